@@ -1,0 +1,122 @@
+"""What can go wrong, and what to do about it.
+
+Two families.  Errors that a *person* can mend before anything is computed are
+`SceneError`: they carry file, line, column, the value, what was expected and the
+likely fix.  What goes wrong *while computing* is first a value (`Outcome`, an
+integer that a compiled kernel can return) and becomes a `ComputationError` only
+at the edge, with time, place, cause, remedy and the snapshot that was left.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+from pathlib import Path
+
+
+class HybridError(Exception):
+    """Base of every error this package raises on purpose."""
+
+
+@dataclass(frozen=True)
+class Complaint:
+    """One thing that is wrong with a scene.
+
+    `where` is the path of the key (``cable.sections[0].mass``); `line` and `column`
+    count from 1 and are None for scenes built without a file.
+    """
+
+    where: str
+    value: str
+    expected: str
+    fix: str = ""
+    line: int | None = None
+    column: int | None = None
+
+    def text(self, file: str = "") -> str:
+        place = file or "scene"
+        if self.line is not None:
+            place += f":{self.line}"
+            if self.column is not None:
+                place += f":{self.column}"
+        lines = [f"{place}: {self.where}", f"    given:    {self.value}", f"    expected: {self.expected}"]
+        if self.fix:
+            lines.append(f"    try:      {self.fix}")
+        return "\n".join(lines)
+
+
+class SceneError(HybridError):
+    """The scene is refused; `complaints` says every reason that was found."""
+
+    def __init__(self, complaints: list[Complaint], file: str = "") -> None:
+        self.complaints = complaints
+        self.file = file
+        super().__init__("\n".join(c.text(file) for c in complaints))
+
+
+class ResultError(HybridError):
+    """A result file cannot be written, opened or understood."""
+
+
+class Outcome(IntEnum):
+    """How one time step (or one static solve) ended."""
+
+    OK = 0
+    NOT_CONVERGED = 1
+    NOT_FINITE = 2
+    SINGULAR = 3
+    SLACK = 4
+    SHARP_BEND = 5
+    STEP_TOO_SMALL = 6
+
+    @property
+    def cause(self) -> str:
+        return _CAUSE[self]
+
+    @property
+    def remedy(self) -> str:
+        return _REMEDY[self]
+
+
+_CAUSE = {
+    Outcome.OK: "done",
+    Outcome.NOT_CONVERGED: "Newton's method did not converge",
+    Outcome.NOT_FINITE: "a number stopped being finite (NaN or infinity)",
+    Outcome.SINGULAR: "the equations have no unique solution: something can move without resistance",
+    Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
+    Outcome.SHARP_BEND: "two neighbouring cells of a rod fold onto each other: the bend is sharper than the mesh",
+    Outcome.STEP_TOO_SMALL: "the time step was halved until it could not be halved any more",
+}
+
+_REMEDY = {
+    Outcome.OK: "",
+    Outcome.NOT_CONVERGED: "make time.step smaller, or add cells where the cable bends",
+    Outcome.NOT_FINITE: "check the motion and the forces at this time; make time.step smaller",
+    Outcome.SINGULAR: "hold the cable at one end at least, or give it a force, tension or bending stiffness",
+    Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
+    Outcome.SHARP_BEND: "add cells there, or make time.step smaller",
+    Outcome.STEP_TOO_SMALL: "look for a jump in motion or force at this time; add cells; add damping",
+}
+
+
+class ComputationError(HybridError):
+    """The computation stopped.
+
+    `t` is the time in s (None in statics), `s` the arc length in m where it showed
+    first, `snapshot` the file that holds the last good state (or None).
+    """
+
+    def __init__(
+        self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None
+    ) -> None:
+        self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot
+        at = " and ".join(
+            x for x in (f"t = {t:.6g} s" if t is not None else "", f"s = {s:.6g} m" if s is not None else "") if x
+        )
+        lines = [f"{outcome.cause}{' at ' + at if at else ''}"]
+        if detail:
+            lines.append(f"    detail:   {detail}")
+        lines.append(f"    try:      {outcome.remedy}")
+        if snapshot is not None:
+            lines.append(f"    snapshot: {snapshot}")
+        super().__init__("\n".join(lines))

@@ -1,0 +1,221 @@
+"""Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
+
+Each iteration is one march along s and one substitution back (solve.elimination),
+then an update of positions, tensions, frames and rates.  The whole step is one
+compiled call.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.compiled import inner, kernel
+from hybrid.physics.cell import chord, strain_tension
+from hybrid.physics.loads import STIFFNESS_DAMPING
+from hybrid.physics.rotations import dot, scale, spin_about, transport
+from hybrid.solve.elimination import march, substitute
+
+OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, SHARP_BEND = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+
+# Newton stops when the next correction, predicted from the last two by quadratic
+# convergence, turns no chord by more than TOLERANCE (rad) and changes no tension by more
+# than TOLERANCE of the largest.  Differences between two ways of computing the same thing
+# (ends swapped, scene rotated) then stay near 1e-9, a hundred times above round-off.
+TOLERANCE = 1e-9
+# Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
+ROUND_OFF = 1e-6
+# A chord that would turn by more than this in one iteration shortens the whole correction
+# (damped Newton): the linearised constraint of length is useless beyond about half a radian.
+LARGEST_TURN = 0.7
+
+
+@inner
+def tension_change(line, e, d, l, il, T, v, de, cv, i):
+    """(Ts - T) + dTs/de . de: how the mixed tension of cell i follows a change of its chord."""
+    Ts = strain_tension(e, l, line.h[i], line.ck[i])
+    stiff = 1.0 / (line.h[i] * line.ck[i])
+    change = Ts - T + stiff * dot(d, de)
+    if line.bits & STIFFNESS_DAMPING:
+        e1 = (v[i + 1, 0] - v[i, 0], v[i + 1, 1] - v[i, 1], v[i + 1, 2] - v[i, 2])
+        along = dot(d, e1)
+        cross_part = il * (dot(e1, de) - along * dot(d, de))
+        change += line.tau[i] * stiff * (along + cv * dot(d, de) + cross_part)
+    return change
+
+
+@kernel
+def measure(line, e, v, T, x, cv):
+    """Size of a Newton correction x: largest shift, largest turn of a chord, largest change of tension, its cell."""
+    n = e.shape[0]
+    shift, turn, pull, spin, where = 0.0, 0.0, 0.0, 0.0, -1
+    big = 0.0
+    for i in range(n):
+        de = (x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2])
+        ei = (e[i, 0], e[i, 1], e[i, 2])
+        d, l, il = chord(ei)
+        dT = abs(tension_change(line, ei, d, l, il, T[i], v, de, cv, i))
+        t = math.sqrt(dot(de, de)) * il
+        if not t <= turn:
+            turn, where = t, i
+        if not dT <= pull:
+            pull = dT
+        if not abs(x[i, 3]) <= spin:
+            spin = abs(x[i, 3])
+        if abs(T[i]) > big:
+            big = abs(T[i])
+        s = abs(x[i, 0]) + abs(x[i, 1]) + abs(x[i, 2])
+        if not s <= shift:
+            shift = s
+    s = abs(x[n, 0]) + abs(x[n, 1]) + abs(x[n, 2])
+    if not s <= shift:
+        shift = s
+    return shift, max(turn, spin), pull, big, where
+
+
+@kernel
+def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part):
+    """Apply `part` of the correction x to everything that depends on it."""
+    n = e.shape[0]
+    for i in range(n):
+        de = (
+            part * (x[i + 1, 0] - x[i, 0]),
+            part * (x[i + 1, 1] - x[i, 1]),
+            part * (x[i + 1, 2] - x[i, 2]),
+        )
+        ei = (e[i, 0], e[i, 1], e[i, 2])
+        d, l, il = chord(ei)
+        full = (x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2])
+        T[i] += part * tension_change(line, ei, d, l, il, T[i], v, full, cv, i)
+        en = (ei[0] + de[0], ei[1] + de[1], ei[2] + de[2])
+        e[i, 0], e[i, 1], e[i, 2] = en
+        if line.spin[i]:
+            dpsi = part * x[i, 3]
+            dn, _, _ = chord(en)
+            a = transport((a1[i, 0], a1[i, 1], a1[i, 2]), d, dn)
+            if dpsi != 0.0:
+                a = spin_about(a, dn, dpsi)
+            a1[i, 0], a1[i, 1], a1[i, 2] = a
+            w[i] += cv * dpsi
+            wd[i] += ca * dpsi
+    # velocities last: the damped law of tension reads those of the configuration being left
+    for i in range(n + 1):
+        for k in range(3):
+            dr = part * x[i, k]
+            u[i, k] += dr
+            v[i, k] += cv * dr
+            vd[i, k] += ca * dr
+
+
+@kernel
+def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, most, W, X, x, report, rows):
+    """Solve the equilibrium at the end of a step.
+
+    Starts from the prediction in (u, e, v, vd, T, a1, w, wd) and leaves the answer
+    there.  `reach` (m) bounds the shift of a node in one iteration.  Returns outcome,
+    iterations, last predicted correction, and the cell or node where it was worst.
+    """
+    before = math.inf
+    left = math.inf
+    where = -1
+    for it in range(1, most + 1):
+        bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows)
+        if bad >= 0:
+            for i in range(e.shape[0]):  # a NaN that came in makes every pivot fail: say so instead of "singular"
+                if not abs(e[i, 0]) + abs(e[i, 1]) + abs(e[i, 2]) + abs(T[i]) < math.inf:
+                    return NOT_FINITE, it, left, i
+            return SINGULAR, it, left, bad
+        substitute(X, x)
+        shift, turn, pull, big, where = measure(line, e, v, T, x, cv)
+        if not (shift < 1e300 and turn < 1e300 and pull < 1e300):
+            return NOT_FINITE, it, left, where
+        part = 1.0
+        if shift > reach:
+            part = reach / shift
+        if turn * part > LARGEST_TURN:
+            part = LARGEST_TURN / turn
+        update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part)
+        # Tension counts against the largest of the line; a line without any tension is judged by its turns.
+        size = max(turn, pull / big if big > 0.0 else 0.0)
+        ratio = size / before
+        left = size * min(1.0, ratio * ratio)
+        if part == 1.0:
+            if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
+                return OK, it, left, where
+            if it > 4 and size < ROUND_OFF and ratio > 0.3:
+                return OK, it, size, where
+        before = size if part == 1.0 else math.inf
+    return NOT_CONVERGED, most, left, where
+
+
+@kernel
+def advance(line, ends, old, new, u, dt, rho, most, reach, W, X, x, report, rows):
+    """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
+
+    Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
+    """
+    am = (2.0 * rho - 1.0) / (rho + 1.0)
+    af = rho / (rho + 1.0)
+    ga = 0.5 - am + af
+    be = 0.25 * (ga + 0.5) ** 2
+    cv = ga / (be * dt)
+    ca = (1.0 - am) / ((1.0 - af) * be * dt * dt)
+    n = old.e.shape[0]
+    for i in range(n + 1):
+        for k in range(3):
+            ai = old.a[i, k]
+            # with a' = a the increment is dt v + dt^2 a/2, and what remains is be dt^2 (a' - a) = 0
+            u[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * ai
+            new.v[i, k] = old.v[i, k] + dt * ai
+            new.vd[i, k] = (am * ai - af * old.vd[i, k]) / (1.0 - af) + ca * be * dt * dt * ai
+    for i in range(n):
+        ei = (old.e[i, 0], old.e[i, 1], old.e[i, 2])
+        en = (
+            ei[0] + u[i + 1, 0] - u[i, 0],
+            ei[1] + u[i + 1, 1] - u[i, 1],
+            ei[2] + u[i + 1, 2] - u[i, 2],
+        )
+        new.e[i, 0], new.e[i, 1], new.e[i, 2] = en
+        new.T[i] = old.T[i]
+        if line.spin[i]:
+            dpsi = dt * old.w[i] + 0.5 * dt * dt * old.wa[i]
+            d, _, _ = chord(ei)
+            dn, _, _ = chord(en)
+            a = transport((old.a1[i, 0], old.a1[i, 1], old.a1[i, 2]), d, dn)
+            a = spin_about(a, dn, dpsi)
+            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
+            new.w[i] = old.w[i] + dt * old.wa[i]
+            new.wd[i] = (am * old.wa[i] - af * old.wd[i]) / (1.0 - af) + ca * be * dt * dt * old.wa[i]
+        else:
+            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = old.a1[i, 0], old.a1[i, 1], old.a1[i, 2]
+            new.w[i], new.wd[i] = 0.0, 0.0
+
+    outcome, iterations, left, where = newton(
+        line, ends, old.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
+        cv, ca, reach, most, W, X, x, report, rows,
+    )  # fmt: skip
+
+    # a' = (r' - rp)/(be dt^2) with rp = r + dt v + dt^2 (1/2 - be) a; likewise for the spin, through w'
+    for i in range(n + 1):
+        for k in range(3):
+            rp = dt * old.v[i, k] + dt * dt * (0.5 - be) * old.a[i, k]
+            new.a[i, k] = (u[i, k] - rp) / (be * dt * dt)
+            new.r[i, k] = old.r[i, k] + u[i, k]
+    for i in range(n):
+        if line.spin[i]:
+            new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
+        else:
+            new.wa[i] = 0.0
+    return outcome, iterations, left, where
+
+
+@kernel
+def slackest(line, T, floor):
+    """Cell of a catenary zone whose tension is lowest and not above `floor`, or -1."""
+    where, low = -1, floor
+    for i in range(T.shape[0]):
+        if not line.spin[i] and not T[i] > low:
+            where, low = i, T[i]
+    return where
+
+
+__all__ = ["advance", "newton", "scale", "slackest"]

@@ -1,0 +1,122 @@
+"""Every hand-written derivative against differences of the residual, on random three-dimensional states.
+
+Tolerance: the residual is smooth and of order one; a fourth-order central difference
+with step 1e-3 has a truncation error near 1e-10 and round-off near 1e-12, so 1e-6 of the
+largest entry catches any wrong term while a correct Jacobian passes with room to spare.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from hybrid.model.state import Ends, Line, blank_state
+from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
+from hybrid.solve.elimination import march, substitute, workspace
+from hybrid.solve.step import update
+
+N = 7
+CV, CA = 3.0, 7.0
+ZONES = {
+    "rod": [1] * (N + 1),
+    "catenary": [0] * (N + 1),
+    "rod-catenary": [1, 1, 1, 0, 0, 0, 0, 0],
+    "catenary-rod": [0, 0, 0, 0, 0, 1, 1, 1],
+    "three": [0, 0, 1, 1, 0, 0, 1, 0],
+}
+BITS = [0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, 31]
+
+
+def random_case(seed, element, bits, held=(0, 0)):
+    """A line of N cells in a random, strongly bent and moving configuration with all parameters of order one."""
+    g = np.random.default_rng(seed)
+    h = g.uniform(0.5, 1.5, N)
+    hn = np.zeros(N + 1)
+    hn[:-1] += h / 2
+    hn[1:] += h / 2
+    element = np.array(element, np.int8)
+    spin = np.array([element[i] or element[i + 1] for i in range(N)], np.int8)
+
+    def p(*shape):
+        return g.uniform(0.5, 1.5, shape)
+
+    line = Line(
+        s=np.concatenate([[0], np.cumsum(h)]), h=h, ck=0.3 * p(N), mass=p(N + 1), force=g.normal(size=(N + 1, 3)),
+        element=element, spin=spin, kb=p(N + 1, 3), k0=0.2 * g.normal(size=(N + 1, 3)), hn=hn, rotary=p(N),
+        polar=p(N), drag_n=p(N), drag_t=p(N), added_n=p(N), added_t=p(N), damp=p(N + 1), tau=0.2 * p(N),
+        current=g.normal(size=3), bits=bits,
+    )  # fmt: skip
+    frames = [np.linalg.qr(g.normal(size=(3, 3)))[0] for _ in range(2)]
+    ends = Ends(
+        np.array(held, np.int8), g.normal(size=(2, 3)),
+        np.array([(f * np.sign(np.linalg.det(f))).ravel() for f in frames]),
+        g.normal(size=(2, 3)), g.normal(size=(2, 3)), g.normal(size=(2, 3)),
+    )  # fmt: skip
+    st = blank_state(N)
+    d = np.array([1.0, 0.3, -0.2]) + 0.35 * g.normal(size=(N, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    st.e[:] = d * h[:, None] * g.uniform(0.9, 1.1, N)[:, None]
+    st.r[1:] = np.cumsum(st.e, axis=0)
+    for x in (st.v, st.vd, st.w, st.wd, st.T):
+        x[:] = g.normal(size=x.shape)
+    a = np.cross(d, g.normal(size=(N, 3)))
+    st.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
+    # A mixed tension equal to that of the law makes the geometric stiffness the exact derivative.
+    l = np.linalg.norm(st.e, axis=1)
+    rate = np.einsum("ij,ij->i", st.e / l[:, None], np.diff(st.v, axis=0))
+    st.T[:] = ((l + (line.tau * rate if bits & STIFFNESS_DAMPING else 0)) / h - 1) / line.ck
+    return line, ends, st
+
+
+def assembled(line, ends, st, u):
+    """Dense Jacobian and right-hand side of the rows that the march eliminates."""
+    n = st.e.shape[0]
+    W, X, _, report, _ = workspace(n)
+    rows = np.zeros((n + 1, 80))
+    march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, W, X, report, rows)
+    J = np.zeros((4 * (n + 1) + 8, 4 * (n + 1) + 16))
+    b = np.zeros(4 * (n + 1))
+    for i in range(n + 1):
+        block = rows[i].reshape(4, 20)
+        J[4 * i : 4 * i + 4, 4 * i : 4 * i + 19] = block[:, :19]
+        b[4 * i : 4 * i + 4] = block[:, 19]
+    return J[: 4 * (n + 1), 8 : 8 + 4 * (n + 1)], b
+
+
+def residual_at(line, ends, st, x):
+    """Right-hand side after the configuration is moved by x (shape (N+1, 4))."""
+    s, u = st.copy(), np.zeros_like(st.r)
+    update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0)
+    return assembled(line, ends, s, u)[1]
+
+
+@pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
+def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
+    line, ends, st = random_case(3, ZONES[zones], bits)
+    J, _ = assembled(line, ends, st, np.zeros_like(st.r))
+    numeric = np.zeros_like(J)
+    t = 1e-3
+    for j in range(J.shape[1]):
+        x = np.zeros(J.shape[1])
+        x[j] = t
+        f = [residual_at(line, ends, st, (k * x).reshape(-1, 4)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    spinless = [4 * i + 3 for i in range(N + 1) if i == N or not line.spin[i]]
+    numeric[spinless, spinless] = 1.0  # rows without a spin are replaced by the identity
+    soft = [4 * i + 3 for i in range(N) if line.spin[i]]
+    exact = J.copy()
+    exact[soft, soft] += [1e-9 * (line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]) for i in range(N) if line.spin[i]]  # fmt: skip
+    assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+@pytest.mark.parametrize("zones", ZONES)
+@pytest.mark.parametrize("held", [(0, 0), (1, 0), (1, 1)])
+def test_elimination_equals_a_dense_solve(zones, held):
+    """The march and the substitution back against LAPACK on the same rows; bound: condition number times round-off."""
+    line, ends, st = random_case(5, ZONES[zones], 31, held)
+    u = np.zeros_like(st.r)
+    J, b = assembled(line, ends, st, u)
+    W, X, x, report, rows = workspace(N)
+    assert march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, W, X, report, rows) == -1
+    substitute(X, x)
+    assert np.abs(x.ravel() - np.linalg.solve(J, b)).max() < 1e-14 * np.linalg.cond(J) * np.abs(x).max()
