@@ -1,0 +1,80 @@
+"""Dynamics of long cables that are taut almost everywhere and slack somewhere.
+
+A taut cable is a flexible catenary; where tension drops, bending and torsion rule and the
+cable is a Kirchhoff rod.  `hybrid` computes both in one line, with joints between them.
+
+    scene  = hybrid.load_scene("scene.yaml")
+    result = hybrid.run(scene, output="run.h5")
+    result.tension                 # (nt, ns), N
+
+Names are imported when first used, so that `import hybrid` costs nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
+    from hybrid.results.plot import plot_summary as plot
+    from hybrid.results.read import Result
+    from hybrid.results.read import open_result as open  # noqa: A004
+    from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
+    from hybrid.scene.schema import Scene
+    from hybrid.simulate import plan, run, static
+
+_HOME = {
+    "ComputationError": ("hybrid.errors", "ComputationError"),
+    "HybridError": ("hybrid.errors", "HybridError"),
+    "Outcome": ("hybrid.errors", "Outcome"),
+    "Result": ("hybrid.results.read", "Result"),
+    "ResultError": ("hybrid.errors", "ResultError"),
+    "Scene": ("hybrid.scene.schema", "Scene"),
+    "SceneError": ("hybrid.errors", "SceneError"),
+    "load_scene": ("hybrid.scene.read", "load_scene"),
+    "open": ("hybrid.results.read", "open_result"),
+    "parse_scene": ("hybrid.scene.read", "parse_scene"),
+    "plan": ("hybrid.simulate", "plan"),
+    "plot": ("hybrid.results.plot", "plot_summary"),
+    "run": ("hybrid.simulate", "run"),
+    "scene_text": ("hybrid.scene.read", "scene_text"),
+    "static": ("hybrid.simulate", "static"),
+    "validate_scene": ("hybrid.scene.read", "validate_scene"),
+}
+
+__all__ = [
+    "ComputationError",
+    "HybridError",
+    "Outcome",
+    "Result",
+    "ResultError",
+    "Scene",
+    "SceneError",
+    "load_scene",
+    "open",
+    "parse_scene",
+    "plan",
+    "plot",
+    "run",
+    "scene_text",
+    "static",
+    "validate_scene",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name == "__version__":
+        from importlib.metadata import version
+
+        return version("hybrid-cable")
+    if name not in _HOME:
+        raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
+    module, attribute = _HOME[name]
+    value = getattr(import_module(module), attribute)
+    globals()[name] = value
+    return value
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

@@ -1,0 +1,143 @@
+"""What the two ends impose at a time t: positions, frames, forces, moments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Literal, NamedTuple, Protocol
+
+import numpy as np
+
+from hybrid.model.state import Ends, Floats
+
+# A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
+SAME_DIRECTION = 1e-6
+
+
+def first_director(tangent: Sequence[float], normal: Sequence[float] | None = None) -> Floats:
+    """Unit vector normal to `tangent`, in the plane of `normal` or, without one, away from the nearest axis."""
+    t = np.array(tangent, float) / np.linalg.norm(tangent)
+    seed = np.array(normal, float) if normal is not None else np.eye(3)[int(np.argmin(np.abs(t)))]
+    a = seed - np.dot(seed, t) * t
+    a = a / np.linalg.norm(a)
+    a -= np.dot(a, t) * t
+    return a / np.linalg.norm(a)
+
+
+def transported(first: Floats, tangents: Floats) -> Floats:
+    """`first`, normal to tangents[0], carried without twist along all `tangents` (n, 3)."""
+    t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
+    out = np.empty_like(t)
+    out[0] = first
+    for i in range(1, len(t)):
+        a, c = out[i - 1], 1.0 + float(np.dot(t[i - 1], t[i]))
+        # a fold has no smallest rotation: any director normal to both will do, and a rod refuses the fold later
+        b = a - np.dot(a, t[i]) / c * (t[i - 1] + t[i]) if c > 1e-12 else a
+        b = b - np.dot(b, t[i]) * t[i]
+        out[i] = b / np.linalg.norm(b)
+    return out
+
+
+class Moves(Protocol):
+    """A prescribed motion: position (3,), velocity (3,), frame (3, 3) or None, angular velocity (3,) at a time."""
+
+    def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]: ...
+
+
+class EndLoad(NamedTuple):
+    """A force (N) or moment (N m) on end 0 or 1 that acts until a time."""
+
+    what: Literal["force", "moment"]
+    end: int
+    value: Floats
+    until: float
+
+
+class EndConditions:
+    """Evaluates both ends into the arrays of `Ends`.
+
+    `moving` is False when nothing but loads that stop depends on time.  `breaks` lists the
+    times at which a load stops (a step must end there).
+    """
+
+    def __init__(
+        self, held: Sequence[bool], position: Floats, frame: Floats, loads: Sequence[EndLoad], motions: dict[int, Moves]
+    ) -> None:
+        zero = np.zeros((2, 3))
+        self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
+        self.velocity = np.zeros((2, 3))
+        self.moving = bool(motions)
+        self.breaks = sorted({x.until for x in loads if np.isfinite(x.until)})
+        self._loads, self._motions = tuple(loads), motions
+        self._turns: dict[int, tuple[Floats, float]] = {}
+        self._turn_time = np.inf
+        self.set_loads(0.0)
+        self.at(0.0)
+
+    def set_loads(self, t: float) -> None:
+        """Forces and moments that act just after t."""
+        self.values.force[:] = 0.0
+        self.values.moment[:] = 0.0
+        for load in self._loads:
+            if t < load.until:
+                getattr(self.values, load.what)[load.end] += load.value
+
+    def at(self, t: float) -> Ends:
+        """Positions and frames at t; the arrays returned are overwritten by the next call."""
+        for k, motion in self._motions.items():
+            position, velocity, frame, spin = motion.at(t)
+            self.values.position[k] = position
+            self.velocity[k] = velocity
+            if frame is not None:
+                self.values.frame[k] = frame.ravel()
+                self.values.spin[k] = spin
+        if t < self._turn_time:
+            self._turn_in(t)
+        elif self._turns:  # done: leave the frames as they are given
+            self._end_turn()
+        return self.values
+
+    def turn_in(self, chords: tuple[Floats, Floats], which: Sequence[bool], duration: float) -> list[tuple[int, float]]:
+        """Let the tangents of the ends `which` start as the cable lies and reach their given directions after `duration`.
+
+        chords: directions (3,) of the first and last cell at t = 0.  A tangent imposed at once on a cable
+        that does not have it is a blow whose strength depends on the mesh alone.  Returns (end, angle in rad) of those that turn.
+        """
+        turned = []
+        for k in range(2):
+            tangent = self.values.frame[k].reshape(3, 3)[:, 2]
+            axis = np.cross(chords[k], tangent)
+            sine, cosine = float(np.linalg.norm(axis)), float(np.dot(chords[k], tangent))
+            angle = float(np.arctan2(sine, cosine))
+            if which[k] and angle > SAME_DIRECTION:
+                if sine < 1e-9:  # opposite: any axis across will do
+                    axis, sine = first_director(tangent), 1.0
+                self._turns[k] = (axis / sine, angle)
+                turned.append((k, angle))
+        if turned:
+            self._turn_time, self.moving = duration, True
+            self._given = (self.values.frame.copy(), self.values.spin.copy())
+            self.at(0.0)
+        return turned
+
+    def _turn_in(self, t: float) -> None:
+        x = max(t, 0.0) / self._turn_time
+        left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        rate = 30.0 * x * x * (1.0 - x) ** 2 / self._turn_time
+        for k, (axis, angle) in self._turns.items():
+            if k not in self._motions:
+                self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
+            back = _rotation(axis, -angle * left)
+            self.values.frame[k] = (back @ self.values.frame[k].reshape(3, 3)).ravel()
+            self.values.spin[k] = back @ self.values.spin[k] + axis * angle * rate
+
+    def _end_turn(self) -> None:
+        for k in self._turns:
+            if k not in self._motions:
+                self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
+        self._turns = {}
+
+
+def _rotation(axis: Floats, angle: float) -> Floats:
+    """Rotation matrix (3, 3) about a unit axis."""
+    K = np.array([[0, -axis[2], axis[1]], [axis[2], 0, -axis[0]], [-axis[1], axis[0], 0]])
+    return np.asarray(np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K))

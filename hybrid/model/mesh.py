@@ -1,0 +1,143 @@
+"""Where the nodes go: zones and sections cut the line, cells fill the pieces, graded if asked."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.model.state import Floats
+
+DEFAULT_CELLS = 100  # of a line whose scene says nothing: errors of a smooth sag near 1e-4 of the length
+
+
+@dataclass(frozen=True)
+class Zone:
+    """A stretch [s_a, s_b] of one kind, "rod" or "catenary" (m, unstretched)."""
+
+    kind: str
+    s_a: float
+    s_b: float
+
+
+@dataclass(frozen=True)
+class ZonePlan:
+    """A zone as a scene asks for it: kind, length (m), number of cells and grading, None where it leaves them open."""
+
+    kind: str
+    length: float
+    cells: int | None = None
+    ratio: float | None = None
+
+
+def graded(cells: int, ratio: float) -> Floats:
+    """Fractions 0 .. 1 of the nodes of `cells` cells whose lengths grow geometrically to `ratio` times the first."""
+    q = ratio ** (1.0 / (cells - 1)) if cells > 1 else 1.0
+    lengths = q ** np.arange(cells)
+    x = np.concatenate([[0.0], np.cumsum(lengths)])
+    return x / x[-1]
+
+
+def share(total: int, lengths: Sequence[float]) -> list[int]:
+    """Distribute `total` cells over stretches in proportion to their lengths, at least two each."""
+    whole = sum(lengths)
+    exact = [total * length / whole for length in lengths]
+    counts = [max(2, int(x)) for x in exact]
+    by_rest = sorted(range(len(lengths)), key=lambda i: int(exact[i]) - exact[i])
+    for i in by_rest:
+        if sum(counts) >= total:
+            break
+        counts[i] += 1
+    return counts
+
+
+def place_nodes(
+    plans: Sequence[ZonePlan], cuts: Sequence[float], cells: int | None, ratio: float | None
+) -> tuple[Floats, tuple[Zone, ...]]:
+    """Nodes s (N+1,) in m and the zones, for zones in order and further `cuts` (m) where a node must lie.
+
+    A cut moves the nearest free node of its zone when that is less than half a cell away
+    and is inserted otherwise.  `ratio` grades a line of one zone as a whole.
+    """
+    open_zones = [p for p in plans if p.cells is None]
+    if cells is None:
+        counts = [p.cells or 0 for p in plans]
+        known = [(p.cells, p.length) for p in plans if p.cells]
+        density = DEFAULT_CELLS / sum(p.length for p in plans) if not known else max(c / x for c, x in known)
+        rest = [max(2, round(density * p.length)) for p in open_zones]
+    else:
+        counts = [p.cells or 0 for p in plans]
+        left = cells - sum(counts)
+        if left < 2 * len(open_zones) or (not open_zones and left != 0):
+            raise SceneError(
+                [
+                    Complaint(
+                        "mesh.cells",
+                        str(cells),
+                        f"what the zones ask for ({sum(counts)}) and at least two for each of the other "
+                        f"{len(open_zones)} zones",
+                        "leave mesh.cells out, or leave `cells` out of one zone",
+                    )
+                ]
+            )
+        rest = share(left, [p.length for p in open_zones]) if open_zones else []
+    it = iter(rest)
+    counts = [c or next(it) for c in counts]
+
+    s = [0.0]
+    zones = []
+    total = sum(p.length for p in plans)
+    start = 0.0
+    for k, (plan, count) in enumerate(zip(plans, counts, strict=True)):
+        stop = total if k == len(plans) - 1 else start + plan.length
+        r = plan.ratio if plan.ratio is not None else (ratio if len(plans) == 1 and ratio else 1.0)
+        piece = start + (stop - start) * graded(count, r)
+        piece[-1] = stop
+        s.extend(_with_cuts(piece, [c for c in cuts if start < c < stop])[1:])
+        zones.append(Zone(plan.kind, start, stop))
+        start = stop
+    return np.array(s), tuple(zones)
+
+
+def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:
+    """`nodes` with each cut as a node."""
+    x = list(nodes)
+    fixed = {0, len(x) - 1}
+    for c in sorted(cuts):
+        i = int(np.argmin(np.abs(np.array(x) - c)))
+        tolerance = 1e-9 * (x[-1] - x[0])
+        if abs(x[i] - c) <= tolerance:
+            x[i] = x[i] if i in (0, len(x) - 1) else c
+            fixed.add(i)
+        elif i not in fixed and abs(x[i] - c) < 0.5 * min(x[i] - x[i - 1], x[i + 1] - x[i]):
+            x[i] = c
+            fixed.add(i)
+        else:
+            i = int(np.searchsorted(x, c))
+            x.insert(i, c)
+            fixed = {j + (j >= i) for j in fixed} | {i}
+    return x
+
+
+def given_nodes(nodes: Sequence[float], plans: Sequence[ZonePlan], cuts: Sequence[float]) -> tuple[Floats, tuple[Zone, ...]]:
+    """The nodes a scene lists itself; every zone boundary and every cut must be among them."""
+    s = np.array(nodes, float)
+    bounds = np.concatenate([[0.0], np.cumsum([p.length for p in plans])])
+    for x in [*bounds, *cuts]:
+        i = int(np.argmin(np.abs(s - x)))
+        if abs(s[i] - x) > 1e-9 * s[-1]:
+            raise SceneError(
+                [
+                    Complaint(
+                        "mesh.nodes",
+                        f"nearest node to {x:g} m is {s[i]:g} m",
+                        f"a node at {x:g} m, where a zone or a section begins",
+                        f"add {x:g} to the list",
+                    )
+                ]
+            )
+        s[i] = x
+    return s, tuple(Zone(p.kind, a, b) for p, (a, b) in zip(plans, pairwise(bounds.tolist()), strict=True))

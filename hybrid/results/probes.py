@@ -1,0 +1,291 @@
+"""What a run writes down: quantities on the fixed output grid, evaluated only when an output is due.
+
+Second order everywhere: positions by cubic Hermite interpolation of the nodes (one-sided
+at joints, where the tangent may kink), tensions and tangents from the middle of the
+cells, moments and curvatures from the nodes, zone by zone.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from hybrid.model.mesh import Zone
+from hybrid.model.state import Ends, Floats, Line, State
+from hybrid.results.record import Field
+from hybrid.solve.observe import observe
+from hybrid.solve.timestep import POWERS
+
+
+def _sparse(rows: list[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
+    i, j, x = (np.array(column) for column in zip(*rows, strict=True))
+    return csr_array((x, (i, j)), shape=shape)
+
+
+def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
+    """Weights of the derivative at node i of x from the parabola through the three nearest nodes."""
+
+    def at(i: int) -> list[tuple[int, float]]:
+        if x.size == 2:
+            return [(0, -1.0 / (x[1] - x[0])), (1, 1.0 / (x[1] - x[0]))]
+        j = min(max(i, 1), x.size - 2)
+        a, b, c = x[j - 1], x[j], x[j + 1]
+        p = x[i]
+        return [
+            (j - 1, (2 * p - b - c) / ((a - b) * (a - c))),
+            (j, (2 * p - a - c) / ((b - a) * (b - c))),
+            (j + 1, (2 * p - a - b) / ((c - a) * (c - b))),
+        ]
+
+    return at
+
+
+class Grid:
+    """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
+
+    nodes: cubic, from node values (positions, velocities); cells: linear, from values at
+    the middle of the cells; sides: linear, from node values that may differ on the two
+    sides of a zone boundary (one entry per zone and node, `side_nodes`).
+    """
+
+    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
+        cubic, middle, linear = [], [], []
+        self.side_nodes: list[int] = []
+        middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
+        done = np.zeros(s.size, bool)
+        self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the zone's sides
+        for zone in zones:
+            a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
+            offset = len(self.side_nodes)
+            self.spans.append((a, b, offset))
+            self.side_nodes += range(a, b + 1)
+            x, c = nodes_s[a : b + 1], middles[a:b]
+            slope = _slopes(x)
+            inside = np.flatnonzero(~done & (s <= zone.s_b + 1e-12 * nodes_s[-1]))
+            done[inside] = True
+            for g in inside:
+                k = min(max(int(np.searchsorted(x, s[g], side="right")) - 1, 0), x.size - 2)
+                H = x[k + 1] - x[k]
+                p = (s[g] - x[k]) / H
+                cubic.append((g, a + k, (1 + 2 * p) * (1 - p) ** 2))
+                cubic.append((g, a + k + 1, p * p * (3 - 2 * p)))
+                cubic += [(g, a + j, p * (1 - p) ** 2 * H * w) for j, w in slope(k)]
+                cubic += [(g, a + j, p * p * (p - 1) * H * w) for j, w in slope(k + 1)]
+                linear += [(g, offset + k, 1 - p), (g, offset + k + 1, p)]
+                if c.size == 1:
+                    middle.append((g, a, 1.0))
+                else:
+                    m = min(max(int(np.searchsorted(c, s[g])) - 1, 0), c.size - 2)
+                    q = (s[g] - c[m]) / (c[m + 1] - c[m])
+                    middle += [(g, a + m, 1 - q), (g, a + m + 1, q)]
+        n = nodes_s.size
+        self.nodes = _sparse(cubic, (s.size, n))
+        self.cells = _sparse(middle, (s.size, n - 1))
+        self.sides = _sparse(linear, (s.size, len(self.side_nodes)))
+        self.s = s
+
+
+class View:
+    """One state looked at: everything the probes share is computed once, and only if a probe needs it."""
+
+    def __init__(self, line: Line, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats) -> None:
+        self.line, self.zones, self.ends, self.state, self.grid, self.report = line, zones, ends, state, grid, report
+
+    @cached_property
+    def d(self) -> Floats:
+        return np.asarray(self.state.e / np.linalg.norm(self.state.e, axis=1)[:, None])
+
+    @cached_property
+    def tangent(self) -> Floats:
+        t = self.grid.cells @ self.d
+        return np.asarray(t / np.linalg.norm(t, axis=1)[:, None])
+
+    @cached_property
+    def _observed(self) -> tuple[Floats, Floats, Floats]:
+        n, st = self.line.h.size, self.state
+        M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
+        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
+        return M, strain, energy
+
+    @property
+    def node_moment(self) -> Floats:
+        """(N+1, 3) N m, inertial."""
+        return self._observed[0]
+
+    @property
+    def energy(self) -> Floats:
+        """(4,) J: kinetic, bending, torsion, stretch."""
+        return self._observed[2]
+
+    @cached_property
+    def moment(self) -> Floats:
+        return np.asarray(self.grid.sides @ self.node_moment[self.grid.side_nodes])
+
+    @cached_property
+    def torque(self) -> Floats:
+        return np.einsum("ij,ij->i", self.moment, self.tangent)
+
+    @cached_property
+    def _strains(self) -> Floats:
+        """Curvature and twist (n sides, 2), 1/m."""
+        line, d = self.line, self.d
+        out = np.zeros((len(self.grid.side_nodes), 2))
+        cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
+        cross = np.linalg.norm(np.cross(d[:-1], d[1:]), axis=1)
+        sharp = np.zeros(line.s.size)
+        sharp[1:-1] = 2.0 * cross / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1])
+        strain = self._observed[1]
+        for zone, (a, b, o) in zip(self.zones, self.grid.spans, strict=True):
+            side = out[o : o + b - a + 1]
+            if zone.kind == "rod":
+                k = strain[a : b + 1] / line.hn[a : b + 1, None]
+                side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
+                for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
+                    if not line.element[node]:  # a joint or an end without element: strain of the moment that is given
+                        side[row] = self._strain_of_moment(node, cell)
+            else:
+                side[:, 0] = sharp[a : b + 1]
+                for row, one, two, x, x1, x2 in (
+                    (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
+                    (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
+                ):
+                    if b - a >= 4:
+                        p = (x - x1) / (x2 - x1)
+                        side[row, 0] = max(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
+                    elif b - a >= 2:
+                        side[row, 0] = side[one, 0]
+        return out
+
+    def _strain_of_moment(self, node: int, cell: int) -> tuple[float, float]:
+        """Curvature and twist at a rod's end that carries the given moment (zero at a joint)."""
+        line = self.line
+        inner = cell + 1 if cell == node else cell
+        if not line.element[inner]:
+            return 0.0, 0.0
+        B = line.kb[inner] * line.hn[inner]
+        k0 = line.k0[inner] / line.hn[inner]
+        a1, d = self.state.a1[cell], self.d[cell]
+        body = np.array(
+            [a1 @ self.node_moment[node], np.cross(d, a1) @ self.node_moment[node], d @ self.node_moment[node]]
+        )
+        k = k0 + np.divide(body, B, out=np.zeros(3), where=B > 0)
+        return float(np.hypot(k[0], k[1])), float(k[2])
+
+    @cached_property
+    def curvature_twist(self) -> Floats:
+        return np.asarray(self.grid.sides @ self._strains)
+
+    @cached_property
+    def shear(self) -> Floats:
+        Q = np.diff(self.node_moment, axis=0)
+        V = np.cross(self.d, Q) / np.linalg.norm(self.state.e, axis=1)[:, None]
+        V[self.line.spin == 0] = 0.0
+        return np.asarray(np.linalg.norm(self.grid.cells @ V, axis=1))
+
+    def bending_moment(self) -> Floats:
+        return np.asarray(np.linalg.norm(self.moment - self.torque[:, None] * self.tangent, axis=1))
+
+    def reaction(self, k: int) -> Floats:
+        """Force of the support on the cable at end k; the applied force where the end is not held."""
+        return -self.report[3 * k : 3 * k + 3] if self.ends.held[k] else self.ends.force[k].copy()
+
+
+@dataclass(frozen=True)
+class Probe:
+    """A quantity that can be recorded: unit, description, dimensions, how to get it, and what it `needs`."""
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+    value: Callable[[View], object]
+    needs: str = ""
+    frame: str = ""
+
+
+_S, _SX, _X = ("s",), ("s", "xyz"), ("xyz",)
+PROBES: dict[str, Probe] = {
+    "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.state.r, frame="inertial"),
+    "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.state.v, frame="inertial"),
+    "tension": Probe("N", "tension (effective tension in a fluid)", _S, lambda v: v.grid.cells @ v.state.T),
+    "theta": Probe(
+        "rad", "angle of the tangent to the z axis", _S, lambda v: np.arccos(np.clip(v.tangent[:, 2], -1, 1))
+    ),
+    "phi": Probe(
+        "rad", "azimuth of the tangent from the x axis", _S, lambda v: np.arctan2(v.tangent[:, 1], v.tangent[:, 0])
+    ),
+    "curvature": Probe("1/m", "curvature of the centreline", _S, lambda v: v.curvature_twist[:, 0]),
+    "twist": Probe("1/m", "twist of the material frame per length", _S, lambda v: v.curvature_twist[:, 1], "rod"),
+    "bending_moment": Probe("N m", "magnitude of the bending moment", _S, lambda v: v.bending_moment(), "rod"),
+    "torque": Probe("N m", "torque (moment about the tangent)", _S, lambda v: v.torque, "rod"),
+    "shear": Probe("N", "magnitude of the shear force", _S, lambda v: v.shear, "rod"),
+    "reaction_start": Probe("N", "force on the cable at its start", _X, lambda v: v.reaction(0), frame="inertial"),
+    "reaction_end": Probe("N", "force on the cable at its end", _X, lambda v: v.reaction(1), frame="inertial"),
+    "moment_start": Probe(
+        "N m", "moment on the cable at its start", _X, lambda v: -v.node_moment[0], "rod", "inertial"
+    ),
+    "moment_end": Probe(
+        "N m", "moment on the cable at its end", _X, lambda v: v.node_moment[-1].copy(), "rod", "inertial"
+    ),
+    "energy/kinetic": Probe("J", "kinetic energy, with rotary inertia", (), lambda v: v.energy[0]),
+    "energy/potential": Probe(
+        "J", "potential energy of weight and buoyancy, zero at z = 0", (), lambda v: -np.sum(v.line.force * v.state.r)
+    ),
+    "energy/stretch": Probe("J", "energy of stretching", (), lambda v: v.energy[3]),
+    "energy/bending": Probe("J", "energy of bending", (), lambda v: v.energy[1], "rod"),
+    "energy/torsion": Probe("J", "energy of torsion", (), lambda v: v.energy[2], "rod"),
+}
+
+WORK = {
+    "start": "work done on the cable at its start",
+    "end": "work done on the cable at its end",
+    "applied": "work of applied forces and moments",
+    "drag": "work of drag",
+    "mass_damping": "work of mass-proportional damping",
+    "stiffness_damping": "work of stiffness-proportional damping",
+    "added_mass": "work of the added mass",
+    "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
+}
+
+
+class Observer:
+    """Fields and values for one run: what its line has, on its output grid."""
+
+    def __init__(self, line: Line, zones: Sequence[Zone], s: Floats, with_work: bool) -> None:
+        self.line, self.zones, self.grid = line, tuple(zones), Grid(line.s, zones, s)
+        has = {zone.kind for zone in zones}
+        self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
+        self._first_energy: float | None = None
+        self._with_work = with_work
+        size = {"s": s.size, "xyz": 3}
+        fields = [
+            Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame)
+            for name, p in self._probes.items()
+        ]
+        if with_work:
+            fields += [Field(f"work/{name}", "J", text) for name, text in WORK.items()]
+        self.fields = tuple(fields)
+
+    @property
+    def zone_rows(self) -> list[tuple[str, float, float]]:
+        return [(z.kind, z.s_a, z.s_b) for z in self.zones]
+
+    def values(self, ends: Ends, state: State, report: Floats, work: Floats) -> dict[str, object]:
+        """All fields at one moment; `work` (7,) J in the order of POWERS since the start."""
+        view = View(self.line, self.zones, ends, state, self.grid, report)
+        out = {name: p.value(view) for name, p in self._probes.items()}
+        if self._with_work:
+            energy = float(sum(out[name] for name in out if name.startswith("energy/")))  # type: ignore[misc]
+            if self._first_energy is None:
+                self._first_energy = energy
+            out |= {f"work/{name}": float(x) for name, x in zip(POWERS, work, strict=True)}
+            out["work/scheme"] = energy - self._first_energy - float(work.sum())
+        return out
+
+
+def output_points(points: int | Sequence[float], length: float) -> Floats:
+    """Output grid (ns,), m: that many points from end to end, or the ones listed."""
+    return np.linspace(0.0, length, points) if isinstance(points, int) else np.array(points, float)

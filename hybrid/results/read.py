@@ -1,0 +1,399 @@
+"""Read what a run has written: `open_result("run.h5")` gives a `Result`.
+
+The file is HDF5 and every dataset says its own unit, frame and dimensions, so the
+reader is generic: whatever was recorded is there under its name, as an attribute
+(``result.tension``) or an item (``result["energy/kinetic"]``).  Arrays are read when
+they are asked for, once.
+
+Layout, format 1 (`record` writes it)::
+
+    /t (nt)  /s (ns)  /xyz (3)      dimension scales: s, m, and the inertial axes
+    /tension (t, s)  /energy/kinetic (t)  ...    one dataset per field
+    /steps/*                        one row per time step; its first column is the scale
+    /zones/{t,output,kind,s_a,s_b}  one row per zone, written only when the zones change;
+                                    they hold from output number `output` on
+    /events/{t,s_a,s_b,kind,text}   one row per event
+    /scene                          the scene, as YAML text
+
+A table grows by whole rows and its dimension scale grows last, so the length of the
+scale says how many rows are complete; a reader beside a running writer, or after a
+kill, looks at no row beyond it.
+"""
+
+from __future__ import annotations
+
+import difflib
+import io
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import h5py
+import numpy as np
+
+from hybrid.errors import ResultError
+
+FORMAT = "hybrid-cable"
+FORMAT_VERSION = 1
+ALIASES = {"times": "t", "moment": "bending_moment"}
+
+# The writer holds the file alone for a few milliseconds while it starts; a reader that comes
+# just then waits this long (s) before it believes the lock.
+_PATIENCE = 1.0
+
+
+class Zone(NamedTuple):
+    """A stretch s_a <= s <= s_b (m, unstretched) and the kind of model that holds there."""
+
+    kind: str
+    s_a: float
+    s_b: float
+
+
+class Event(NamedTuple):
+    """Something that happened at time t (s) on s_a <= s <= s_b (m), and why."""
+
+    t: float
+    s_a: float
+    s_b: float
+    kind: str
+    text: str
+
+
+class UnknownName(ResultError, AttributeError):
+    """The file holds nothing of this name.  (An AttributeError too, so that `hasattr` works.)"""
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """The datasets of one group, by name: ``result.energy["kinetic"]`` or ``result.energy.kinetic``."""
+
+    def __init__(self, result: Result, group: str) -> None:
+        self._result, self._group = result, group
+        self._keys = [n.removeprefix(group + "/") for n in result.names if n.startswith(group + "/")]
+
+    def __getitem__(self, key: str) -> np.ndarray:
+        return self._result[f"{self._group}/{key}"]
+
+    def __getattr__(self, key: str) -> np.ndarray:
+        if key.startswith("_"):
+            raise AttributeError(key)
+        return self[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._keys)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._keys]
+
+    def __repr__(self) -> str:
+        return f"<{self._group}: {', '.join(self._keys)}>"
+
+
+class ZoneHistory(Sequence[list[Zone]]):
+    """`zones[i]`: the zones at output i, in the order of s."""
+
+    def __init__(self, outputs: np.ndarray, zones: list[Zone], count: int) -> None:
+        self._first, starts = np.unique(outputs, return_index=True)
+        self._sets = [zones[a:b] for a, b in zip(starts, [*starts, len(zones)][1:], strict=True)]
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, i: Any) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(self._count))]
+        if not -self._count <= i < self._count:
+            raise IndexError(f"output {i} of {self._count}")
+        k = int(np.searchsorted(self._first, i % self._count, side="right")) - 1
+        return list(self._sets[k]) if k >= 0 else []
+
+
+class Result:
+    """The recorded answer of one run.
+
+    Arrays have the output times first: `position` is (nt, ns, 3).  `units`, `describe`
+    and `dims` say what each is.  Use `refresh` to see what a running computation has
+    added since.
+    """
+
+    def __init__(self, source: Path | io.BytesIO) -> None:
+        self._source = source
+        self._open()
+
+    def _open(self) -> None:
+        self._file = _open_file(self._source)
+        try:
+            _check_format(self._file, self._source)
+            self._scan()
+        except BaseException:
+            self._file.close()
+            raise
+
+    def _scan(self) -> None:
+        self._cache: dict[str, np.ndarray] = {}
+        self._dims: dict[str, tuple[str, ...]] = {}
+        self.units: dict[str, str] = {}
+        groups: set[str] = set()
+
+        def visit(name: str, item: Any) -> None:
+            if isinstance(item, h5py.Dataset) and name != "scene":
+                self._dims[name] = tuple(d.label for d in item.dims)
+                self.units[name] = _text(item.attrs.get("units", ""))
+            elif isinstance(item, h5py.Group):
+                groups.add(name)
+
+        self._file.visititems(visit)
+        self.names = tuple(self._dims)
+        for alias, name in ALIASES.items():
+            if name in self.units:
+                self.units[alias] = self.units[name]
+        # Taken once, so that everything read later shows the same moment of a file that grows.
+        # t first: the zones of an output are complete before its time is.
+        scales = sorted((n for n, dims in self._dims.items() if dims == (n,)), key=lambda n: n != "t")
+        self._rows = {n: self._dataset(n).shape[0] for n in scales}
+        self._groups = {g: Columns(self, g) for g in sorted(groups)}
+        self.attributes: dict[str, Any] = {k: _plain(v) for k, v in self._file.attrs.items()}
+        table = self._groups["zones"]
+        rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
+        self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
+
+    def _dataset(self, name: str) -> Any:
+        data = self._file[name]
+        if self._file.swmr_mode:
+            data.refresh()  # HDF5 may remember its length from a moment before the row count was taken
+        return data
+
+    def close(self) -> None:
+        """Let go of the file; what was read already stays."""
+        self._file.close()
+
+    def refresh(self) -> Result:
+        """Look at the file again, for what was added since it was opened; returns itself."""
+        if isinstance(self._source, Path):
+            self._file.close()
+            self._open()
+        return self
+
+    def __enter__(self) -> Result:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        self.close()
+
+    # ---- arrays -------------------------------------------------------------------------------
+
+    def _known(self, name: str) -> str:
+        name = ALIASES.get(name, name)
+        if name in self._dims:
+            return name
+        known = [*(n for n in self.names if "/" not in n), *self._groups, "scene_text"]
+        known += [a for a, n in ALIASES.items() if n in self._dims]
+        near = [n for n in self.names if "/" in n and n.split("/")[1] == name.split("/")[-1]]
+        near = near or difflib.get_close_matches(name, [*known, *self.names], 3)
+        hint = f"did you mean {' or '.join(near)}?" if near else "it has " + ", ".join(known)
+        raise UnknownName(f"the result has no '{name}'; {hint}")
+
+    def __getitem__(self, name: str) -> Any:
+        if name in self._groups:
+            return self._groups[name]
+        name = self._known(name)
+        if name not in self._cache:
+            if not self._file:
+                raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
+            dims = self._dims[name]
+            data = self._dataset(name)
+            array = data[: self._rows[dims[0]]] if dims and dims[0] in self._rows else data[()]
+            if array.dtype.kind == "S":
+                array = np.char.decode(array, "utf-8", "replace")
+            array.setflags(write=False)  # it is shared by everyone who asks again
+            self._cache[name] = array
+        return self._cache[name]
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        return self[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._dims or name in self._groups or ALIASES.get(str(name)) in self._dims
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._groups, *ALIASES, *(n for n in self.names if "/" not in n)]
+
+    def dims(self, name: str) -> tuple[str, ...]:
+        """Names of the dimensions of an array, such as ("t", "s", "xyz")."""
+        return self._dims[self._known(name)]
+
+    def describe(self, name: str) -> str:
+        """What an array is: dimensions, unit, frame, in a sentence."""
+        name = self._known(name)
+        attrs = self._file[name].attrs
+        unit, frame = _text(attrs.get("units", "")), _text(attrs.get("frame", ""))
+        head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
+        return f"{head}: {_text(attrs.get('description', ''))}" + (f" ({frame} frame)" if frame else "")
+
+    def at(self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None) -> dict[str, Any]:
+        """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
+
+        t and s are a number, an array, or None for all; a number takes its dimension away.
+        `names` limits the answer to some fields.
+        """
+        answer = {}
+        wanted = [n for n in self.names if self._dims[n][:1] == ("t",) and n != "t"] if names is None else names
+        for name in wanted:
+            array, dims = self[name], self.dims(name)
+            for dim, where in (("s", s), ("t", t)):  # s first: it comes later, so the axis of t stays put
+                if where is not None and dim in dims:
+                    array = _interpolate(array, dims.index(dim), self[dim], where, dim, "m" if dim == "s" else "s")
+            answer[name] = array
+        return answer
+
+    # ---- what else was written ----------------------------------------------------------------
+
+    @property
+    def events(self) -> list[Event]:
+        """What happened and why, in the order of time."""
+        table = self._groups["events"]
+        rows = zip(*(table[k].tolist() for k in Event._fields), strict=True)
+        return [Event(*row) for row in rows]
+
+    @property
+    def scene_text(self) -> str:
+        """The scene that was run, as YAML text."""
+        return _text(self._file["scene"][()])
+
+    @property
+    def title(self) -> str:
+        return str(self.attributes.get("title", ""))
+
+    @property
+    def status(self) -> str:
+        """running, complete, interrupted or failed; a killed run never came to change "running"."""
+        return str(self.attributes["status"])
+
+    @property
+    def message(self) -> str:
+        return str(self.attributes["message"])
+
+    @property
+    def status_text(self) -> str:
+        """The status in words, with its message."""
+        status = "interrupted or still running" if self.status == "running" else self.status
+        return f"{status}: {self.message}" if self.message else status
+
+    @property
+    def versions(self) -> dict[str, str]:
+        """Versions of the programs that computed and wrote the result."""
+        head = "version_"
+        return {k.removeprefix(head): v for k, v in self.attributes.items() if k.startswith(head)}
+
+    def __repr__(self) -> str:
+        t, s = self.times, self.s
+        name = self._source.name if isinstance(self._source, Path) else "in memory"
+        span = f"t = {t[0]:.6g} ... {t[-1]:.6g} s" if len(t) > 1 else (f"t = {t[0]:.6g} s" if len(t) else "none yet")
+        text = f"Result of '{self.title}' ({name}): {len(t)} output{'s' * (len(t) != 1)}, {span}; "
+        text += f"{len(s)} points on s = {s[0]:.6g} ... {s[-1]:.6g} m; "
+        if len(t) and self.zones[-1]:
+            zones = [f"{z.kind} {z.s_a:.6g}-{z.s_b:.6g} m" for z in self.zones[-1]]
+            more = f" and {len(zones) - 6} more" if len(zones) > 6 else ""
+            text += f"last zones {', '.join(zones[:6])}{more}; "
+        return f"<{text}{self.status_text}>"
+
+
+def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
+    """Open a result file, or one in memory.
+
+    A file that another process is writing, or that was left by a killed one, opens too,
+    with the outputs that were complete.  ResultError when it is not a result.
+    """
+    if isinstance(source, bytes):
+        return Result(io.BytesIO(source))
+    if isinstance(source, io.BytesIO):
+        return Result(source)
+    return Result(Path(source).expanduser().resolve())
+
+
+def is_result(path: Path) -> bool:
+    """Whether the file is one of ours, of whatever format version and status."""
+    try:
+        with _open_file(path) as file:
+            return _text(file.attrs.get("format", "")) == FORMAT
+    except ResultError:
+        return False
+
+
+def _open_file(source: Path | io.BytesIO) -> h5py.File:
+    if not isinstance(source, Path):
+        try:
+            return h5py.File(source, "r")
+        except OSError as error:
+            raise ResultError(f"the bytes in memory are no HDF5 file: {error}") from None
+    if not source.exists():
+        raise ResultError(f"there is no file {source}\n    try:      check the name, or run the scene first")
+    if source.is_dir():
+        raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
+    until = time.monotonic() + _PATIENCE
+    while True:
+        # Plain first; SWMR (single writer, multiple readers) for files with a writer, alive or killed.
+        for swmr in (False, True):
+            try:
+                return h5py.File(source, "r", swmr=swmr, locking="best-effort")
+            except OSError as error:
+                problem = error
+        if "lock" not in str(problem) or time.monotonic() > until:
+            break
+        time.sleep(0.05)
+    raise ResultError(
+        f"{source} cannot be read as a result\n    detail:   {problem}\n    expected: an HDF5 file written by hybrid"
+    )
+
+
+def _check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
+    name = str(source) if isinstance(source, Path) else "the file in memory"
+    kind, version = _text(file.attrs.get("format", "")), file.attrs.get("format_version")
+    if kind != FORMAT:
+        raise ResultError(f"{name} is an HDF5 file, but not a result of hybrid\n    given:    format '{kind}'")
+    if version != FORMAT_VERSION:
+        raise ResultError(
+            f"{name} has result format {version}; this program reads format {FORMAT_VERSION}\n"
+            f"    try:      read it with hybrid-cable {_text(file.attrs.get('version_hybrid-cable', '?'))}, "
+            "which wrote it, or run its scene again"
+        )
+
+
+def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:
+    x = np.asarray(where, dtype=float)
+    if len(grid) == 0:
+        raise ResultError(f"the result holds no output yet, so nothing at {dim} = {where} {unit}")
+    low, high = grid[0], grid[-1]
+    slack = 1e-9 * (high - low)  # what adding up steps loses: 0.1 * 3 is still inside 0 ... 0.3
+    bad = ~((x >= low - slack) & (x <= high + slack))
+    if bad.any():
+        raise ResultError(
+            f"{dim} = {np.atleast_1d(x)[np.atleast_1d(bad)][0]:.9g} {unit} is outside the result\n"
+            f"    expected: {low:.9g} <= {dim} <= {high:.9g} {unit}"
+        )
+    if array.dtype.kind not in "fiu":
+        raise ResultError(f"text cannot be interpolated along {dim}")
+    right = np.clip(np.searchsorted(grid, x), min(1, len(grid) - 1), len(grid) - 1)
+    left = np.maximum(right - 1, 0)
+    width = grid[right] - grid[left]
+    weight = np.clip((x - grid[left]) / np.where(width > 0, width, 1.0), 0.0, 1.0)
+    weight = weight.reshape(weight.shape + (1,) * (array.ndim - axis - 1))
+    return np.take(array, left, axis) * (1.0 - weight) + np.take(array, right, axis) * weight
+
+
+def _text(value: Any) -> str:
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, bytes):
+        return _text(value)
+    return value.item() if isinstance(value, np.generic) else value

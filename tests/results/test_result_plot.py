@@ -1,0 +1,280 @@
+"""Plots show what is in the file: labels, units, curves, warnings; and leave no state behind."""
+
+from __future__ import annotations
+
+import ast
+import io
+import os
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+import hybrid
+from hybrid.errors import ResultError
+from hybrid.results import plot
+from hybrid.results.read import Result, open_result
+from hybrid.results.record import Field, Recorder
+
+MIXED = [("catenary", 0.0, 75.0), ("rod", 75.0, 100.0)]
+
+
+def made(
+    position: Callable[[np.ndarray, float], Sequence[Any]],
+    *,
+    nt: int = 12,
+    zones: Callable[[float], list[tuple[str, float, float]]] = lambda t: MIXED,
+    torque: float = 0.0,
+    tension: float = 2.0e4,
+    moment: bool = True,
+    status: str = "complete",
+    message: str = "",
+    title: str = "Made-up mooring",
+) -> Result:
+    """A result on 0 <= s <= 100 m and 0 <= t <= 10 s with a given shape and plausible forces."""
+    s = np.linspace(0.0, 100.0, 41)
+    names = [("tension", "N"), ("curvature", "1/m"), ("theta", "rad")] + [("bending_moment", "N m")] * moment
+    fields = [Field(n, u, "d", (41,), ("s",)) for n, u in [*names, ("torque", "N m")]]
+    fields.append(Field("position", "m", "d", (41, 3), ("s", "xyz"), "inertial"))
+    memory = io.BytesIO()
+    recorder = Recorder(
+        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, scene_text="", outputs=nt
+    )
+    for t in np.linspace(0.0, 10.0, nt):
+        values = {
+            "position": np.stack([np.broadcast_to(x, s.shape) for x in position(s, t)], axis=1),
+            "tension": tension * (1.0 + 0.1 * np.sin(t)) * (1.0 + s / 200.0),
+            "curvature": 2e-3 * np.exp(-((s - 80.0) ** 2) / 100.0),
+            "theta": s / 200.0,
+            "torque": torque + 0.0 * s,
+        }
+        if moment:
+            values["bending_moment"] = np.where(s > 75.0, 3.0 + np.sin(t), 0.0)
+        recorder.save(float(t), values, zones(float(t)))
+    recorder.close(status, message)
+    return open_result(memory)
+
+
+def sag(s: np.ndarray, t: float) -> Sequence[Any]:
+    return 0.9 * s, 0.0, 30.0 * ((s / 50.0 - 1.0) ** 2 - 1.0) * (1.0 + 0.1 * np.sin(t))
+
+
+def image(figure: Figure) -> np.ndarray:
+    canvas = figure.canvas
+    assert isinstance(canvas, FigureCanvasAgg)
+    canvas.draw()
+    return np.asarray(canvas.buffer_rgba())
+
+
+def texts(figure: Figure) -> str:
+    axes = figure.axes
+    return "\n".join(
+        [t.get_text() for t in figure.texts]
+        + [t.get_text() for ax in axes for t in ax.texts]
+        + [ax.get_title("left") + ax.get_title("right") for ax in axes]
+        + [f"{ax.get_xlabel()} | {ax.get_ylabel()}" for ax in axes]
+        + [t.get_text() for legend in figure.legends for t in legend.get_texts()]
+    )
+
+
+def test_a_summary_shows_shape_profiles_and_histories(tmp_path: Path) -> None:
+    result = made(sag, zones=lambda t: [("rod", 0.0, 100.0)] if t < 5 else MIXED)
+    figure = plot.plot_summary(result, tmp_path / "page.png")
+    shape, tension, h_tension, moment, h_position = _panels(figure)
+    assert [a.get_xlabel() for a in (shape, tension, h_tension)] == ["x (m)", "s (m)", "t (s)"]
+    assert (shape.get_ylabel(), tension.get_ylabel(), moment.get_ylabel()) == ("z (m)", "tension (kN)", "moment (N m)")
+    assert h_position.get_ylabel() == "Δz (m)" and h_tension.get_ylabel() == "tension (kN)"
+    assert shape.get_aspect() == 1.0
+    kinds = [line for line in shape.lines if line.get_label() in ("rod", "catenary")]
+    assert [line.get_label() for line in kinds] == ["catenary", "rod"] and kinds[0].get_color() != kinds[1].get_color()
+    assert kinds[0].get_xdata()[-1] == kinds[1].get_xdata()[0] == pytest.approx(67.5)  # at the joint itself
+    assert len([line for line in shape.lines if line.get_linewidth() == 0.7]) == 9  # earlier shapes
+    assert tension.lines[0].get_ydata() == pytest.approx(result.tension[-1] / 1e3)
+    assert len(tension.collections) == 1 and len(tension.patches) == 2  # the range over time; two shaded zones
+    curves = [line for line in h_tension.lines if line.get_label().startswith("s = ")]
+    assert [line.get_label() for line in curves] == ["s = 0 m", "s = 50 m", "s = 100 m"]
+    assert curves[1].get_ydata() == pytest.approx(result.tension[:, 20] / 1e3)
+    assert len(h_tension.lines) == 4  # and where the zones changed
+    text = texts(figure)
+    for part in (
+        "Made-up mooring",
+        "12 outputs",
+        "joint",
+        "start",
+        "end",
+        "earlier shapes",
+        "range over time",
+        "s = 50 m",
+    ):
+        assert part in text
+    assert "torque" not in text
+    pixels = image(figure)
+    assert pixels.shape == (900, 1200, 4) and (tmp_path / "page.png").stat().st_size > 20_000
+    for ax in figure.axes:  # something is drawn in every panel
+        x0, y0, x1, y1 = ax.get_window_extent().extents.astype(int)
+        assert pixels[900 - y1 : 900 - y0, x0:x1, :3].std() > 3.0
+
+
+def _panels(figure: Figure) -> list[Any]:
+    by_name = {ax.get_label(): ax for ax in figure.axes}
+    return [by_name[k] for k in ("shape0", "p0", "h0", "p1", "h1")]
+
+
+def test_torque_is_drawn_when_there_is_some() -> None:
+    moment = _panels(plot.plot_summary(made(sag, torque=-0.5)))[3]
+    assert [line.get_label() for line in moment.lines] == ["bending moment", "torque"]
+    assert moment.get_title("left") == "bending moment and torque at t = 10 s"
+
+
+def test_statics_show_curvature_and_tangent_in_place_of_histories() -> None:
+    figure = plot.plot_summary(made(sag, nt=1, tension=0.02))
+    text = texts(figure)
+    for part in ("static", "curvature (1/km)", "angle to z (°)", "tension (mN)"):
+        assert part in text
+    assert "t (s)" not in text and "range over time" not in text and "t = " not in text
+    image(figure)
+
+
+def test_a_catenary_says_that_it_has_no_moment() -> None:
+    figure = plot.plot_summary(made(sag, zones=lambda t: [("catenary", 0.0, 100.0)]))
+    assert "no rod zone" in texts(figure) and "joint" not in texts(figure)
+    figure = plot.plot_summary(made(sag, zones=lambda t: [("catenary", 0.0, 100.0)], moment=False))
+    assert "no rod zone" in texts(figure)
+    assert "bending moment was not recorded" in texts(plot.plot_summary(made(sag, moment=False)))
+
+
+@pytest.mark.parametrize(
+    "status, message, shown",
+    [("interrupted", "stopped by the user", "interrupted: stopped by the user"), ("running", "", "or still running")],
+)
+def test_an_incomplete_run_is_marked_in_red(status: str, message: str, shown: str) -> None:
+    figure = plot.plot_summary(made(sag, status=status, message=message))
+    (warning,) = [t for t in figure.texts if shown in t.get_text()]
+    assert warning.get_color() == "#C00000"
+
+
+def test_nothing_saved_still_gives_a_page() -> None:
+    figure = plot.plot_summary(made(sag, nt=0, status="failed", message="singular at t = 0 s"))
+    assert "no output was saved" in texts(figure) and "singular" in texts(figure)
+    image(figure)
+
+
+CASES: dict[str, tuple[Callable[[np.ndarray, float], Sequence[Any]], list[tuple[str, str]], str]] = {
+    "in x-z": (sag, [("x (m)", "z (m)")], ""),
+    "in y-z": (lambda s, t: (0.0, *sag(s, t)[::2]), [("y (m)", "z (m)")], ""),
+    "level": (lambda s, t: (*sag(s, t)[::2], -5.0), [("x (m)", "y (m)")], "from above"),
+    "oblique": (
+        lambda s, t: (0.8 * sag(s, t)[0], 0.6 * sag(s, t)[0], sag(s, t)[2]),
+        [("horizontal, 36.9° from x (m)", "z (m)")],
+        "vertical plane",
+    ),
+    "helix": (
+        lambda s, t: (3 * np.cos(s / 5), 3 * np.sin(s / 5), -0.8 * s),
+        [("x (m)", "z (m)"), ("y (m)", "z (m)")],
+        "",
+    ),
+    "bowed": (
+        lambda s, t: (0.9 * s, 20 * np.sin(s / 32 + t), sag(s, t)[2]),
+        [("x (m)", "z (m)"), ("x (m)", "y (m)")],
+        "from above",
+    ),
+    "nearly straight": (lambda s, t: (0.3 * np.sin(s / 32) * np.cos(t), 0.0, -s), [("x (m)", "z (m)")], "x × 50"),
+    "sideways": (lambda s, t: (0.01 * np.sin(s / 32), 0.9 * np.sin(s / 32), -s), [("y (m)", "z (m)")], "y × 20"),
+    "straight": (lambda s, t: (s, 0.0, 0.0), [("x (m)", "z (m)")], ""),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_the_plane_suits_the_shape(case: str) -> None:
+    position, labels, title = CASES[case]
+    figure = plot.plot_summary(made(position, nt=3))
+    shapes = [ax for ax in figure.axes if ax.get_label().startswith("shape")]
+    assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in shapes] == labels
+    assert title in texts(figure)
+    image(figure)
+
+
+def test_parts_draw_on_axes_of_the_user() -> None:
+    result = made(sag)
+    figure = Figure(layout="constrained")
+    a, b, c, d = figure.subplots(2, 2).ravel()
+    plot.plot_shape(a, result, times=[0.0, 2.5], view="yz")
+    plot.plot_profiles(b, result, "curvature", output=0)
+    plot.plot_history(c, result, "position", [0.0, 33.0])
+    plot.plot_history(d, result, "position", [33.0], component=2)
+    assert a.get_xlabel() == "y (m)" and len([x for x in a.lines if x.get_linewidth() == 0.7]) == 2
+    assert b.get_ylabel() == "curvature (1/km)"
+    assert c.lines[1].get_ydata() == pytest.approx(np.linalg.norm(result.at(s=33.0)["position"], axis=-1))
+    assert d.lines[0].get_ydata()[0] == 0.0 and d.get_ylabel() == "Δz (m)"
+    FigureCanvasAgg(figure).draw()
+
+
+@pytest.mark.parametrize(
+    "unit, peak, shown, factor",
+    [
+        ("N", 2.5e4, "kN", 1e-3),
+        ("N", 0.02, "mN", 1e3),
+        ("N", 1000.0, "kN", 1e-3),
+        ("N", 999.0, "N", 1.0),
+        ("N m", 3e-5, "µN m", 1e6),
+        ("N m", 0.0, "N m", 1.0),
+        ("N m", 1e-15, "N m", 1.0),
+        ("m", 250.0, "m", 1.0),
+        ("m", 2e4, "km", 1e-3),
+        ("m", 1e-3, "mm", 1e3),
+        ("1/m", 1e-4, "1/km", 1e3),
+        ("kg", 1e9, "kg", 1.0),
+        ("", 1.0, "–", 1.0),
+    ],
+)
+def test_units_get_sensible_prefixes(unit: str, peak: float, shown: str, factor: float) -> None:
+    assert plot._prefix(unit, peak) == (pytest.approx(factor), shown)
+
+
+def test_round_off_does_not_fill_a_panel() -> None:
+    ax = Figure().subplots()
+    result = made(sag, tension=1000.0)
+    plot.plot_profiles(ax, result, "torque")
+    assert ax.get_ylim() == (-1.0, 1.0)
+
+
+def test_nonsense_is_refused(tmp_path: Path) -> None:
+    result = made(sag)
+    with pytest.raises(ResultError, match="0 <= s <= 100 m"):
+        plot.plot_summary(result, history=[101.0])
+    with pytest.raises(ResultError, match="list of arc lengths"):
+        plot.plot_summary(result, history=[])
+    with pytest.raises(ResultError, match="0 <= t <= 10 s"):
+        plot.plot_summary(result, times=[11.0])
+    for path in (tmp_path / "no" / "page.png", tmp_path / "page.xyz"):
+        with pytest.raises(ResultError, match="cannot be saved"):
+            plot.plot_summary(result, path)
+    ax = Figure().subplots()
+    with pytest.raises(ResultError, match="'xx' is not a plane"):
+        plot.plot_shape(ax, result, view="xx")
+    with pytest.raises(ResultError, match="does not depend on s"):
+        plot.plot_history(ax, result, "t", [0.0])
+    with pytest.raises(ResultError, match="did you mean tension"):
+        plot.plot_history(ax, result, "tenson", [0.0])
+
+
+def test_plots_read_files_and_nothing_else() -> None:
+    tree = ast.parse(Path(plot.__file__).read_text())
+    own = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and (n.module or "").startswith("hybrid")}
+    assert own == {"hybrid.errors", "hybrid.results.read"}
+
+
+def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
+    code = (
+        "import sys, hybrid.results.plot as p; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
+        "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw();"
+        "assert 'matplotlib.pyplot' not in sys.modules and 'matplotlib' in sys.modules"
+    )
+    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}
+    subprocess.run([sys.executable, "-c", code, str(Path(__file__).parent)], check=True, env=env)
