@@ -19,10 +19,11 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
-    from hybrid.results.read import open_result as open  # noqa: A004
+    from hybrid.results.read import open_result as open
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.simulate import plan, run, static
+    from hybrid.model.plan import plan
+    from hybrid.simulate import run, static
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -35,7 +36,7 @@ _HOME = {
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
-    "plan": ("hybrid.simulate", "plan"),
+    "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),

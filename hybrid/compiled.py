@@ -75,18 +75,19 @@ _folder: Path | None = None
 def kernel(function: Callable[..., Any]) -> Any:
     """Compile an entry point: called from Python, kept on disk under `cache_folder`."""
     import numba
+    from numba import config
 
     global _folder
     if _folder is None:
         _folder = cache_folder()
         _folder.mkdir(parents=True, exist_ok=True)
         _prune(_folder)
-    before = numba.config.CACHE_DIR
-    numba.config.CACHE_DIR = str(_folder)
+    before = config.CACHE_DIR  # type: ignore[attr-defined]
+    config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
     try:
         return numba.njit(cache=True, **_OPTIONS)(function)
     finally:
-        numba.config.CACHE_DIR = before  # the user's own numba functions keep their own cache
+        config.CACHE_DIR = before  # type: ignore[attr-defined]  # the user's own numba functions keep their own cache
 
 
 def inner(function: Callable[..., Any]) -> Any:

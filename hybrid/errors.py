@@ -66,8 +66,7 @@ class Outcome(IntEnum):
     NOT_FINITE = 2
     SINGULAR = 3
     SLACK = 4
-    SHARP_BEND = 5
-    STEP_TOO_SMALL = 6
+    TURNED_TOO_FAR = 5
 
     @property
     def cause(self) -> str:
@@ -84,8 +83,7 @@ _CAUSE = {
     Outcome.NOT_FINITE: "a number stopped being finite (NaN or infinity)",
     Outcome.SINGULAR: "the equations have no unique solution: something can move without resistance",
     Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
-    Outcome.SHARP_BEND: "two neighbouring cells of a rod fold onto each other: the bend is sharper than the mesh",
-    Outcome.STEP_TOO_SMALL: "the time step was halved until it could not be halved any more",
+    Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
 }
 
 _REMEDY = {
@@ -94,8 +92,7 @@ _REMEDY = {
     Outcome.NOT_FINITE: "check the motion and the forces at this time; make time.step smaller",
     Outcome.SINGULAR: "hold the cable at one end at least, or give it a force, tension or bending stiffness",
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
-    Outcome.SHARP_BEND: "add cells there, or make time.step smaller",
-    Outcome.STEP_TOO_SMALL: "look for a jump in motion or force at this time; add cells; add damping",
+    Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
 }
 
 

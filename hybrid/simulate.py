@@ -1,8 +1,8 @@
-"""The loop over time, and the other things one does with a scene: the only file that knows everyone.
+"""The loop over time, and the equilibrium of a scene: the only file that knows everyone.
 
-    run      integrate a scene over its duration
-    static   find its equilibrium
-    plan     say what would be computed, before anything is
+run      integrate a scene over its duration
+static   find its equilibrium
+plan     say what would be computed, before anything is
 """
 
 from __future__ import annotations
@@ -17,11 +17,12 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from math import ceil
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome, SceneError
-from hybrid.model.build import Entry, Model, build
+from hybrid.model.build import Model, build
 from hybrid.model.mesh import Zone
 from hybrid.model.state import Floats
 from hybrid.results.probes import Observer, output_points
@@ -31,7 +32,8 @@ from hybrid.scene.motion import check_motions
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.solve.statics import Equilibrium, solve_statics
-from hybrid.solve.timestep import POWERS, Stepper, Taken
+from hybrid.solve.step import sharpest
+from hybrid.solve.timestep import POWERS, UNRESOLVED_BEND, Stepper, Taken
 
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
@@ -41,7 +43,9 @@ STEP_FIELDS = (
     Field("t", "s", "time at the end of the step"),
     Field("dt", "s", "length of the step"),
     Field("iterations", "", "Newton iterations, repeats included", dtype="int64"),
-    Field("correction", "", "next Newton correction as predicted (turn of a chord in rad, or tension over the largest)"),
+    Field(
+        "correction", "", "next Newton correction as predicted (turn of a chord in rad, or tension over the largest)"
+    ),
     Field("residual", "N", "largest force out of balance at a node before the last correction"),
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
     Field("cpu", "s", "processor time since the start of the run"),
@@ -127,6 +131,7 @@ class _Motion:
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.cpu = clock.process_time()
         self.work = np.zeros(len(POWERS))
+        self.worst_bend = UNRESOLVED_BEND  # rad; worse ones are noted
         if equilibrium is None:
             self.state = model.start.copy()
             self._turn_ends_in()
@@ -177,12 +182,20 @@ class _Motion:
         power = self._powers()
         self.work += 0.5 * dt * (self.power + power)
         self.power = power
+        self._watch_bends()
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
                 "residual": taken.residual, "repeats": repeats, "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
+
+    def _watch_bends(self) -> None:
+        """Note a bend that the mesh cannot resolve: when it shows first, and whenever it is half as bad again."""
+        angle, node = sharpest(self.model.line, self.state.e)
+        if angle > self.worst_bend:
+            note_bend(self.recorder, self.model, self.t, angle, node)
+            self.worst_bend = 1.5 * angle
 
     def _turn_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""
@@ -194,7 +207,7 @@ class _Motion:
         for k, angle in model.ends.turn_in(d, which, duration):
             s = float(model.line.s[-k])
             text = (
-                f"the initial shape does not have the tangent prescribed at s = {s:g} m ({np.degrees(angle):.3g} deg apart): "
+                f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
                 f"it is turned in over the first {duration:.3g} s; start from an equilibrium to avoid this"
             )
             self.recorder.event(0.0, s, s, "turned in", text)
@@ -232,10 +245,10 @@ class _Motion:
             path = self.target.with_suffix(".snapshot.npz")
         else:
             path = Path(tempfile.gettempdir()) / f"hybrid-{clock.strftime('%Y%m%d-%H%M%S')}.snapshot.npz"
-        state = {name: np.asarray(x) for name, x in self.state._asdict().items()}
-        text = np.array(scene_text(self.scene))
+        content: dict[str, Any] = {"t": self.t, "dt": dt, "outcome": taken.outcome.name, "s": self.model.line.s}
+        content |= {"scene": scene_text(self.scene), **self.state._asdict()}
         try:
-            np.savez(path, t=self.t, dt=dt, outcome=taken.outcome.name, s=self.model.line.s, scene=text, **state)
+            np.savez(path, **content)
         except OSError:
             return None
         return path
@@ -271,38 +284,22 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
         ends = model.ends.at(0.0)
+        angle, node = sharpest(model.line, found.state.e)
+        if angle > UNRESOLVED_BEND:
+            note_bend(recorder, model, 0.0, angle, node)
         recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
         recorder.close("complete", f"equilibrium: {found.path[-1]}; out of balance {found.residual:.2g} N")
     return open_result(target)
 
 
-@dataclass(frozen=True)
-class Plan:
-    """What a scene requires: the ledger, the mesh, the unknowns, and a cost estimate."""
-
-    ledger: tuple[Entry, ...]
-    zones: tuple[Zone, ...]
-    cells: tuple[int, ...]  # per zone
-    unknowns: int
-    steps: int
-    seconds: float  # of processor time, from the measured cost per cell and iteration
-
-
-# Processor time per cell and Newton iteration (s) and per step, as tests/bench/bench_cost.py
-# prints them on one core; a plan promises an order of magnitude, not more.
-COST = {"rod": 0.3e-6, "catenary": 0.1e-6}
-COST_STEP = 50e-6
-USUAL_ITERATIONS = 2.5
-
-
-def plan(scene: Scene) -> Plan:
-    """Say what would be computed for a scene, and compute nothing."""
-    model = build(scene)
-    middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
-    cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
-    steps = ceil(scene.time.duration / scene.time.step - 1e-9) if scene.time else 0
-    each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
-    return Plan(model.ledger, model.zones, cells, model.unknowns, steps, steps * (USUAL_ITERATIONS * each + COST_STEP))
+def note_bend(recorder: Recorder, model: Model, t: float, angle: float, node: int) -> None:
+    """Write an event about a bend that the mesh does not resolve."""
+    s = float(model.line.s[node])
+    recorder.event(
+        t, s, s, "unresolved bend",
+        f"the rod bends by {np.degrees(angle):.0f} deg from one cell to the next at s = {s:g} m: "
+        f"curvature and moment are wrong there; cells of {model.line.hn[node] / angle * 0.3:.2g} m would resolve it",
+    )  # fmt: skip
 
 
 # --- parts of the above ---------------------------------------------------------------
@@ -348,7 +345,9 @@ def _recorder(
     fixed = []
     if scene.output.history:
         points = np.array(scene.output.history)
-        fixed.append((Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points))
+        fixed.append(
+            (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
+        )
     return Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=overwrite,

@@ -97,10 +97,11 @@ class EndConditions:
         return self.values
 
     def turn_in(self, chords: tuple[Floats, Floats], which: Sequence[bool], duration: float) -> list[tuple[int, float]]:
-        """Let the tangents of the ends `which` start as the cable lies and reach their given directions after `duration`.
+        """Let tangents start as the cable lies and reach their given directions after `duration` s, at ends `which`.
 
         chords: directions (3,) of the first and last cell at t = 0.  A tangent imposed at once on a cable
-        that does not have it is a blow whose strength depends on the mesh alone.  Returns (end, angle in rad) of those that turn.
+        that does not have it is a blow whose strength depends on the mesh alone.  Returns (end,
+        angle in rad) of those that turn.
         """
         turned = []
         for k in range(2):

@@ -122,7 +122,9 @@ def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:
     return x
 
 
-def given_nodes(nodes: Sequence[float], plans: Sequence[ZonePlan], cuts: Sequence[float]) -> tuple[Floats, tuple[Zone, ...]]:
+def given_nodes(
+    nodes: Sequence[float], plans: Sequence[ZonePlan], cuts: Sequence[float]
+) -> tuple[Floats, tuple[Zone, ...]]:
     """The nodes a scene lists itself; every zone boundary and every cut must be among them."""
     s = np.array(nodes, float)
     bounds = np.concatenate([[0.0], np.cumsum([p.length for p in plans])])

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
+# The compliance of an inextensible cable, as a strain at the tension scale: far below any
+# accuracy asked for, far above round-off of a cell's length (1e-16).
+INEXTENSIBLE = 1e-9
+
 
 class Line(NamedTuple):
     """What the plan says: mesh, stiffness, mass and load parameters.

@@ -67,7 +67,7 @@ def damped_stretch(d, il, h, ck, T, Ts, e1, d1, tau, cv):
         ((1.0 + tau * cv) * d[1] + tau * d1[1]) / (h * ck),
         ((1.0 + tau * cv) * d[2] + tau * d1[2]) / (h * ck),
     )
-    return scale(Td, d), madd(outer(d, row), P), Td, row
+    return scale(Td, d), madd(outer(d, row), P)
 
 
 @inner

@@ -21,7 +21,7 @@ from hybrid.solve.observe import observe
 from hybrid.solve.timestep import POWERS
 
 
-def _sparse(rows: list[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
+def _sparse(rows: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
     i, j, x = (np.array(column) for column in zip(*rows, strict=True))
     return csr_array((x, (i, j)), shape=shape)
 
@@ -53,7 +53,9 @@ class Grid:
     """
 
     def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
-        cubic, middle, linear = [], [], []
+        cubic: list[tuple[int, int, float]] = []
+        middle: list[tuple[int, int, float]] = []
+        linear: list[tuple[int, int, float]] = []
         self.side_nodes: list[int] = []
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         done = np.zeros(s.size, bool)
@@ -67,7 +69,7 @@ class Grid:
             slope = _slopes(x)
             inside = np.flatnonzero(~done & (s <= zone.s_b + 1e-12 * nodes_s[-1]))
             done[inside] = True
-            for g in inside:
+            for g in inside.tolist():
                 k = min(max(int(np.searchsorted(x, s[g], side="right")) - 1, 0), x.size - 2)
                 H = x[k + 1] - x[k]
                 p = (s[g] - x[k]) / H

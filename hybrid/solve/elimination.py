@@ -37,7 +37,20 @@ from hybrid.physics.loads import (
     half_cell_added_mass,
     half_cell_drag,
 )
-from hybrid.physics.rotations import add, cross, dot, frame, hat, madd, mat_mat, mat_vec, mscale, msub, outer, scale, sub
+from hybrid.physics.rotations import (
+    add,
+    cross,
+    dot,
+    frame,
+    hat,
+    madd,
+    mat_mat,
+    mat_vec,
+    mscale,
+    msub,
+    scale,
+    sub,
+)
 
 WIDTH = 20  # columns of W
 ROW = 32  # numbers of X_i
@@ -161,9 +174,23 @@ def eliminate_narrow(L, D, U, b, X, i):
     f = 1.0 / A0[0]
     p1, p2, p3, p4, p5, p6 = f * A0[1], f * A0[2], f * A0[3], f * A0[4], f * A0[5], f * A0[6]
     f = A1[0]
-    q1, q2, q3, q4, q5, q6 = A1[1] - f * p1, A1[2] - f * p2, A1[3] - f * p3, A1[4] - f * p4, A1[5] - f * p5, A1[6] - f * p6
+    q1, q2, q3, q4, q5, q6 = (
+        A1[1] - f * p1,
+        A1[2] - f * p2,
+        A1[3] - f * p3,
+        A1[4] - f * p4,
+        A1[5] - f * p5,
+        A1[6] - f * p6,
+    )
     f = A2[0]
-    r1, r2, r3, r4, r5, r6 = A2[1] - f * p1, A2[2] - f * p2, A2[3] - f * p3, A2[4] - f * p4, A2[5] - f * p5, A2[6] - f * p6
+    r1, r2, r3, r4, r5, r6 = (
+        A2[1] - f * p1,
+        A2[2] - f * p2,
+        A2[3] - f * p3,
+        A2[4] - f * p4,
+        A2[5] - f * p5,
+        A2[6] - f * p6,
+    )
     if abs(r1) > abs(q1):
         q1, q2, q3, q4, q5, q6, r1, r2, r3, r4, r5, r6 = r1, r2, r3, r4, r5, r6, q1, q2, q3, q4, q5, q6
     f = 1.0 / q1
@@ -249,7 +276,9 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
         Rg = get9(ends.frame, 0)
         if bits & STIFFNESS_DAMPING:
             wb, We, Wp = angular_velocity(d, d1, w[0], il, D1, cv)
-            M, C, Cd, loss = damped_bending(Rg, Ra, get3(line.kb, 0), get3(line.k0, 0), line.tau[0], get3(ends.spin, 0), wb)
+            M, C, Cd, loss = damped_bending(
+                Rg, Ra, get3(line.kb, 0), get3(line.k0, 0), line.tau[0], get3(ends.spin, 0), wb
+            )
             A, a = after(C, d, il)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
             report[14] += loss
@@ -306,7 +335,7 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
         if cell:
             Ts = strain_tension(get3(e, i), l, line.h[i], line.ck[i])
             if bits & STIFFNESS_DAMPING:
-                nc, N0, Td, row = damped_stretch(d, il, line.h[i], line.ck[i], T[i], Ts, e1, d1, line.tau[i], cv)
+                nc, N0 = damped_stretch(d, il, line.h[i], line.ck[i], T[i], Ts, e1, d1, line.tau[i], cv)
                 along = dot(d, e1)
                 report[14] += line.tau[i] * along * along / (line.h[i] * line.ck[i])
             else:

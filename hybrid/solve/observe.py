@@ -44,7 +44,6 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
             continue
         Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
         wa, wb = get3(ends.spin, 0), get3(ends.spin, 1)
-        tau = 0.0
         if left:
             d, l, il = chord(get3(e, i - 1))
             Ra = frame(get3(a1, i - 1), d)
@@ -61,10 +60,7 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
         energy[1] += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
         energy[2] += 0.5 * kb[2] * x[2] * x[2]
         if line.bits & STIFFNESS_DAMPING:
-            if left and right:
-                tau = 0.5 * (line.tau[i - 1] + line.tau[i])
-            else:
-                tau = line.tau[i] if right else line.tau[i - 1]
+            tau = 0.5 * (line.tau[max(i - 1, 0)] + line.tau[min(i, n - 1)])
             m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, wa, wb)
         else:
             m, _ = bending(Ra, Rb, kb, k0)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,19 +11,21 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
 from hybrid.physics.loads import MASS_DAMPING
 from hybrid.solve.elimination import march, workspace
-from hybrid.solve.step import newton
+from hybrid.solve.step import newton, slackest
 from hybrid.solve.timestep import SLACK_FLOOR, Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration
-LOAD_STEPS = (4, 16, 64)  # ladders of end loads tried when Newton does not get there in one go
+MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
+LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
+HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
 
 @dataclass(frozen=True)
 class Equilibrium:
-    """A static solution, how it was found (`path`), iterations, and what proves it: the largest force out of balance (N)."""
+    """A static solution: how it was found (`path`), iterations, and its proof, the largest force out of balance (N)."""
 
     state: State
     path: tuple[str, ...]
@@ -32,24 +35,32 @@ class Equilibrium:
 
 
 class _Solver:
-    def __init__(self, line: Line, length: float, scale: float) -> None:
+    def __init__(self, line: Line, length: float, scale: float, stop_when_slack: bool) -> None:
         n = line.h.size
-        self.line, self.length, self.scale = line, length, scale
+        self.line, self.length, self.scale, self.stop_when_slack = line, length, scale, stop_when_slack
         self.W, self.X, self.x, self.report, self.rows = workspace(n)
         self.total = 0
 
-    def newton(self, ends: Ends, state: State) -> tuple[Outcome, int, State]:
-        """Static Newton from `state`; a new state is returned, the old one is left as it was."""
-        new = state.copy()
+    def newton(self, line: Line, ends: Ends, start: State, turning: bool = False) -> tuple[Outcome, int, State]:
+        """Static Newton from `start`; a new state is returned, the old one is left as it was.
+
+        An equilibrium with a catenary cell that is not under tension is no equilibrium of a cable: SLACK.
+        """
+        new = start.copy()
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
             still[:] = 0.0
         u = np.zeros_like(new.r)
+        most = MOST_TURNING if turning else MOST_ITERATIONS
         outcome, iterations, _, where = newton(
-            self.line, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-            0.0, 0.0, REACH * self.length, MOST_ITERATIONS, self.W, self.X, self.x, self.report, self.rows,
+            line, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
+            0.0, 0.0, REACH * self.length, self.scale, most, turning, self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
         self.total += iterations
         new.r[:] += u
+        if outcome == Outcome.OK and self.stop_when_slack:
+            slack = slackest(line, new.T, SLACK_FLOOR * self.scale)
+            if slack >= 0:
+                outcome, where = Outcome.SLACK, slack
         return Outcome(outcome), int(where), new
 
     def prove(self, ends: Ends, state: State) -> float:
@@ -66,8 +77,42 @@ class _Solver:
         return float(self.report[15])
 
 
-def _scaled(ends: Ends, part: float) -> Ends:
-    return ends._replace(force=part * ends.force, moment=part * ends.moment)
+def _loaded(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
+    """End loads and moments applied in steps, each solved with turning chords."""
+    for steps in LOAD_STEPS:
+        state, outcome, where = start, Outcome.OK, -1
+        for k in range(1, steps + 1):
+            part = ends._replace(force=k / steps * ends.force, moment=k / steps * ends.moment)
+            outcome, where, state = solver.newton(solver.line, part, state, turning=True)
+            if outcome not in (Outcome.OK, Outcome.SLACK):
+                break
+        yield f"turning chords, end loads in {steps} step{'s' * (steps > 1)}", outcome, where, state
+
+
+def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int, State]:
+    """From a soft and short line, stretched by its start, to the real one: it sags from any start that is not slack.
+
+    The starting shape is under the tension scale at a strain of 1.  First the cells get
+    their real length, so that the soft line sags and stays taut; then their compliance
+    falls to the real one.  A part of the way that fails is halved.
+    """
+    line, state = solver.line, start.copy()
+    state.T[:] = solver.scale
+    chords = np.linalg.norm(start.e, axis=1)
+    soft, short = np.maximum(line.ck, 1.0 / solver.scale), 0.5 * chords
+    outcome, where = Outcome.OK, -1
+    done, part, steps = 0.0, 1.0 / HARDENING, 0
+    while done < 1.0 and part > 1e-3:
+        goal = min(1.0, done + part)
+        longer, harder = min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
+        between = line._replace(h=short ** (1 - longer) * line.h**longer, ck=soft ** (1 - harder) * line.ck**harder)
+        outcome, where, found = solver.newton(between if goal < 1.0 else line, ends, state)
+        steps += 1
+        if outcome == Outcome.OK:
+            state, done = found, goal
+        else:
+            part *= 0.5
+    return f"a soft line hardened in {steps} steps", outcome, where, state
 
 
 def _relax(solver: _Solver, ends: Ends, state: State) -> State:
@@ -103,41 +148,34 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     return old
 
 
-def solve_statics(line: Line, ends: Ends, start: State, length: float, scale: float, slack: str = "stop") -> Equilibrium:
+def _roads(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
+    """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
+    yield "Newton from the starting shape", *solver.newton(solver.line, ends, start)
+    yield _hardened(solver, ends, start)
+    yield from _loaded(solver, ends, start)
+    relaxed = _relax(solver, ends, start)
+    yield "damped motion to rest, then Newton", *solver.newton(solver.line, ends, relaxed)
+
+
+def solve_statics(
+    line: Line, ends: Ends, start: State, length: float, scale: float, slack: str = "stop"
+) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
-    Tries Newton; then Newton along ladders of end loads; then a damped motion that
-    settles, and Newton again.  Raises ComputationError when none of them arrives, or
-    when a catenary zone is not under tension in the solution.
+    Tries Newton; then a soft line that is hardened; then Newton with turning chords along
+    ladders of end loads; then a damped motion that settles, and Newton again.  Raises
+    ComputationError when none of them arrives, or when a catenary zone is not under
+    tension in the solution.
     """
-    solver = _Solver(line, length, scale)
-    path = []
-    outcome, where, state = solver.newton(ends, start)
-    path.append(f"Newton from the starting shape: {outcome.cause}, {solver.total} iterations")
-    loaded = bool(ends.force.any() or ends.moment.any())
-    if outcome != Outcome.OK and loaded:
-        for steps in LOAD_STEPS:
-            state, before = start, solver.total
-            for k in range(1, steps + 1):
-                outcome, where, state = solver.newton(_scaled(ends, k / steps), state)
-                if outcome != Outcome.OK:
-                    break
-            path.append(f"end loads in {steps} steps: {outcome.cause}, {solver.total - before} iterations")
-            if outcome == Outcome.OK:
-                break
+    solver = _Solver(line, length, scale, slack == "stop")
+    path: list[str] = []
+    roads = _roads(solver, ends, start)
+    outcome = Outcome.NOT_CONVERGED
+    while outcome != Outcome.OK and (road := next(roads, None)) is not None:
+        how, outcome, where, state = road
+        path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations so far)")
     if outcome != Outcome.OK:
-        before = solver.total
-        relaxed = _relax(solver, ends, start)
-        outcome, where, state = solver.newton(ends, relaxed)
-        path.append(f"damped motion to rest, then Newton: {outcome.cause}, {solver.total - before} iterations")
-    s = float(line.s[min(max(where, 0), line.s.size - 1)])
-    if outcome != Outcome.OK:
+        s = float(line.s[min(max(where, 0), line.s.size - 1)])
         raise ComputationError(outcome, None, s, "; ".join(path))
-    if slack == "stop":
-        catenary = line.spin == 0
-        low = np.flatnonzero(catenary & ~(state.T > SLACK_FLOOR * scale))
-        if low.size:
-            worst = int(low[np.argmin(state.T[low])])
-            raise ComputationError(Outcome.SLACK, None, float(line.s[worst]), f"tension {state.T[worst]:.3g} N in the equilibrium found")
     residual = solver.prove(ends, state)
     return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy())

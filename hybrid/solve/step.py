@@ -12,10 +12,10 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord, strain_tension
 from hybrid.physics.loads import STIFFNESS_DAMPING
-from hybrid.physics.rotations import dot, scale, spin_about, transport
+from hybrid.physics.rotations import cross, dot, spin_about, transport
 from hybrid.solve.elimination import march, substitute
 
-OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, SHARP_BEND = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
 # Newton stops when the next correction, predicted from the last two by quadratic
 # convergence, turns no chord by more than TOLERANCE (rad) and changes no tension by more
@@ -24,6 +24,11 @@ OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, SHARP_BEND = 0, 1, 2, 3, 4, 5  #
 TOLERANCE = 1e-9
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
+# Changes of tension count against the largest tension of the line, or against this part of
+# the tension scale of the scene where that is larger (a line can be free of tension).
+LOW_TENSION = 1e-3
+# A step in which a chord turns by more than a radian has missed the motion: it is repeated in parts.
+LARGEST_STEP_TURN = 1.0
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
@@ -73,9 +78,15 @@ def measure(line, e, v, T, x, cv):
 
 
 @kernel
-def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part):
-    """Apply `part` of the correction x to everything that depends on it."""
+def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning):
+    """Apply `part` of the correction x to everything that depends on it.
+
+    With `turning` chords are turned and stretched by the correction instead of shifted:
+    the same to first order, but a large turn does not stretch the line.  Positions then
+    follow from the start along the chords, and a held end is met again by the next correction.
+    """
     n = e.shape[0]
+    drift = (0.0, 0.0, 0.0)
     for i in range(n):
         de = (
             part * (x[i + 1, 0] - x[i, 0]),
@@ -87,6 +98,22 @@ def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part):
         full = (x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2])
         T[i] += part * tension_change(line, ei, d, l, il, T[i], v, full, cv, i)
         en = (ei[0] + de[0], ei[1] + de[1], ei[2] + de[2])
+        if turning:
+            along = dot(d, de)
+            across = (de[0] - along * d[0], de[1] - along * d[1], de[2] - along * d[2])
+            q = math.sqrt(dot(across, across))
+            if q > 0.0:
+                c, s = (l + along) * math.cos(q * il), (l + along) * math.sin(q * il) / q
+                turned = (c * d[0] + s * across[0], c * d[1] + s * across[1], c * d[2] + s * across[2])
+                drift = (
+                    drift[0] + turned[0] - en[0],
+                    drift[1] + turned[1] - en[1],
+                    drift[2] + turned[2] - en[2],
+                )
+                en = turned
+            u[i + 1, 0] += drift[0]
+            u[i + 1, 1] += drift[1]
+            u[i + 1, 2] += drift[2]
         e[i, 0], e[i, 1], e[i, 2] = en
         if line.spin[i]:
             dpsi = part * x[i, 3]
@@ -107,11 +134,12 @@ def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part):
 
 
 @kernel
-def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, most, W, X, x, report, rows):
+def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most, turning, W, X, x, report, rows):
     """Solve the equilibrium at the end of a step.
 
     Starts from the prediction in (u, e, v, vd, T, a1, w, wd) and leaves the answer
-    there.  `reach` (m) bounds the shift of a node in one iteration.  Returns outcome,
+    there.  `reach` (m) bounds the shift of a node in one iteration, `scale` (N) is the
+    tension scale of the scene; `turning`: see `update`.  Returns outcome,
     iterations, last predicted correction, and the cell or node where it was worst.
     """
     before = math.inf
@@ -129,13 +157,12 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, most, W, X, 
         if not (shift < 1e300 and turn < 1e300 and pull < 1e300):
             return NOT_FINITE, it, left, where
         part = 1.0
-        if shift > reach:
+        if shift > reach and not turning:
             part = reach / shift
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
-        update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part)
-        # Tension counts against the largest of the line; a line without any tension is judged by its turns.
-        size = max(turn, pull / big if big > 0.0 else 0.0)
+        update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
+        size = max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
         left = size * min(1.0, ratio * ratio)
         if part == 1.0:
@@ -148,7 +175,23 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, most, W, X, 
 
 
 @kernel
-def advance(line, ends, old, new, u, dt, rho, most, reach, W, X, x, report, rows):
+def sharpest(line, e):
+    """Largest angle (rad) between two cells that a rod element joins, and its node; 0 and -1 without any."""
+    angle, where = 0.0, -1
+    before = (0.0, 0.0, 0.0)
+    for i in range(e.shape[0]):
+        d, _, _ = chord((e[i, 0], e[i, 1], e[i, 2]))
+        if i > 0 and line.element[i]:
+            c = cross(d, before)
+            a = math.atan2(math.sqrt(dot(c, c)), dot(d, before))
+            if not a <= angle:
+                angle, where = a, i
+        before = d
+    return angle, where
+
+
+@kernel
+def advance(line, ends, old, new, u, dt, rho, reach, scale, most, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
@@ -191,7 +234,7 @@ def advance(line, ends, old, new, u, dt, rho, most, reach, W, X, x, report, rows
 
     outcome, iterations, left, where = newton(
         line, ends, old.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-        cv, ca, reach, most, W, X, x, report, rows,
+        cv, ca, reach, scale, most, False, W, X, x, report, rows,
     )  # fmt: skip
 
     # a' = (r' - rp)/(be dt^2) with rp = r + dt v + dt^2 (1/2 - be) a; likewise for the spin, through w'
@@ -205,6 +248,13 @@ def advance(line, ends, old, new, u, dt, rho, most, reach, W, X, x, report, rows
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
         else:
             new.wa[i] = 0.0
+    if outcome == OK:
+        least = math.cos(LARGEST_STEP_TURN)
+        for i in range(n):
+            d, _, _ = chord((new.e[i, 0], new.e[i, 1], new.e[i, 2]))
+            b, _, _ = chord((old.e[i, 0], old.e[i, 1], old.e[i, 2]))
+            if not dot(d, b) > least:
+                outcome, where = TURNED_TOO_FAR, i
     return outcome, iterations, left, where
 
 
@@ -216,6 +266,3 @@ def slackest(line, T, floor):
         if not line.spin[i] and not T[i] > low:
             where, low = i, T[i]
     return where
-
-
-__all__ = ["advance", "newton", "scale", "slackest"]

@@ -5,12 +5,14 @@ Chung & Hulbert 1993; Arnold & Bruels 2007; docs/theory.md section 2.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import solve_banded
 
 from hybrid.errors import Outcome
-from hybrid.model.state import Ends, Floats, Line, State
+from hybrid.model.state import INEXTENSIBLE, Ends, Floats, Line, State
 from hybrid.solve.elimination import workspace
 from hybrid.solve.step import advance, slackest
 
@@ -20,6 +22,8 @@ REACH = 0.1
 # Length of the probing step that finds consistent accelerations, as a part of the step
 # (error of the same order, round-off 1e-16/IGNITION^2).
 IGNITION = 1e-4
+# A rod that bends by more than this (rad) from one cell to the next is not resolved by its mesh.
+UNRESOLVED_BEND = 1.0
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: the error of an inextensible cell's tension (its compliance 1e-9, round-off 1e-16).
 SLACK_FLOOR = -1e-6
@@ -46,7 +50,7 @@ class Stepper:
 
     def __init__(self, line: Line, length: float, tension_scale: float, stop_when_slack: bool) -> None:
         self.line = line
-        self.reach = REACH * length
+        self.reach, self.scale = REACH * length, tension_scale
         self.floor = SLACK_FLOOR * tension_scale if stop_when_slack else -np.inf
         n = line.h.size
         self.W, self.X, self.x, self.report, self.rows = workspace(n)
@@ -55,7 +59,7 @@ class Stepper:
     def step(self, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions of the new time."""
         outcome, iterations, left, where = advance(
-            self.line, ends, old, new, self.u, dt, rho, MOST_ITERATIONS, self.reach,
+            self.line, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
             self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
         if outcome == Outcome.OK:
@@ -64,7 +68,7 @@ class Stepper:
                 outcome, where = Outcome.SLACK, slack
         return Taken(Outcome(outcome), iterations, left, where, float(self.report[15]))
 
-    def ignite(self, ends_at, state: State, t: float, dt: float) -> Taken:  # type: ignore[no-untyped-def]
+    def ignite(self, ends_at: Callable[[float], Ends], state: State, t: float, dt: float) -> Taken:
         """Give `state` accelerations and tensions consistent with its positions, velocities and loads at t.
 
         A probing step of length IGNITION dt with rho = 0 finds them; its displacement is thrown away.
@@ -72,12 +76,39 @@ class Stepper:
         probe = IGNITION * dt
         state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
         new = state.copy()
-        taken = self.step(ends_at(t + probe), state, new, probe, 0.0)
+        old = state._replace(v=self._without_stretching(state, ends_at(t)))
+        taken = self.step(ends_at(t + probe), old, new, probe, 0.0)
         ends_at(t)
         if taken.outcome in (Outcome.OK, Outcome.SLACK):
-            for to, found in ((state.a, new.vd), (state.vd, new.vd), (state.wa, new.wd), (state.wd, new.wd), (state.T, new.T)):
-                to[:] = found
+            state.a[:], state.vd[:], state.T[:] = new.vd, new.vd, new.T
+            state.wa[:], state.wd[:] = new.wd, new.wd
         return taken
+
+    def _without_stretching(self, state: State, ends: Ends) -> Floats:
+        """Velocities (N+1, 3) nearest to those of `state` that stretch no inextensible cell.
+
+        A run keeps lengths, and so rates of length only to the order of the scheme; a probing
+        step would take that small rate for a collision.  Impulses along the chords remove it:
+        (1/m_c + 1/m_{c+1}) p_c - d_c.d_{c-1} p_{c-1}/m_c - d_c.d_{c+1} p_{c+1}/m_{c+1} = -d_c.(v_{c+1} - v_c).
+        """
+        line, v = self.line, state.v
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        rate = np.einsum("ij,ij->i", d, np.diff(v, axis=0))
+        stiff = line.ck * self.scale <= 2.0 * INEXTENSIBLE
+        if not (stiff & (rate != 0.0)).any():
+            return v
+        lightness = 1.0 / line.mass
+        lightness[[0, -1]] *= 1 - ends.held
+        both = stiff[:-1] & stiff[1:]
+        side = -np.einsum("ij,ij->i", d[:-1], d[1:]) * lightness[1:-1] * both
+        middle = np.where(stiff, lightness[:-1] + lightness[1:], 1.0)
+        bands = np.vstack([np.concatenate([[0.0], side]), middle, np.concatenate([side, [0.0]])])
+        p = solve_banded((1, 1), bands, np.where(stiff, -rate, 0.0))
+        push = p[:, None] * d
+        out = v.copy()
+        out[1:] += push * lightness[1:, None]
+        out[:-1] -= push * lightness[:-1, None]
+        return out
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> Floats:
         """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""

@@ -86,7 +86,7 @@ def assembled(line, ends, st, u):
 def residual_at(line, ends, st, x):
     """Right-hand side after the configuration is moved by x (shape (N+1, 4))."""
     s, u = st.copy(), np.zeros_like(st.r)
-    update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0)
+    update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0, False)
     return assembled(line, ends, s, u)[1]
 
 

@@ -1,0 +1,101 @@
+"""What a section of cable is per length: weight, stiffness, inertia, damping, with the defaults that a plan states."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybrid.scene.schema import Damping, Harmonic, Scene, Section
+
+# Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
+POISSON = 0.3
+
+
+def merged_sections(sections: Sequence[Section]) -> list[Section]:
+    """Neighbouring sections that differ in nothing but length are one section."""
+    merged: list[Section] = []
+    for section in sections:
+        if merged and merged[-1].model_copy(update={"length": section.length}) == section:
+            merged[-1] = section.model_copy(update={"length": merged[-1].length + section.length})
+        else:
+            merged.append(section)
+    return merged
+
+
+def torsional_stiffness(section: Section) -> float:
+    """GJ in N m^2; of a solid round section with the bending stiffness given where the scene is silent."""
+    if section.torsional_stiffness is not None:
+        return section.torsional_stiffness
+    return float(np.mean(bending_stiffness(section))) / (1.0 + POISSON)
+
+
+def bending_stiffness(section: Section) -> tuple[float, float]:
+    b = section.bending_stiffness
+    if b is None:
+        return 0.0, 0.0
+    return b if isinstance(b, tuple) else (b, b)
+
+
+def rotary_inertia(section: Section) -> tuple[float, float]:
+    """Transverse and polar inertia per length, kg m; of a solid round section where only the diameter is given."""
+    given = section.rotary_inertia
+    if given is None:
+        return (
+            (section.mass * section.diameter**2 / 16, section.mass * section.diameter**2 / 8)
+            if section.diameter
+            else (0.0, 0.0)
+        )
+    return given if isinstance(given, tuple) else (given, 2.0 * given)
+
+
+def damping(section: Section) -> Damping:
+    d = section.damping
+    if d is None:
+        return Damping()
+    return d if isinstance(d, Damping) else Damping(mass=d)
+
+
+def weight(section: Section, scene: Scene) -> float:
+    """Weight in water (air, vacuum) per unstretched length, N/m, positive downwards."""
+    fluid = scene.environment.fluid
+    displaced = fluid.density * np.pi / 4 * section.diameter**2 if fluid and section.diameter else 0.0
+    return float((section.mass - displaced) * scene.environment.gravity)
+
+
+def tension_scale(scene: Scene, sections: Sequence[Section]) -> float:
+    """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for."""
+    length = scene.length
+    mass = sum(s.mass * s.length for s in sections)
+    candidates = [sum(abs(weight(s, scene)) * s.length for s in sections)]
+    candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
+    fluid = scene.environment.fluid
+    if fluid and fluid.current:
+        speed2 = float(np.dot(fluid.current, fluid.current))
+        candidates += [
+            0.5 * fluid.density * s.diameter * s.drag.normal * speed2 * s.length
+            for s in sections
+            if s.drag and s.diameter
+        ]
+    for end in (scene.ends.start, scene.ends.end):
+        for name, arm in (("force", 1.0), ("moment", length)):
+            load = getattr(end, name, None)
+            if load is not None:
+                candidates.append(float(np.linalg.norm(getattr(load, "value", load))) / arm)
+        motion = getattr(end, "motion", None)
+        if motion is not None:
+            parts = [getattr(motion, x) for x in ("surge", "sway", "heave")]
+            candidates += [
+                mass * abs(p.amplitude) * (2 * np.pi / p.period) ** 2 for p in parts if isinstance(p, Harmonic)
+            ]
+    first, last = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    if first and last and all(s.axial_stiffness for s in sections):
+        free = length / sum(s.length / s.axial_stiffness for s in sections if s.axial_stiffness)  # N per unit strain
+        candidates.append(free * max(0.0, float(np.linalg.norm(np.subtract(last, first))) / length - 1.0))
+    velocity = getattr(scene.initial, "velocity", None)
+    if velocity:
+        candidates.append(mass / length * float(np.dot(velocity, velocity)))
+    scale = max(candidates)
+    if scale > 0.0:
+        return scale
+    return mass / length * (length / scene.time.duration) ** 2 if scene.time else 1.0
