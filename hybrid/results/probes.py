@@ -44,12 +44,24 @@ def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
     return at
 
 
+def stretches(zones: Sequence[Zone]) -> tuple[Zone, ...]:
+    """Zones with neighbours of the same kind made one: what joints, and nothing else, cut the line into."""
+    whole: list[Zone] = []
+    for zone in zones:
+        if whole and whole[-1].kind == zone.kind:
+            whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
+        else:
+            whole.append(zone)
+    return tuple(whole)
+
+
 class Grid:
     """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
 
     nodes: cubic, from node values (positions, velocities); cells: linear, from values at
     the middle of the cells; sides: linear, from node values that may differ on the two
-    sides of a zone boundary (one entry per zone and node, `side_nodes`).
+    sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
+    shows the side before it.
     """
 
     def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
@@ -59,8 +71,8 @@ class Grid:
         self.side_nodes: list[int] = []
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         done = np.zeros(s.size, bool)
-        self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the zone's sides
-        for zone in zones:
+        self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the stretch's sides
+        for zone in stretches(zones):
             a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
             offset = len(self.side_nodes)
             self.spans.append((a, b, offset))
@@ -141,7 +153,7 @@ class View:
         sharp = np.zeros(line.s.size)
         sharp[1:-1] = 2.0 * cross / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1])
         strain = self._observed[1]
-        for zone, (a, b, o) in zip(self.zones, self.grid.spans, strict=True):
+        for zone, (a, b, o) in zip(stretches(self.zones), self.grid.spans, strict=True):
             side = out[o : o + b - a + 1]
             if zone.kind == "rod":
                 k = strain[a : b + 1] / line.hn[a : b + 1, None]

@@ -6,11 +6,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
 from hybrid.physics.loads import MASS_DAMPING
-from hybrid.solve.elimination import march, workspace
+from hybrid.solve.elimination import WIDTH, march, workspace
 from hybrid.solve.step import newton, slackest
 from hybrid.solve.timestep import SLACK_FLOOR, Stepper
 
@@ -19,6 +20,7 @@ REACH = 0.1  # of the length: largest shift of a node in one iteration
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
+CHECKED_COMPLIANCE = 1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
@@ -34,6 +36,43 @@ class Equilibrium:
     report: Floats
 
 
+def positive_definite(rows: Floats, ends: Ends, spin: np.ndarray) -> bool:
+    """True when the negative of the Jacobian in `rows` (N+1, 80), made symmetric, is positive definite.
+
+    Held nodes and cells without spin, whose rows are replaced by the identity, are left out.
+    """
+    blocks = rows.reshape(-1, 4, WIDTH)[:, :, : WIDTH - 1]
+    n = 4 * blocks.shape[0]
+    free = np.ones((blocks.shape[0], 4), bool)
+    free[0, :3], free[-1, :3] = not ends.held[0], not ends.held[1]
+    free[:-1, 3], free[-1, 3] = spin != 0, False
+    free = free.ravel()
+    reach = 11  # columns to the right of the diagonal
+    band = np.zeros((reach + 1, n))
+    for k in range(4):
+        for j in range(reach + 1 - k):  # entry (4 i + k, 4 i + k + j); W holds block i from column 8 on
+            if 8 + k + j < WIDTH - 1:
+                i = np.arange(blocks.shape[0])
+                inside = 4 * i + k + j < n
+                band[j, 4 * i[inside] + k] -= 0.5 * blocks[inside, k, 8 + k + j]
+        for j in range(1, 9 + k):  # entry (4 i + k, 4 i + k - j), the mirror of (4 i + k - j, 4 i + k)
+            column = 8 + k - j
+            if column >= 0 and j <= reach:
+                i = np.arange(blocks.shape[0])
+                inside = 4 * i + k - j >= 0
+                band[j, 4 * i[inside] + k - j] -= 0.5 * blocks[inside, k, column]
+    band[0] *= 2.0
+    for j in range(reach + 1):
+        both = free[: n - j] & free[j:]
+        band[j, : n - j] *= both
+    band[0, ~free] = 1.0
+    try:
+        cholesky_banded(band, lower=True, check_finite=False)
+    except LinAlgError:
+        return False
+    return True
+
+
 class _Solver:
     def __init__(self, line: Line, length: float, scale: float, stop_when_slack: bool) -> None:
         n = line.h.size
@@ -41,10 +80,26 @@ class _Solver:
         self.W, self.X, self.x, self.report, self.rows = workspace(n)
         self.total = 0
 
+    def stable(self, ends: Ends, state: State) -> bool:
+        """True when the stiffness of the line is positive definite: a Cholesky factor of it exists.
+
+        Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
+        and at its real size its round-off would hide the softest modes of a long line.
+        """
+        line = self.line._replace(ck=np.maximum(self.line.ck, CHECKED_COMPLIANCE / self.scale))
+        rows = np.zeros((line.s.size, 4 * WIDTH))
+        u = np.zeros_like(state.r)
+        march(
+            line, ends, state.e, u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, 0.0, self.W, self.X, self.report, rows,
+        )  # fmt: skip
+        return positive_definite(rows, ends, line.spin)
+
     def newton(self, line: Line, ends: Ends, start: State, turning: bool = False) -> tuple[Outcome, int, State]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
         An equilibrium with a catenary cell that is not under tension is no equilibrium of a cable: SLACK.
+        One out of which a rod would buckle is none that anybody will see: UNSTABLE.
         """
         new = start.copy()
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
@@ -61,6 +116,8 @@ class _Solver:
             slack = slackest(line, new.T, SLACK_FLOOR * self.scale)
             if slack >= 0:
                 outcome, where = Outcome.SLACK, slack
+        if outcome == Outcome.OK and line is self.line and line.element.any() and not self.stable(ends, new):
+            outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
 
     def prove(self, ends: Ends, state: State) -> float:
@@ -109,7 +166,7 @@ def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, 
         outcome, where, found = solver.newton(between if goal < 1.0 else line, ends, state)
         steps += 1
         if outcome == Outcome.OK:
-            state, done = found, goal
+            state, done, part = found, goal, 1.5 * part
         else:
             part *= 0.5
     return f"a soft line hardened in {steps} steps", outcome, where, state

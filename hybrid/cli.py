@@ -1,0 +1,290 @@
+"""The command line: hybrid run | static | plan | plot | schema.
+
+The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
+Results and JSON go to the output stream; the live line, notes and errors to the error stream.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sys
+import threading
+import time as clock
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+
+if TYPE_CHECKING:
+    from hybrid.live import Voice
+    from hybrid.model.plan import Plan
+    from hybrid.results.read import Result
+    from hybrid.scene.schema import Scene
+
+REFUSED, FAILED, INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    help="Dynamics of long cables: flexible catenaries where they are taut, rods where they bend.",
+    epilog="Exit codes: 0 done, 1 input refused, 2 computation failed, 130 interrupted.",
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+UsageError: Any = typer.BadParameter.__mro__[1]  # typer has no public name for it
+
+
+def _numbers(text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is no list of numbers such as 0,1.5,2") from None
+
+
+def _flag(*names: str, help: str) -> Any:
+    return typer.Option(*names, metavar="", help=help)  # it takes no value, so none is named
+
+
+def _output(help: str) -> Any:
+    return typer.Option("--output", "-o", metavar="FILE", help=help)
+
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene to read.", show_default=False)]
+RunFile = Annotated[Path | None, _output("Result; else SCENE.h5, in this folder.")]
+StaticFile = Annotated[Path | None, _output("Result; else SCENE.static.h5, here.")]
+Picture = Annotated[Path | None, _output("PNG, PDF, SVG ..; else RUN.png beside RUN.h5.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
+]
+Drawn = Annotated[bool, _flag("--plot", help="Draw it as well, as PNG beside it.")]
+Keep = Annotated[bool, _flag("--no-overwrite", help="Refuse to replace an older result.")]
+Quiet = Annotated[bool, _flag("--quiet", "-q", help="Print nothing but errors.")]
+Json = Annotated[bool, _flag("--json", help="Print JSON, one object per line.")]
+
+
+@app.callback(invoke_without_command=True)
+def hybrid_(
+    context: typer.Context, version: Annotated[bool, _flag("--version", help="Print the version.")] = False
+) -> None:
+    if version:
+        print(f"hybrid {hybrid.__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@app.command()
+def run(
+    scene: SceneFile, output: RunFile = None, settings: Settings = None,
+    plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Compute the motion of a cable and write it to a file."""
+    with _speaking(as_json, quiet) as say:
+        asked = _load(say, scene, settings)
+        duration = asked.require_time().duration
+        target = say.will_write(output or Path(f"{scene.stem}.h5"))
+        cold = say.compiling()
+        from hybrid.live import span, speed
+
+        begin = clock.perf_counter()
+        with say.progress() as tell:
+            result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
+        wall = clock.perf_counter() - begin
+        picture = _draw(result, target.with_suffix(".png")) if plot else None
+        steps = len(result["steps/t"]) if "steps/t" in result else 0
+        pace = "compilation included" if cold else f"{speed(duration / wall)} x real time"
+        text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
+        say.events(result.events)
+        say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall)
+
+
+@app.command()
+def static(
+    scene: SceneFile, output: StaticFile = None, settings: Settings = None,
+    plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Find the equilibrium of a cable at t = 0 and write it to a file."""
+    with _speaking(as_json, quiet) as say:
+        asked = _load(say, scene, settings)
+        target = say.will_write(output or Path(f"{scene.stem}.static.h5"))
+        say.compiling()
+        from hybrid.live import span
+
+        begin = clock.perf_counter()
+        result = hybrid.static(asked, target, overwrite=not keep)
+        wall = clock.perf_counter() - begin
+        picture = _draw(result, target.with_suffix(".png")) if plot else None
+        facts = _equilibrium(result)
+        say.show(lambda: _equilibrium_table(facts))
+        say.events(result.events)
+        say.done(f"equilibrium in {span(wall)} of wall time", target, picture, status=result.status, wall=wall, **facts)
+
+
+@app.command()
+def plan(scene: SceneFile, settings: Settings = None, as_json: Json = False) -> None:
+    """Say what a run would compute and who asked for it; compute nothing."""
+    with _speaking(as_json, False) as say:
+        asked = _load(say, scene, settings)
+
+        made = hybrid.plan(asked)
+        zones = [asdict(zone) | {"cells": n} for zone, n in zip(made.zones, made.cells, strict=True)]
+        say.json("plan", **(asdict(made) | {"zones": zones, "cells": sum(made.cells)}))
+        say.show(lambda: _plan_table(asked, made))
+
+
+@app.command()
+def plot(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to draw.", show_default=False)],
+    output: Picture = None,
+    times: Annotated[Any, typer.Option(metavar="T,T,..", parser=_numbers, help="Earlier shapes to draw (s).")] = None,
+    history: Annotated[
+        Any, typer.Option(metavar="S,S,..", parser=_numbers, help="Arc lengths to follow over time (m).")
+    ] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Draw a result: shapes, profiles along the cable, histories."""
+    with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
+        picture = _draw(opened, output or result.with_suffix(".png"), times=times, history=history)
+        n = len(opened.times)
+        over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
+        say.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)
+
+
+@app.command()
+def schema() -> None:
+    """Print the JSON schema of a scene, for editors."""
+    dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
+    print(json.dumps(dialect | hybrid.Scene.model_json_schema(), indent=2))
+
+
+def main(arguments: list[str] | None = None) -> None:
+    """Run a command and leave with its exit code."""
+    arguments = sys.argv[1:] if arguments is None else arguments
+    try:
+        code = typer.main.get_command(app).main(arguments, prog_name="hybrid", standalone_mode=False)
+        sys.stdout.flush()
+    except UsageError as error:
+        from hybrid.live import Voice
+
+        command = error.ctx.command_path if error.ctx else "hybrid"
+        Voice("--json" in arguments, False).error("usage", f"{error.format_message()}\n    try:      {command} --help")
+        code = REFUSED
+    except BrokenPipeError:  # the reader has gone, as in `hybrid schema | head`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = INTERRUPTED
+    sys.exit(code)
+
+
+# ---- what commands share --------------------------------------------------------------------------
+
+
+@contextmanager
+def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
+    """The voice of one command; errors become words and exit codes."""
+    from hybrid.errors import ComputationError, ResultError, SceneError
+    from hybrid.live import Voice
+
+    voice, code = Voice(as_json, quiet), 0
+    in_main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main else None
+    try:
+        yield voice
+    except SceneError as error:
+        voice.refused(error)
+        code = REFUSED
+    except ComputationError as error:
+        voice.failed(error)
+        code = FAILED
+    except ResultError as error:
+        voice.error("result", str(error), file=voice.written)
+        code = FAILED if voice.written else REFUSED
+    except KeyboardInterrupt:
+        voice.interrupted()
+        code = INTERRUPTED
+    except Exception:
+        head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
+        voice.error("bug", f"{head}\n{traceback.format_exc()}")
+        code = FAILED
+    finally:
+        if in_main:
+            signal.signal(signal.SIGTERM, before)
+    if code:
+        raise typer.Exit(code)
+
+
+def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:
+    say.source = str(path)
+    return hybrid.load_scene(path, settings or [])
+
+
+def _draw(result: Result, picture: Path, **chosen: Any) -> Path:
+    hybrid.plot(result, picture, **chosen)
+    return picture
+
+
+def _equilibrium(result: Result) -> dict[str, Any]:
+    """What one asks of an equilibrium first; None for what its solver does not say."""
+    s, tension, position = result.s, result.tension[-1], result.position[-1]
+    low, high, bottom = int(tension.argmin()), int(tension.argmax()), int(position[:, 2].argmin())
+    force = {end: result[f"reaction_{end}"][-1].tolist() for end in ("start", "end") if f"reaction_{end}" in result}
+    return {
+        "path": result.attributes.get("static_path", result.message),
+        "residual": result.attributes.get("static_residual"),
+        "tension_max": {"value": float(tension[high]), "s": float(s[high])},
+        "tension_min": {"value": float(tension[low]), "s": float(s[low])},
+        "lowest": {"position": position[bottom].tolist(), "s": float(s[bottom])},
+        "force": force,
+    }
+
+
+def _equilibrium_table(facts: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    def vector(x: list[float]) -> str:
+        zero = 1e-9 * max(abs(c) for c in x)
+        return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
+
+    table = Table.grid(padding=(0, 2))
+    table.add_row("found by", facts["path"].replace("; ", "\n"))
+    if facts["residual"] is not None:
+        table.add_row("out of balance", f"{facts['residual']:.2g} N at most")
+    for name, key in (("largest tension", "tension_max"), ("smallest tension", "tension_min")):
+        table.add_row(name, f"{facts[key]['value']:.5g} N at s = {facts[key]['s']:.5g} m")
+    for end, force in facts["force"].items():
+        table.add_row(f"force at {end}", f"{vector(force)} N on the cable")
+    table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")
+    table.columns[0].style = "bold"
+    return table
+
+
+def _plan_table(scene: Scene, plan: Plan) -> Any:
+    from rich.console import Group
+    from rich.table import Table
+
+    from hybrid.live import span
+
+    ledger = Table.grid(padding=(0, 3, 0, 0))
+    ledger.add_column(no_wrap=True)
+    ledger.add_column(overflow="fold")
+    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would ask for it")):
+        ledger.add_row(what, why, style="bold")
+        for entry in (e for e in plan.ledger if e.on == on):
+            ledger.add_row(entry.what, entry.why, style="" if on else "dim")
+        ledger.add_row()
+    zones = Table.grid(padding=(0, 3, 0, 0))
+    zones.add_row("zone", "from", "to", "cells", style="bold")
+    for zone, cells in zip(plan.zones, plan.cells, strict=True):
+        zones.add_row(zone.kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", str(cells))
+    work = "no time in the scene, so statics only"
+    if scene.time is not None:
+        work = f"{plan.steps} steps of {scene.time.step:.6g} s, about {span(plan.seconds)} of computing"
+    head = [scene.title, ""] if scene.title else []
+    return Group(*head, ledger, zones, "", f"{sum(plan.cells)} cells, {plan.unknowns} unknowns; {work}")

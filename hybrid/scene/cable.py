@@ -1,0 +1,137 @@
+"""What the cable is made of and what surrounds it."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.table import (
+    Finding,
+    NonNegative,
+    NonNegativePair,
+    PlainNumber,
+    Positive,
+    Table,
+    Vector,
+    number_or_list,
+    refuse,
+)
+
+
+class Fluid(Table):
+    """The water (or air) around the whole cable; without this table there is none."""
+
+    density: Positive = Field(description="density of the fluid; gives buoyancy, drag and added mass [kg/m^3]")
+    current: Vector | None = Field(
+        default=None, description="velocity of the fluid, uniform and steady, inertial frame; absent: still water [m/s]"
+    )
+
+
+class Environment(Table):
+    """What acts on the cable from outside."""
+
+    gravity: NonNegative = Field(default=9.81, description="acceleration of gravity, along -z [m/s^2]")
+    fluid: Fluid | None = Field(default=None, description="the fluid around the cable; absent: vacuum")
+
+
+class Drag(Table):
+    """Morison drag per length: 1/2 density x diameter x coefficient x |u| u, normal and tangential part."""
+
+    normal: NonNegative = Field(default=0.0, description="normal drag coefficient, on the diameter [-]")
+    tangential: NonNegative = Field(
+        default=0.0, description="tangential drag coefficient, on the circumference pi x diameter [-]"
+    )
+
+
+class AddedMass(Table):
+    """Fluid that moves with the cable, as a multiple of the displaced mass."""
+
+    normal: NonNegative = Field(default=0.0, description="added mass coefficient across the cable [-]")
+    tangential: NonNegative = Field(default=0.0, description="added mass coefficient along the cable [-]")
+
+
+class Damping(Table):
+    """Rayleigh damping; a plain number means `mass`."""
+
+    mass: NonNegative = Field(default=0.0, description="mass-proportional damping, mainly to settle a cable [1/s]")
+    stiffness: NonNegative = Field(
+        default=0.0, description="stiffness-proportional damping of stretch, bending and twist [s]"
+    )
+
+
+# One number for a round section, two for the material axes a1, a2 (or transverse, polar).
+OneOrTwo = Annotated[
+    Annotated[NonNegative, Tag("<number>")] | Annotated[NonNegativePair, Tag("<list>")],
+    Discriminator(number_or_list),
+]
+
+
+class Section(Table):
+    """A stretch of cable with constant properties, per metre of unstretched length."""
+
+    length: Positive = Field(description="unstretched length [m]")
+    mass: Positive = Field(description="mass per length, in air [kg/m]")
+    diameter: Positive | None = Field(
+        default=None, description="outer diameter; needed by buoyancy, drag and added mass [m]"
+    )
+    axial_stiffness: Positive | None = Field(default=None, description="axial stiffness EA; absent: inextensible [N]")
+    bending_stiffness: OneOrTwo | None = Field(
+        default=None,
+        description="bending stiffness EI, or [about a1, about a2]; needed in rod zones [N m^2]",
+    )
+    torsional_stiffness: NonNegative | None = Field(
+        default=None, description="torsional stiffness GJ; absent: chosen from the bending stiffness [N m^2]"
+    )
+    rotary_inertia: OneOrTwo | None = Field(
+        default=None,
+        description="rotary inertia per length: transverse, or [transverse, polar]; absent: neglected [kg m]",
+    )
+    intrinsic_curvature: Vector | None = Field(
+        default=None, description="curvatures about a1 and a2 and twist of the unloaded cable, material axes [1/m]"
+    )
+    drag: Drag | None = Field(default=None, description="drag coefficients; need a fluid and a diameter")
+    added_mass: AddedMass | None = Field(
+        default=None, description="added mass coefficients; need a fluid and a diameter"
+    )
+    damping: Annotated[Damping, PlainNumber("mass")] | None = Field(
+        default=None, description="internal damping; a plain number is the mass-proportional part"
+    )
+
+    @property
+    def anisotropic(self) -> bool:
+        """Whether the two bending stiffnesses differ, so that the material axes matter."""
+        return isinstance(self.bending_stiffness, tuple) and self.bending_stiffness[0] != self.bending_stiffness[1]
+
+    @property
+    def weakest_bending(self) -> float | None:
+        """The smaller bending stiffness [N m^2], None if none is given."""
+        return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
+
+    @model_validator(mode="after")
+    def _frame_needs_torsion(self) -> Section:
+        reason = ""
+        if self.anisotropic:
+            reason = "two different bending stiffnesses"
+        if self.intrinsic_curvature is not None and any(self.intrinsic_curvature):
+            reason = "intrinsic_curvature"
+        if reason and self.torsional_stiffness is None:
+            expected = f"a number, in N m^2, because with {reason} the twist of the cable matters"
+            refuse([Finding(("torsional_stiffness",), expected, "add `torsional_stiffness: ...` (N m^2)")])
+        return self
+
+
+class Cable(Table):
+    """The cable, from s = 0 at the start to s = length at the end."""
+
+    sections: tuple[Section, ...] = Field(min_length=1, description="sections in order from s = 0 on")
+
+    @property
+    def length(self) -> float:
+        """Unstretched length of the whole cable [m]."""
+        return sum(section.length for section in self.sections)
+
+    @property
+    def inextensible(self) -> bool:
+        """Whether no section can stretch."""
+        return all(section.axial_stiffness is None for section in self.sections)

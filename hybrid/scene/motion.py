@@ -1,0 +1,231 @@
+"""Prescribed motion of an end: position, velocity, frame and angular velocity at any time.
+
+A cable feels a jump of velocity as a blow, so motion has to start from rest and stay
+smooth: `check_motions` refuses what does not.
+
+Symbols: A amplitude, w = 2 pi / period, p phase; ramp r(t) = 10 x^3 - 15 x^4 + 6 x^5 with
+x = t / ramp (C2 at both ends); harmonic r(t) A sin(w t + p); rotation R = Rz Ry Rx applied to
+the base frame.  Everything in inertial axes, angles in radians inside, degrees in the scene.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.ends import SHIFTS, TURNS, Ends, Free, Guided, Motion, Pinned
+from hybrid.scene.record import Record, RecordRefused, judge_record, read_record
+from hybrid.scene.table import Finding, dotted
+
+if TYPE_CHECKING:
+    from hybrid.scene.schema import Scene
+
+Array = NDArray[np.float64]
+
+# A harmonic motion counts as starting from rest below this part of its top speed: round-off.
+AT_REST = 1e-6
+
+
+class EndMotion:
+    """The motion of one end as a function of time.
+
+    motion: the scene's table, or None for an end at rest; position: (3,) m, inertial, where the end
+    is held (None for a guided end); frame: (3, 3), columns a1, a2, tangent in inertial axes, or None.
+    SceneError if the motion file cannot be read.
+    """
+
+    def __init__(self, motion: Motion | None, position: ArrayLike | None, frame: ArrayLike | None = None) -> None:
+        self._base = _constant(np.zeros(3) if position is None else position)
+        self._frame = None if frame is None else _constant(frame)
+        self._still = _constant(np.zeros(3))
+        self._ramp = None if motion is None else motion.ramp
+        harmonics = {} if motion is None else motion.harmonics()
+        self._shifts = _components(harmonics, SHIFTS, 1.0)
+        self._turns = _components(harmonics, TURNS, math.pi / 180)
+        self._shift_spline: Any = None
+        self._turn_spline: Any = None
+        if motion is not None and motion.file is not None:
+            try:
+                record = read_record(motion.file)
+            except RecordRefused as refused:
+                raise SceneError([_complaint(("motion",), refused.finding)]) from None
+            self._shift_spline = _spline(record, record.shift)
+            self._turn_spline = _spline(record, None if record.turn is None else np.radians(record.turn))
+            self._last = float(record.times[-1])
+        self._translates = bool(self._shifts) or self._shift_spline is not None
+        self._rotates = bool(self._turns) or self._turn_spline is not None
+        self.moving = self._translates or self._rotates
+
+    def at(self, t: float) -> tuple[Array, Array, Array | None, Array]:
+        """Position (3,) m, velocity (3,) m/s, frame (3, 3) or None, angular velocity (3,) rad/s at t [s].
+
+        All inertial.  What does not move is returned read-only and shared.
+        """
+        position, velocity = self._translation(t) if self._translates else (self._base, self._still)
+        frame, spin = self._rotation(t) if self._rotates else (self._frame, self._still)
+        return position, velocity, frame, spin
+
+    def _translation(self, t: float) -> tuple[Array, Array]:
+        if self._shift_spline is not None:
+            t = min(t, self._last)
+            return self._base + self._shift_spline(t), self._shift_spline(t, 1)
+        r, dr = self._grow(t)
+        position, velocity = self._base.tolist(), [0.0, 0.0, 0.0]
+        for axis, amplitude, w, phase in self._shifts:
+            sine, cosine = math.sin(w * t + phase), math.cos(w * t + phase)
+            position[axis] += r * amplitude * sine
+            velocity[axis] += amplitude * (dr * sine + r * w * cosine)
+        return np.array(position), np.array(velocity)
+
+    def _rotation(self, t: float) -> tuple[Array | None, Array]:
+        if self._turn_spline is not None:
+            t = min(t, self._last)
+            turn, spin = _turn_by_vector(self._turn_spline(t), self._turn_spline(t, 1))
+        else:
+            r, dr = self._grow(t)
+            angle, rate = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
+            for axis, amplitude, w, phase in self._turns:
+                sine, cosine = math.sin(w * t + phase), math.cos(w * t + phase)
+                angle[axis] += r * amplitude * sine
+                rate[axis] += amplitude * (dr * sine + r * w * cosine)
+            turn, spin = _turn_by_angles(angle, rate)
+        return None if self._frame is None else turn @ self._frame, spin
+
+    def _grow(self, t: float) -> tuple[float, float]:
+        """The ramp and its derivative [1/s]."""
+        if self._ramp is None or t >= self._ramp:
+            return 1.0, 0.0
+        x = max(t / self._ramp, 0.0)
+        return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) ** 2 / self._ramp
+
+
+def _constant(value: ArrayLike) -> Array:
+    array = np.array(value, dtype=float)
+    array.flags.writeable = False
+    return array
+
+
+def _components(
+    harmonics: dict[str, Any], names: tuple[str, ...], scale: float
+) -> list[tuple[int, float, float, float]]:
+    """(axis, amplitude, angular frequency, phase) of the harmonics that move at all."""
+    return [
+        (axis, scale * h.amplitude, 2 * math.pi / h.period, math.radians(h.phase))
+        for axis, h in ((names.index(name), h) for name, h in harmonics.items() if name in names)
+        if h.amplitude != 0.0
+    ]
+
+
+def _spline(record: Record, values: Array | None) -> Any:
+    """C2 spline through `values`, counted from their value at t = 0 so that no rounding shows as a jump."""
+    if values is None:
+        return None
+    from scipy.interpolate import CubicSpline  # slow to import, and most scenes have no motion file
+
+    # A record that begins with the computation begins from rest (judge_record sees to it).
+    start = (1, np.zeros(3)) if record.times[0] == 0.0 else "not-a-knot"
+    zero = CubicSpline(record.times, values, bc_type=(start, "not-a-knot"))(0.0)
+    return CubicSpline(record.times, values - zero, bc_type=(start, "not-a-knot"))
+
+
+def _turn_by_angles(angle: list[float], rate: list[float]) -> tuple[Array, Array]:
+    """Rz(yaw) Ry(pitch) Rx(roll) and its angular velocity: every rate about its own axis, turned by what follows."""
+    (cx, cy, cz), (sx, sy, sz) = map(math.cos, angle), map(math.sin, angle)
+    turn = np.array(
+        [
+            [cz * cy, cz * sy * sx - sz * cx, cz * sy * cx + sz * sx],
+            [sz * cy, sz * sy * sx + cz * cx, sz * sy * cx - cz * sx],
+            [-sy, cy * sx, cy * cx],
+        ]
+    )
+    roll, pitch, yaw = rate
+    return turn, np.array([cz * cy * roll - sz * pitch, sz * cy * roll + cz * pitch, yaw - sy * roll])
+
+
+def _turn_by_vector(vector: Array, rate: Array) -> tuple[Array, Array]:
+    """exp of a rotation vector [rad] and the angular velocity that belongs to its rate (Rodrigues)."""
+    x, y, z = vector
+    skew = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    square = skew @ skew
+    angle = math.sqrt(x * x + y * y + z * z)
+    if angle < 1e-4:  # below, the next Taylor terms are under round-off, and 1 - cos loses digits
+        a, b, c = 1.0 - angle**2 / 6, 0.5 - angle**2 / 24, 1 / 6 - angle**2 / 120
+    else:
+        a, b = math.sin(angle) / angle, 2.0 * (math.sin(angle / 2) / angle) ** 2
+        c = (1.0 - a) / angle**2
+    return np.eye(3) + a * skew + b * square, rate + b * (skew @ rate) + c * (square @ rate)
+
+
+# --- refusing ----------------------------------------------------------------------------------
+
+
+def check_motions(scene: Scene) -> None:
+    """SceneError if an end's motion cannot be read, does not start from rest, jumps, or ends too early."""
+    found = motion_findings(scene.ends, scene.time.duration if scene.time is not None else None)
+    if found:
+        raise SceneError([_complaint((), finding) for finding in found])
+
+
+def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
+    """What is wrong with the motions of both ends; paths count from the scene."""
+    found: list[Finding] = []
+    for name, end in (("start", ends.start), ("end", ends.end)):
+        if isinstance(end, Free) or end.motion is None:
+            continue
+        here = ("ends", name, "motion")
+        wrong = _file_findings(end, end.motion, duration) if end.motion.file is not None else _harmonic_jump(end.motion)
+        found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
+    return found
+
+
+def _harmonic_jump(motion: Motion) -> list[Finding]:
+    """A harmonic motion without ramp starts with a velocity (phase 0), a displacement (phase 90), or both."""
+    harmonics = motion.harmonics()
+    longest = max(h.period for h in harmonics.values())
+    for name, h in harmonics.items():
+        if motion.ramp is not None or h.amplitude == 0.0:
+            continue
+        w, phase = 2 * math.pi / h.period, math.radians(h.phase)
+        unit = "m" if name in SHIFTS else "deg"
+        speed, offset = h.amplitude * w * math.cos(phase), h.amplitude * math.sin(phase)
+        jump = f"velocity jumps to {speed:.4g} {unit}/s"
+        if abs(speed) <= AT_REST * abs(h.amplitude) * w:
+            jump = f"position jumps by {offset:.4g} {unit}"
+        expected = "motion that starts from rest where the end is held, because the cable starts at rest"
+        return [
+            Finding(
+                (),
+                expected,
+                f"give `ramp: {2 * longest:.6g}` (s), two periods",
+                f"{name} without ramp: {jump} at t = 0",
+            )
+        ]
+    return []
+
+
+def _file_findings(end: Any, motion: Motion, duration: float | None) -> list[Finding]:
+    try:
+        record = read_record(motion.file or "")
+    except RecordRefused as refused:
+        return [refused.finding]
+    if isinstance(end, Pinned) and record.turn is not None:
+        given = f"{record.name} with rotations"
+        return [
+            Finding(
+                ("file",), "columns t,x,y,z, because a pinned end turns freely", "kind: clamped can be turned", given
+            )
+        ]
+    if isinstance(end, Guided) and record.shift is not None:
+        given = f"{record.name} with positions"
+        expected = "columns t,rx,ry,rz, because the position of a guided end is free"
+        return [Finding(("file",), expected, "kind: clamped can be moved", given)]
+    position = None if isinstance(end, Guided) else np.array(end.position)
+    return judge_record(record, position, duration)
+
+
+def _complaint(prefix: tuple[str, ...], finding: Finding) -> Complaint:
+    return Complaint(dotted((*prefix, *finding.at)), finding.given or "motion", finding.expected, finding.fix)

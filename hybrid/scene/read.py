@@ -1,0 +1,155 @@
+"""From text to `Scene`; whatever is wrong with it is said all at once, with line and column."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterable, Sequence
+from functools import cache
+from pathlib import Path
+from typing import Any, get_type_hints
+
+from pydantic import TypeAdapter, ValidationError
+from ruamel.yaml import YAML
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.checks import contradictions
+from hybrid.scene.motion import motion_findings
+from hybrid.scene.schema import Ends, Scene, Time
+from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
+from hybrid.scene.table import Finding, dotted
+from hybrid.scene.words import explain
+
+
+def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
+    """Read a scene file.
+
+    overrides: changes such as ``time.step=0.005`` or ``cable.sections[0].mass=2``.  A motion file is
+    looked for in the folder of the scene file, and the scene keeps its absolute path.
+    SceneError with every complaint if the scene is refused.
+    """
+    try:
+        text = Path(path).read_text(encoding="utf-8")
+    except FileNotFoundError:
+        complaint = Complaint("scene", str(path), "a scene file that exists", "check the name and the folder")
+        raise SceneError([complaint], str(path)) from None
+    except (OSError, UnicodeDecodeError, ValueError):
+        complaint = Complaint("scene", str(path), "a readable text file (UTF-8)", "check what kind of file it is")
+        raise SceneError([complaint], str(path)) from None
+    return parse_scene(text, str(path), overrides)
+
+
+def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
+    """Read a scene from YAML text; `file` is its name in complaints and the folder of motion files."""
+    try:
+        root, complaints = from_text(text)
+    except Unreadable as error:
+        raise SceneError([error.complaint], file) from None
+    if isinstance(root.value, dict):
+        complaints += [c for c in (override(root, each, Scene) for each in overrides) if c is not None]
+    data = root.plain()
+    _resolve_motion_files(data, Path(file).parent)
+    return _validated(data, root, complaints, file)
+
+
+def validate_scene(data: Any) -> Scene:
+    """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
+    return _validated(data, from_data(data), [], "")
+
+
+def scene_text(scene: Scene) -> str:
+    """The scene as YAML; `parse_scene` reads it back to an equal scene."""
+    yaml = YAML(typ="safe", pure=True)
+    yaml.default_flow_style = None  # tables in lines, vectors in brackets
+    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
+    yaml.width = 120
+    out = io.StringIO()
+    yaml.dump(scene.model_dump(mode="json", exclude_none=True), out)
+    return out.getvalue()
+
+
+# --- helpers -----------------------------------------------------------------------------------
+
+
+def _resolve_motion_files(data: Any, folder: Path) -> None:
+    """Make the paths of motion files absolute, so that the scene can be used from anywhere."""
+    for end in ("start", "end"):
+        here = data
+        for key in ("ends", end, "motion"):
+            here = here.get(key) if isinstance(here, dict) else None
+        name = here.get("file") if isinstance(here, dict) else None
+        if isinstance(here, dict) and isinstance(name, str) and name and "\0" not in name:
+            here["file"] = str((folder / name).absolute())
+
+
+def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) -> Scene:
+    scene: Scene | None = None
+    found: list[tuple[Finding, bool]] = []
+    if not isinstance(data, dict | Scene):
+        fix = "begin with tables such as `cable:` and `ends:`"
+        found = [(Finding((), "a table with cable, ends, initial and model", fix), False)]
+    else:
+        try:
+            scene = Scene.model_validate(data)
+            tables: dict[str, Any] = {name: getattr(scene, name) for name in Scene.model_fields}
+        except ValidationError as error:
+            for each in error.errors(include_url=False):
+                found += explain(Scene, each)
+            # The tables that can be read are held against each other all the same.
+            tables = _readable_tables(data) if isinstance(data, dict) else {}
+            found += [(finding, False) for finding in contradictions(tables)]
+        ends, time = tables.get("ends"), tables.get("time")
+        if isinstance(ends, Ends):
+            duration = time.duration if isinstance(time, Time) else None
+            found += [(finding, False) for finding in motion_findings(ends, duration)]
+    complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
+    if complaints or scene is None:
+        raise SceneError(_in_order(complaints), file)
+    return scene
+
+
+@cache
+def _adapters() -> dict[str, TypeAdapter[Any]]:
+    hints = get_type_hints(Scene, include_extras=True)
+    return {name: TypeAdapter(hints[name]) for name in Scene.model_fields}
+
+
+def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
+    tables: dict[str, Any] = {}
+    for name, field in Scene.model_fields.items():
+        if name in data:
+            try:
+                tables[name] = _adapters()[name].validate_python(data[name])
+            except ValidationError:
+                continue
+        elif not field.is_required():
+            tables[name] = field.default
+    return tables
+
+
+def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
+    """Where a finding was written: the value, else the key if that is wrong, else the table it is missing from."""
+    node, place, missing = root, root.place, False
+    for part in finding.at:
+        inside = node.value
+        if isinstance(inside, dict) and part in inside and isinstance(part, str):
+            key_place = node.key_places.get(part)
+            node = inside[part]
+            place = key_place if at_key else node.place or key_place
+        elif isinstance(inside, list) and isinstance(part, int) and part < len(inside):
+            node = inside[part]
+            place = node.place
+        else:
+            # `model: adaptive` has no key `kind`: the word itself is the kind.
+            missing = isinstance(inside, dict | list) or inside is None
+            break
+    given = finding.given or ("nothing" if missing else node.show())
+    if at_key and not missing:
+        given = f"{finding.at[-1]}: {given}"
+    line, column = place if place is not None else (None, None)
+    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+
+
+def _in_order(complaints: Iterable[Complaint]) -> list[Complaint]:
+    """Every complaint once, in the order of the file; those without a line last."""
+    once = list(dict.fromkeys(complaints))
+    return sorted(once, key=lambda c: (c.line is None, c.line or 0, c.column or 0))

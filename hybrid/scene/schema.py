@@ -1,0 +1,85 @@
+"""The scene: what is there.  Frozen pydantic models, SI units, inertial frame with z up.
+
+Every class is one table of the YAML file; the same classes are the Python API.
+A missing table is None, and None costs nothing downstream.
+
+The tables live in three files (`cable`, `ends`, `task`); import them from here.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+from pydantic import Field, model_validator
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
+from hybrid.scene.checks import contradictions
+from hybrid.scene.ends import Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned
+from hybrid.scene.table import Table, Text, Vector, refuse
+from hybrid.scene.task import (
+    CatenaryModel,
+    CatenaryZone,
+    Equilibrium,
+    Initial,
+    Mesh,
+    Model,
+    Output,
+    Points,
+    RodModel,
+    RodZone,
+    Straight,
+    Time,
+    ZonesModel,
+)
+
+__all__ = [
+    "AddedMass", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Damping", "Drag", "End", "Ends", "Environment",
+    "Equilibrium", "Fluid", "Free", "Guided", "Harmonic", "Initial", "Load", "Mesh", "Model", "Motion", "Output",
+    "Pinned", "Points", "RodModel", "RodZone", "Scene", "Section", "Straight", "Table", "Time", "Vector",
+    "ZonesModel", "missing_time",
+]  # fmt: skip
+
+
+class Scene(Table):
+    """A cable, what holds it, what acts on it, and what is asked."""
+
+    title: Text = Field(default="", description="a line for people; it heads plots and reports")
+    environment: Environment = Field(default=Environment(), description="what acts on the cable from outside")
+    cable: Cable = Field(description="what the cable is made of")
+    ends: Ends = Field(description="how the ends are held, moved and loaded")
+    initial: Initial = Field(description="where the cable is at t = 0")
+    model: Model = Field(description="where the cable is a rod and where a catenary")
+    mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
+    time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
+    output: Output = Field(default=Output(), description="what is kept")
+    solver: Literal["elimination", "shooting"] = Field(
+        default="elimination",
+        description="elimination for all scenes; shooting is the slow, independent arbiter for short lines",
+    )
+
+    @property
+    def length(self) -> float:
+        """Unstretched length of the cable [m]."""
+        return self.cable.length
+
+    def require_time(self) -> Time:
+        """The `time` table; SceneError if the scene has none."""
+        if self.time is None:
+            raise SceneError([missing_time(self)])
+        return self.time
+
+    @model_validator(mode="after")
+    def _no_contradiction(self) -> Scene:
+        refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
+        return self
+
+
+def missing_time(scene: Scene) -> Complaint:
+    """The complaint of a consumer that computes motion and finds no `time` in the scene."""
+    return Complaint(
+        where="time",
+        value="nothing",
+        expected="a table with duration and step, in s, to compute motion",
+        fix="add `time: {duration: ..., step: ...}`, or ask for the static shape only",
+    )

@@ -1,0 +1,233 @@
+"""What is to be done with the cable: where it starts, which model, which mesh, how long, what is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.table import (
+    Direction,
+    Finding,
+    Kinds,
+    NonNegative,
+    Number,
+    Positive,
+    Table,
+    Vector,
+    Whole,
+    by_kind,
+    number_or_list,
+    refuse,
+)
+
+_RATIO = "length of the last cell over the length of the first, geometric grading; absent: 1 [-]"
+
+
+def _increasing(values: tuple[float, ...]) -> bool:
+    return all(a < b for a, b in pairwise(values))
+
+
+# --- where the cable starts --------------------------------------------------------------------
+
+
+class Straight(Table):
+    """The cable starts straight and unstretched.
+
+    It starts at a held start, or ends at a held end; without either, `origin` says where s = 0 is.
+    """
+
+    kind: Literal["straight"] = Field(default="straight", description="straight, unstretched")
+    direction: Direction = Field(description="direction of increasing s, inertial frame; any length [-]")
+    origin: Vector | None = Field(
+        default=None, description="position of s = 0, inertial frame; needed only if no end is held [m]"
+    )
+    velocity: Vector | None = Field(
+        default=None, description="velocity of the whole cable at t = 0, inertial frame; absent: at rest [m/s]"
+    )
+
+
+class Points(Table):
+    """The cable starts along a polyline, spread evenly over it, at rest."""
+
+    kind: Literal["points"] = Field(default="points", description="along a polyline")
+    points: tuple[Vector, ...] = Field(
+        min_length=2, description="corners of the polyline from s = 0 to s = length, inertial frame [m]"
+    )
+
+    @model_validator(mode="after")
+    def _corners_are_distinct(self) -> Points:
+        total = sum(math.dist(a, b) for a, b in pairwise(self.points))
+        same = [i for i, (a, b) in enumerate(pairwise(self.points), start=1) if math.dist(a, b) <= 1e-9 * total]
+        refuse(Finding(("points", i), "a point other than the one before", "leave it out") for i in same)
+        return self
+
+
+class Equilibrium(Table):
+    """The cable starts at rest in static equilibrium."""
+
+    kind: Literal["equilibrium"] = Field(default="equilibrium", description="static equilibrium")
+    guess: Literal["auto", "straight", "span"] = Field(
+        default="auto", description="shape to start the search from: straight, spanning the two ends, or whichever fits"
+    )
+    direction: Direction | None = Field(
+        default=None, description="direction of increasing s of a straight guess, inertial frame; any length [-]"
+    )
+
+
+Initial = Annotated[
+    Annotated[Straight, Tag("<straight>")]
+    | Annotated[Points, Tag("<points>")]
+    | Annotated[Equilibrium, Tag("<equilibrium>")],
+    Discriminator(by_kind),
+    Kinds(("straight", "points", "equilibrium")),
+]
+
+
+# --- which model where -------------------------------------------------------------------------
+
+
+class RodZone(Table):
+    """A stretch with bending and torsion."""
+
+    rod: Positive = Field(description="unstretched length of this rod zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+class CatenaryZone(Table):
+    """A stretch that carries tension only."""
+
+    catenary: Positive = Field(description="unstretched length of this catenary zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+def _zone_tag(value: Any) -> str:
+    rod = "rod" in value if isinstance(value, Mapping) else isinstance(value, RodZone)
+    return "<rod zone>" if rod else "<catenary zone>"
+
+
+def _one_zone_kind(value: Any) -> Any:
+    """Every zone says either rod or catenary: the key is its kind and the value its length."""
+    if isinstance(value, RodZone | CatenaryZone):
+        return value
+    fix = "write {rod: length} or {catenary: length}"
+    if not isinstance(value, Mapping):
+        refuse([Finding((), "a zone", fix)])
+    kinds = [kind for kind in ("rod", "catenary") if kind in value]
+    if len(kinds) != 1:
+        refuse([Finding((), "either rod or catenary, with the length of the zone in m", fix)])
+    return value
+
+
+Zone = Annotated[
+    Annotated[RodZone, Tag("<rod zone>")] | Annotated[CatenaryZone, Tag("<catenary zone>")],
+    Discriminator(_zone_tag),
+    BeforeValidator(_one_zone_kind),
+]
+
+Slack = Literal["stop", "warn"]
+_SLACK = "what to do when a catenary zone loses its tension: stop, or warn and go on"
+
+
+class RodModel(Table):
+    """The whole cable is a Kirchhoff rod."""
+
+    kind: Literal["rod"] = Field(default="rod", description="bending and torsion everywhere")
+
+
+class CatenaryModel(Table):
+    """The whole cable is perfectly flexible."""
+
+    kind: Literal["catenary"] = Field(default="catenary", description="tension only")
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+class ZonesModel(Table):
+    """Rod and catenary zones in a row, spherical joints between them."""
+
+    kind: Literal["zones"] = Field(default="zones", description="rod and catenary zones")
+    zones: tuple[Zone, ...] = Field(min_length=1, description="zones in order from s = 0 on; they fill the cable")
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+Model = Annotated[
+    Annotated[RodModel, Tag("<rod>")]
+    | Annotated[CatenaryModel, Tag("<catenary>")]
+    | Annotated[ZonesModel, Tag("<zones>")],
+    Discriminator(by_kind),
+    Kinds(
+        ("rod", "catenary", "zones"),
+        later=(("adaptive", "not available in this version (0.1); use rod, catenary or zones"),),
+    ),
+]
+
+
+class Mesh(Table):
+    """How the cable is cut into cells: `cells` with `ratio`, or `nodes`."""
+
+    cells: Whole | None = Field(default=None, ge=2, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+    nodes: tuple[Number, ...] | None = Field(
+        default=None, min_length=3, description="arc length of every node, from 0 to the length of the cable [m]"
+    )
+
+    @model_validator(mode="after")
+    def _one_recipe(self) -> Mesh:
+        if self.nodes is not None:
+            fix = "leave out either nodes or cells and ratio"
+            both = [name for name in ("cells", "ratio") if getattr(self, name) is not None]
+            found = [Finding((name,), "nothing, because nodes already gives the mesh", fix) for name in both]
+            if not _increasing(self.nodes):
+                found.append(Finding(("nodes",), "numbers that increase strictly, in m"))
+            refuse(found)
+        return self
+
+
+# --- how long, and what is kept ----------------------------------------------------------------
+
+
+class Time(Table):
+    """How long to compute, in which steps."""
+
+    duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
+    step: Positive = Field(description="time step [s]")
+    rho_inf: Number = Field(
+        default=0.5, ge=0, le=1, description="spectral radius of generalized-alpha at high frequency; 1: no damping [-]"
+    )
+
+    @model_validator(mode="after")
+    def _step_fits(self) -> Time:
+        if self.step > self.duration:
+            expected = f"at most the duration, {self.duration:.6g} s"
+            refuse([Finding(("step",), expected, "a smaller step or a longer duration")])
+        return self
+
+
+OutputPoints = Annotated[
+    Annotated[Whole, Field(ge=2), Tag("<number>")]
+    | Annotated[tuple[NonNegative, ...], Field(min_length=1), Tag("<list>")],
+    Discriminator(number_or_list),
+]
+
+
+class Output(Table):
+    """What is kept."""
+
+    every: Positive | None = Field(default=None, description="time between outputs; absent: chosen [s]")
+    points: OutputPoints = Field(
+        default=101, description="number of output points, evenly spread, or a list of their arc lengths [m]"
+    )
+    history: tuple[NonNegative, ...] | None = Field(
+        default=None, min_length=1, description="arc lengths that are kept at every time step [m]"
+    )
+
+    @model_validator(mode="after")
+    def _points_increase(self) -> Output:
+        if isinstance(self.points, tuple) and not _increasing(self.points):
+            refuse([Finding(("points",), "arc lengths that increase strictly, in m", "sort them and drop duplicates")])
+        return self

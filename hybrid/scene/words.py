@@ -1,0 +1,267 @@
+"""The schema in plain words: what a key expects, and what to try when it got something else.
+
+Everything is read off the models: types, bounds, units (in the descriptions) and the tags of
+unions, which show as ``<tag>`` in pydantic's locations and are dropped from the paths of keys.
+"""
+
+from __future__ import annotations
+
+import types
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, Literal, Union, get_args, get_origin
+
+import annotated_types
+from pydantic import Tag
+from pydantic.fields import FieldInfo
+
+from hybrid.scene.table import Finding, Kinds, Place, PlainNumber, Table, Words, did_you_mean, dotted
+
+# What pydantic calls "extra" is often a condition that another kind of end takes.
+OTHER_KIND = {
+    ("pinned", "force"): "a pinned end takes no force; use kind: free or guided",
+    ("pinned", "moment"): "a pinned end takes no moment; use kind: free",
+    ("pinned", "tangent"): "a pinned end turns freely; kind: clamped holds a tangent",
+    ("pinned", "normal"): "a pinned end turns freely; kind: clamped holds a normal",
+    ("pinned", "swivel"): "a pinned end turns freely already; leave swivel out",
+    ("clamped", "force"): "a clamped end takes no force; use kind: guided, or free",
+    ("clamped", "moment"): "a clamped end takes no moment; use kind: free",
+    ("guided", "position"): "a guided end has no position; kind: clamped holds position and tangent",
+    ("guided", "moment"): "a guided end takes no moment; use kind: free",
+    ("guided", "swivel"): "a guided end spins freely unless it has a normal; leave swivel out",
+    ("free", "position"): "a free end has no position; kind: pinned holds one",
+    ("free", "tangent"): "a free end has no tangent; kind: guided holds one",
+    ("free", "normal"): "a free end has no normal; kind: guided holds one",
+    ("free", "motion"): "a free end cannot be moved; use kind: pinned or clamped",
+    ("rod", "slack"): "a rod may go slack; leave slack out",
+    ("rod", "zones"): "use kind: zones",
+    ("catenary", "zones"): "use kind: zones",
+}
+
+
+@dataclass(frozen=True)
+class Spot:
+    """Where a location leads: the type there, the table and field it belongs to, the tag of that table."""
+
+    annotation: Any
+    metadata: tuple[Any, ...]
+    owner: type[Table] | None
+    field: FieldInfo | None
+    kind: str
+
+
+# --- walking the schema ------------------------------------------------------------------------
+
+
+def arms(annotation: Any, metadata: tuple[Any, ...] = ()) -> Iterator[tuple[Any, tuple[Any, ...]]]:
+    """The types a value may have: unions and Annotated taken apart, None left out."""
+    origin = get_origin(annotation)
+    if origin is Annotated:
+        inner, *extra = get_args(annotation)
+        flat = [m for e in extra for m in (e.metadata if isinstance(e, FieldInfo) else [e])]
+        yield from arms(inner, (*flat, *metadata))
+    elif origin is Union or origin is types.UnionType:
+        for arm in get_args(annotation):
+            yield from arms(arm, metadata)
+    elif annotation is not type(None):
+        yield annotation, metadata
+
+
+def _tables(annotation: Any) -> list[type[Table]]:
+    return [a for a, _ in arms(annotation) if isinstance(a, type) and issubclass(a, Table)]
+
+
+def _item(annotation: Any, index: int) -> Any:
+    """The type of one entry of a list; None if there is none."""
+    for a, _ in arms(annotation):
+        args = get_args(a)
+        if get_origin(a) is tuple and args:
+            return args[0] if args[-1] is Ellipsis else args[min(index, len(args) - 1)]
+    return None
+
+
+def is_tag(part: Any) -> bool:
+    return isinstance(part, str) and part.startswith("<") and part.endswith(">")
+
+
+def follow(root: type[Table], loc: Place) -> Spot:
+    """What the schema has at pydantic's location `loc`."""
+    spot = Spot(root, (), None, None, "")
+    for part in loc:
+        if isinstance(part, int):
+            spot = Spot(_item(spot.annotation, part), (), spot.owner, spot.field, spot.kind)
+        elif is_tag(part):
+            chosen = [(a, m) for a, m in arms(spot.annotation, spot.metadata) if Tag(part) in m]
+            annotation, metadata = chosen[0] if chosen else (spot.annotation, spot.metadata)
+            spot = Spot(annotation, metadata, spot.owner, spot.field, part.strip("<>"))
+        else:
+            tables = _tables(spot.annotation)
+            owner = tables[0] if len(tables) == 1 else None
+            field = owner.model_fields.get(part) if owner is not None else None
+            annotation, metadata = (field.annotation, tuple(field.metadata)) if field is not None else (None, ())
+            spot = Spot(annotation, metadata, owner, field, spot.kind)
+    return spot
+
+
+def keys_at(root: type[Table], path: Place) -> list[str]:
+    """All keys that any branch of the schema knows in the table at `path`."""
+    annotations: list[Any] = [root]
+    for part in path:
+        if isinstance(part, int):
+            annotations = [_item(a, part) for a in annotations]
+        else:
+            tables = [t for a in annotations for t in _tables(a)]
+            annotations = [t.model_fields[part].annotation for t in tables if part in t.model_fields]
+        annotations = [a for a in annotations if a is not None]
+    return list(dict.fromkeys(name for a in annotations for t in _tables(a) for name in t.model_fields))
+
+
+def shorthand_key(root: type[Table], path: Place) -> str | None:
+    """The key that a bare word or number at `path` stands for (``model: rod`` is ``{kind: rod}``)."""
+    spot = follow(root, path)
+    for item in [*spot.metadata, *(m for _, found in arms(spot.annotation) for m in found)]:
+        if isinstance(item, PlainNumber):
+            return item.key
+    return "kind" if "kind" in keys_at(root, path) else None
+
+
+# --- types in words ----------------------------------------------------------------------------
+
+
+def unit_of(field: FieldInfo | None) -> str:
+    """The unit in square brackets at the end of a description; empty if none or dimensionless."""
+    text = (field.description or "") if field is not None else ""
+    unit = text[text.rindex("[") + 1 : -1] if text.endswith("]") else ""
+    return "" if unit == "-" else unit
+
+
+def expected(annotation: Any, metadata: tuple[Any, ...], field: FieldInfo | None) -> str:
+    """What a value should be: ``a number > 0, in kg/m``."""
+    found = list(arms(annotation, metadata))
+    texts = list(dict.fromkeys(_type_in_words(a, m) for a, m in found))
+    unit = "" if all(a is int for a, _ in found) else unit_of(field)  # what is counted has no unit
+    return " or ".join(texts) + (f", in {unit}" if unit else "")
+
+
+def _type_in_words(annotation: Any, metadata: tuple[Any, ...]) -> str:
+    for item in metadata:
+        if isinstance(item, Words):
+            return item.text
+        if isinstance(item, Kinds):
+            return f"a table with kind: {' | '.join(item.names)}"
+    if annotation is float or annotation is int:
+        return ("a number" if annotation is float else "a whole number") + _bounds(metadata)
+    if annotation is bool:
+        return "true or false"
+    if get_origin(annotation) is Literal:
+        return f"one of: {', '.join(map(str, get_args(annotation)))}"
+    if get_origin(annotation) is tuple:
+        least = next((m.min_length for m in metadata if isinstance(m, annotated_types.MinLen)), 0)
+        entry = " or ".join(dict.fromkeys(_type_in_words(a, m) for a, m in arms(get_args(annotation)[0])))
+        return f"a list of at least {least} entries, each {entry}" if least > 1 else f"a list, each entry {entry}"
+    if isinstance(annotation, type) and issubclass(annotation, Table):
+        needed = [name for name, f in annotation.model_fields.items() if f.is_required()]
+        some = needed or list(annotation.model_fields)[:2]
+        return f"a table {{{', '.join(f'{name}: ...' for name in some)}}}"
+    return "something else"
+
+
+def _bounds(metadata: tuple[Any, ...]) -> str:
+    words = []
+    for item in metadata:
+        for name, sign in (("gt", ">"), ("ge", ">="), ("lt", "<"), ("le", "<=")):
+            if getattr(item, name, None) is not None:
+                words.append(f"{sign} {getattr(item, name):g}")
+    return " " + " and ".join(dict.fromkeys(words)) if words else ""
+
+
+# --- errors in words ---------------------------------------------------------------------------
+
+
+def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, bool]]:
+    """One pydantic error as findings with full paths; True: the key itself is what is wrong."""
+    kind, loc, value = error["type"], tuple(error["loc"]), error.get("input")
+    path = tuple(part for part in loc if not is_tag(part))
+    context = error.get("ctx") or {}
+    if kind == "findings":
+        return [(Finding((*path, *f.at), f.expected, f.fix, f.given), False) for f in context["findings"]]
+    if kind == "too_short" and isinstance(value, list | tuple) and len(value) >= context.get("min_length", 0):
+        return []  # pydantic counts only the entries that are right; those that are wrong speak for themselves
+    spot = follow(root, loc)
+    if kind in ("extra_forbidden", "invalid_key"):
+        return [(_unknown_key(path, spot), True)]
+    words = expected(spot.annotation, spot.metadata, spot.field)
+    if kind == "missing":
+        return [(Finding(path, words, _missing_fix(str(path[-1]), spot)), False)]
+    return [(Finding(path, words, _fix(kind, value, spot)), False)]
+
+
+def _unknown_key(path: Place, spot: Spot) -> Finding:
+    key = str(path[-1])
+    known = list(spot.owner.model_fields) if spot.owner is not None else []
+    fix = OTHER_KIND.get((spot.kind, key)) or did_you_mean(key, known)
+    table = "a scene" if len(path) == 1 else f"kind: {spot.kind}" if "kind" in known else dotted(path[:-1])
+    return Finding(path, f"a key of {table}", fix)
+
+
+def _missing_fix(key: str, spot: Spot) -> str:
+    unit = unit_of(spot.field)
+    if (spot.kind, key) == ("guided", "tangent"):
+        return "add `tangent: [x, y, z]`, the direction of increasing s at this end; kind: free holds none"
+    marks = [mark for _, found in arms(spot.annotation, spot.metadata) for mark in found]
+    shape = "[x, y, z]" if any(isinstance(mark, Words) and "[x, y, z]" in mark.text for mark in marks) else "..."
+    shape = next((f"{{kind: {mark.names[0]}, ...}}" for mark in marks if isinstance(mark, Kinds)), shape)
+    return f"add `{key}: {shape}`" + (f" ({unit})" if unit else "")
+
+
+def _fix(kind: str, value: Any, spot: Spot) -> str:
+    unit = unit_of(spot.field)
+    if kind == "literal_error":
+        allowed = [str(x) for a, _ in arms(spot.annotation) for x in get_args(a)]
+        return did_you_mean(str(value), allowed)
+    if value is None:
+        return "give a value, or leave the key out"
+    if kind in ("number", "whole_number") and isinstance(value, str):
+        return _number_in_text(value, unit)
+    if kind == "whole_number" and isinstance(value, float):
+        return "round it"
+    if kind == "finite_number":
+        return "give a finite number"
+    if kind == "too_short":
+        return "give more entries" if value else "give at least one entry"
+    if kind == "vector" and isinstance(value, str):
+        return "write the numbers in brackets, with commas between them"
+    if kind == "vector" and isinstance(value, list | tuple):
+        return f"count the numbers: there {'is' if len(value) == 1 else 'are'} {len(value)}"
+    if kind == "truth":
+        return "write true or false"
+    if kind == "string_type":
+        return "put it in quotes"
+    if kind == "one_line":
+        return "take out line breaks and control characters"
+    if kind == "tuple_type" and isinstance(value, Mapping):
+        return "start each entry with a dash"
+    if kind in ("greater_than", "greater_than_equal") and isinstance(value, int | float) and value < 0:
+        return "check the sign"
+    return ""
+
+
+def _number_in_text(text: str, unit: str) -> str:
+    words = text.split()
+    if not words:
+        return "give a number"
+    if _is_number(text):
+        return f"write {text.strip()} without quotes"
+    if _is_number(text.replace(",", ".")):
+        return f"write a point, not a comma: {text.replace(',', '.').strip()}"
+    if len(words) == 2 and _is_number(words[0]):
+        return f"write the number alone, {words[0]}" + (f"; the unit is {unit}" if unit else "")
+    return ""
+
+
+def _is_number(text: str) -> bool:
+    try:
+        float(text)
+    except ValueError:
+        return False
+    return True

@@ -1,0 +1,176 @@
+"""The same cable said in two ways gives the same answer.
+
+Tolerance: Newton stops when the next correction would turn no chord by more than 1e-9
+(solve.step.TOLERANCE); two runs that round differently may then differ by some 1e-9 of
+the length in statics and by some of these, accumulated over the steps, in motion.
+"""
+
+import numpy as np
+import pytest
+
+import hybrid
+
+STATIC, MOVING = 2e-9, 2e-7  # of the length, and of the largest tension
+LENGTH = 2.0
+
+SECTIONS = [
+    {"length": 0.8, "mass": 0.5, "diameter": 0.02, "bending_stiffness": (0.05, 0.02), "torsional_stiffness": 0.04,
+     "intrinsic_curvature": [0.3, -0.2, 0.1], "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
+     "damping": {"mass": 0.1, "stiffness": 0.01}},
+    {"length": 1.2, "mass": 0.7, "diameter": 0.03, "bending_stiffness": 0.08, "torsional_stiffness": 0.05,
+     "axial_stiffness": 2e4, "drag": {"normal": 1.0}},
+]  # fmt: skip
+MODELS = {
+    "rod": {"kind": "rod"},
+    "catenary": {"kind": "catenary"},
+    "hybrid": {"kind": "zones", "zones": [{"rod": 0.6, "cells": 12}, {"catenary": 0.8, "cells": 16}, {"rod": 0.6, "cells": 12}]},
+}
+
+
+def scene(case, rotate=np.eye(3), sections=SECTIONS, **changes):
+    """A line in a current, pulled and pushed in three dimensions, without gravity, so that it may be turned anywhere."""
+
+    def turned(x):
+        return tuple(float(c) for c in rotate @ np.array(x, float))
+
+    data = {
+        "environment": {"gravity": 0.0, "fluid": {"density": 1000.0, "current": turned([0.3, 0.2, -1.0])}},
+        "cable": {"sections": sections},
+        "ends": {
+            "start": {"kind": "clamped", "position": turned([0.1, -0.2, 0.3]), "tangent": turned([0.2, 0.1, -1]), "normal": turned([1, 0.5, 0])},
+            "end": {"kind": "free", "force": turned([6.0, 3.0, -4.0])},
+        },
+        "initial": {"kind": "equilibrium", "direction": turned([0.3, 0.2, -0.9])},
+        "model": MODELS[case],
+        "time": {"duration": 0.5, "step": 0.01},
+        "output": {"every": 0.1, "points": 41},
+    }  # fmt: skip
+    if case != "hybrid":
+        data["mesh"] = {"cells": 40}
+    return hybrid.validate_scene(data | changes)
+
+
+def released(model, rotate=np.eye(3), sections=SECTIONS):
+    """The same line let go from a straight shape."""
+    direction = tuple(float(c) for c in rotate @ np.array([0.2, 0.1, -1.0]))
+    return scene(model, rotate, sections, initial={"kind": "straight", "direction": direction})
+
+
+def random_rotation(seed):
+    q = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    return q * np.sign(np.linalg.det(q))
+
+
+# the cable along +-x, +-y, +-z, and an arbitrary rotation
+AXES = {
+    "x to y": np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]),
+    "x to z": np.array([[0, 0, -1], [0, 1, 0], [1, 0, 0.0]]),
+    "z to -z": np.diag([1, -1, -1.0]),
+    "x to -x": np.diag([-1, -1, 1.0]),
+    "anyhow": random_rotation(4),
+}
+
+
+def compare(a, b, tolerance, rotate=np.eye(3), flip=False):
+    """Two results are the same, b being a turned by `rotate` (and read from the other end with `flip`)."""
+    size = np.abs(a.tension).max()
+    along = slice(None, None, -1) if flip else slice(None)
+    moved = np.einsum("ij,tsj->tsi", rotate, a.position[:, along])
+    assert np.abs(moved - b.position).max() < tolerance * LENGTH
+    assert np.abs(a.tension[:, along] - b.tension).max() < 10 * tolerance * size
+    assert np.abs(a.curvature[:, along] - b.curvature).max() < 100 * tolerance * max(1.0, np.abs(a.curvature).max())
+
+
+@pytest.mark.parametrize("turn", AXES)
+@pytest.mark.parametrize("model", MODELS)
+def test_a_turned_scene_gives_the_turned_answer(model, turn):
+    rotate = AXES[turn]
+    compare(hybrid.static(scene(model)), hybrid.static(scene(model, rotate)), STATIC, rotate)
+    if turn in ("x to z", "anyhow"):
+        compare(hybrid.run(released(model)), hybrid.run(released(model, rotate)), MOVING, rotate)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_mirrored_scene_gives_the_mirrored_answer(model):
+    """A mirror turns the sense of twist: torsion and the second and third intrinsic strain change sign."""
+    mirror = np.diag([1.0, -1.0, 1.0])
+    mirrored = [dict(SECTIONS[0]), SECTIONS[1]]
+    k1, k2, k3 = SECTIONS[0]["intrinsic_curvature"]
+    # material axes: a1 is mirrored to a1, a2 = d x a1 to minus the mirrored a2
+    mirrored[0]["intrinsic_curvature"] = [-k1, k2, -k3]
+    for solve, make, tolerance in ((hybrid.static, scene, STATIC), (hybrid.run, released, MOVING)):
+        a, b = solve(make(model)), solve(make(model, mirror, mirrored))
+        compare(a, b, tolerance, mirror)
+        if model == "rod":
+            assert np.abs(a.torque + b.torque).max() < 100 * tolerance * np.abs(a.torque).max()
+
+
+def hanging(model, swapped=False, motion=True):
+    """A sagging line between two points, one of them clamped and one moving; or the same told from the other end."""
+    first = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.1, -0.4]}
+    last = {"kind": "pinned", "position": [1.2, 0.3, 0.2]}
+    if motion:
+        last["motion"] = {"heave": {"amplitude": 0.1, "period": 2.5}, "sway": {"amplitude": 0.05, "period": 3.1}, "ramp": 2.0}
+    sections = [{k: v for k, v in s.items() if k != "intrinsic_curvature"} for s in SECTIONS]
+    sections[0]["bending_stiffness"] = 0.05
+    zones = {"rod": [("rod", 2.0, 40)], "catenary": [("catenary", 2.0, 40)], "hybrid": [("rod", 0.5, 10), ("catenary", 1.5, 30)]}[model]
+    if swapped:
+        first["tangent"] = [-x for x in first["tangent"]]
+        first, last = last, first
+        sections, zones = sections[::-1], zones[::-1]
+    return hybrid.validate_scene(
+        {
+            "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "current": [0.2, 0.3, 0.0]}},
+            "cable": {"sections": sections}, "ends": {"start": first, "end": last}, "initial": {"kind": "equilibrium"},
+            "model": {"kind": "zones", "zones": [{kind: length, "cells": n} for kind, length, n in zones]},
+            "time": {"duration": 1.0, "step": 0.01}, "output": {"every": 0.2, "points": 40},  # none on the joint, where tension and curvature have two values
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_swapped_ends(model):
+    compare(hybrid.static(hanging(model)), hybrid.static(hanging(model, swapped=True)), STATIC, flip=True)
+    compare(hybrid.run(hanging(model)), hybrid.run(hanging(model, swapped=True)), MOVING, flip=True)
+
+
+@pytest.mark.parametrize(
+    ("whole", "split"),
+    [
+        ([{"rod": 2.0, "cells": 40}], [{"rod": 0.7, "cells": 14}, {"rod": 1.3, "cells": 26}]),
+        ([{"catenary": 2.0, "cells": 40}], [{"catenary": 0.7, "cells": 14}, {"catenary": 1.3, "cells": 26}]),
+        (
+            [{"rod": 0.6, "cells": 12}, {"catenary": 1.4, "cells": 28}],
+            [{"rod": 0.3, "cells": 6}, {"rod": 0.3, "cells": 6}, {"catenary": 0.4, "cells": 8}, {"catenary": 1.0, "cells": 20}],
+        ),
+    ],
+)
+def test_a_zone_split_in_two_of_the_same_kind(whole, split):
+    straight = {"kind": "straight", "direction": [0.2, 0.1, -1.0]}
+    a = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": whole}, initial=straight))
+    b = hybrid.run(scene("hybrid", model={"kind": "zones", "zones": split}, initial=straight))
+    compare(a, b, MOVING)
+
+
+@pytest.mark.parametrize("model", MODELS)
+def test_a_section_split_in_two_alike(model):
+    halves = [dict(SECTIONS[0], length=0.3), dict(SECTIONS[0], length=0.5), *[dict(SECTIONS[1], length=x) for x in (0.33, 0.87)]]
+    compare(hybrid.run(released(model)), hybrid.run(released(model, sections=halves)), MOVING)
+
+
+def test_far_from_the_origin():
+    """One kilometre away the increments carry the motion: the same to 1e-9 m, which is 1e4 roundings of 1 km."""
+    straight = {"kind": "straight", "direction": [0.2, 0.1, -1.0]}
+    near = scene("hybrid", ends=_ends([0, 0, 0]), initial=straight)
+    far = scene("hybrid", ends=_ends([1000.0, -2000.0, 500.0]), initial=straight)
+    a, b = hybrid.run(near), hybrid.run(far)
+    assert np.abs(b.position - a.position - np.array([1000.0, -2000.0, 500.0])).max() < 1e-9 * 1e3
+    assert np.abs(b.tension - a.tension).max() < 1e-6 * np.abs(a.tension).max()
+
+
+def _ends(offset):
+    position = [float(x) for x in offset]
+    return {
+        "start": {"kind": "clamped", "position": position, "tangent": [0.2, 0.1, -1]},
+        "end": {"kind": "free", "force": [6.0, 3.0, -4.0]},
+    }
