@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.model.plan import output_times
 from hybrid.model.state import Floats
 from hybrid.results.probes import PROBES, output_points
 from hybrid.results.read import Result, open_result
@@ -41,22 +42,19 @@ def static_shooting(scene: Scene, output: str | Path | None, overwrite: bool) ->
 
 def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Result:
     """A run by literal shooting; outputs are its states nearest to the output times asked for."""
-    assert scene.time is not None
+    step = scene.require_time().step
     target = _target(output)
-    every = scene.output.every or scene.time.duration / 100
+    due = [0.0, *output_times(scene)]
     with _recorder(scene, target, overwrite, _STEP_FIELDS) as recorder:
-        due = 0.0
 
         def record(state: ShootingState) -> None:
-            nonlocal due
-            assert scene.time is not None
             if state.t > 0.0:
                 recorder.log(
                     {"t": state.t, "iterations": state.iterations, "residual": state.residual, "growth": state.growth}
                 )
-            if state.t >= due - 0.5 * scene.time.step:
+            if due and state.t >= due[0] - 0.5 * step:
                 recorder.save(state.t, _values(scene, state), _zones(state))
-                due += every
+                due.pop(0)
 
         simulate(scene, record)
         recorder.close("complete", "literal shooting")

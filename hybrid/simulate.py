@@ -15,7 +15,6 @@ import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
-from math import ceil
 from pathlib import Path
 from typing import Any
 
@@ -24,6 +23,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.model.build import Model, build
 from hybrid.model.mesh import Zone
+from hybrid.model.plan import output_times, step_ends
 from hybrid.model.state import Floats
 from hybrid.results.probes import Observer, output_points
 from hybrid.results.read import Result, open_result
@@ -32,12 +32,11 @@ from hybrid.scene.motion import check_motions
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.solve.statics import Equilibrium, solve_statics
-from hybrid.solve.step import sharpest
-from hybrid.solve.timestep import POWERS, UNRESOLVED_BEND, Stepper, Taken
+from hybrid.solve.step import sharpest, slackest
+from hybrid.solve.timestep import POWERS, SLACK_FLOOR, UNRESOLVED_BEND, Stepper, Taken
 
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
-OUTPUTS = 100  # of a run whose scene does not say how often
 
 STEP_FIELDS = (
     Field("t", "s", "time at the end of the step"),
@@ -89,16 +88,16 @@ def run(
         return run_shooting(scene, output, overwrite)
     model = build(scene)
     equilibrium = _equilibrium(scene, model) if scene.initial.kind == "equilibrium" else None
-    outputs, stops = _schedule(scene, model)
+    outputs = output_times(scene)
+    stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
     observer = Observer(model.line, model.zones, output_points(scene.output.points, model.length), True)
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
-    told = _Told(_teller(progress), scene.time.duration, model.zones)
-    with recorder, _interrupts() as interrupted:
+    with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
         motion = _Motion(scene, model, observer, recorder, target, equilibrium)
         motion.save()
         for stop in stops:
-            for until in _parts(motion.t, stop, scene.time.step):
+            for until in step_ends(motion.t, stop, scene.time.step):
                 motion.advance(until)
                 told(motion)
                 if interrupted():
@@ -132,6 +131,7 @@ class _Motion:
         self.cpu = clock.process_time()
         self.work = np.zeros(len(POWERS))
         self.worst_bend = UNRESOLVED_BEND  # rad; worse ones are noted
+        self.slackest = SLACK_FLOOR * model.tension_scale  # N; slacker cells are noted where the scene asks to go on
         if equilibrium is None:
             self.state = model.start.copy()
             self._turn_ends_in()
@@ -183,6 +183,8 @@ class _Motion:
         self.work += 0.5 * dt * (self.power + power)
         self.power = power
         self._watch_bends()
+        if self.model.slack == "warn":
+            self._watch_slack()
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
@@ -196,6 +198,15 @@ class _Motion:
         if angle > self.worst_bend:
             note_bend(self.recorder, self.model, self.t, angle, node)
             self.worst_bend = 1.5 * angle
+
+    def _watch_slack(self) -> None:
+        """Note a catenary cell without tension: when it shows first, and whenever it is ten times as bad."""
+        cell = slackest(self.model.line, self.state.T, self.slackest)
+        if cell >= 0:
+            s, tension = float(self.model.line.s[cell]), float(self.state.T[cell])
+            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
+            self.recorder.event(self.t, s, float(self.model.line.s[cell + 1]), "slack", text)
+            self.slackest = min(10.0 * tension, 10.0 * self.slackest)
 
     def _turn_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""
@@ -218,8 +229,10 @@ class _Motion:
 
     def _ignite(self) -> None:
         assert self.scene.time is not None
-        taken = self.stepper.ignite(self.model.ends.at, self.state, self.t, self.scene.time.step)
-        if taken.outcome not in (Outcome.OK, Outcome.SLACK):
+        ends = self.model.ends
+        acceleration = ends.acceleration(self.t, 1e-3 * self.scene.time.step)
+        taken = self.stepper.ignite(ends.at(self.t), acceleration, self.state)
+        if taken.outcome != Outcome.OK:
             self._stop(taken, 0.0)
 
     def _stop(self, taken: Taken, dt: float) -> None:
@@ -255,12 +268,27 @@ class _Motion:
 
 
 class _Told:
-    """Calls `progress` now and then."""
+    """Calls `progress` now and then, and closes a live line however the run ends."""
 
-    def __init__(self, tell: Callable[[Progress], None] | None, duration: float, zones: tuple[Zone, ...]) -> None:
-        self._tell, self._duration, self._zones = tell, duration, zones
+    def __init__(self, progress: bool | Callable[[Progress], None], duration: float, zones: tuple[Zone, ...]) -> None:
+        self._tell: Callable[[Progress], None] | None = None
+        if progress is True:
+            from hybrid.live import live_line
+
+            self._tell = live_line()
+        elif progress:
+            self._tell = progress
+        self._duration, self._zones = duration, zones
         self._begin = clock.perf_counter()
         self._last = 0.0
+
+    def __enter__(self) -> _Told:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        close = getattr(self._tell, "close", None)
+        if close is not None:
+            close()
 
     def __call__(self, motion: _Motion, finished: bool = False) -> None:
         if self._tell is None:
@@ -305,23 +333,8 @@ def note_bend(recorder: Recorder, model: Model, t: float, angle: float, node: in
 # --- parts of the above ---------------------------------------------------------------
 
 
-def _parts(t: float, stop: float, step: float) -> list[float]:
-    """End times of equal steps, none longer than `step`, from t to `stop`."""
-    n = max(1, ceil((stop - t) / step - 1e-9))
-    return [t + (stop - t) * k / n for k in range(1, n)] + [stop]
-
-
 def _equilibrium(scene: Scene, model: Model) -> Equilibrium:
     return solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale, model.slack)
-
-
-def _schedule(scene: Scene, model: Model) -> tuple[list[float], list[float]]:
-    """Output times after 0, and all times a step must end at."""
-    assert scene.time is not None
-    duration = scene.time.duration
-    every = scene.output.every or duration / OUTPUTS
-    outputs = [k * every for k in range(1, ceil(duration / every - 1e-9))] + [duration]
-    return outputs, sorted({*outputs, *(b for b in model.ends.breaks if b < duration)})
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:
@@ -352,14 +365,6 @@ def _recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=overwrite,
     )  # fmt: skip
-
-
-def _teller(progress: bool | Callable[[Progress], None]) -> Callable[[Progress], None] | None:
-    if progress is True:
-        from hybrid.live import live_line
-
-        return live_line()
-    return progress or None
 
 
 @contextmanager

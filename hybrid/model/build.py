@@ -26,7 +26,7 @@ from hybrid.model.properties import (
     weight,
 )
 from hybrid.model.start import corners, ends_and_frames, initial_nodes
-from hybrid.model.state import INEXTENSIBLE, Floats, Line, State, blank_state
+from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
 from hybrid.scene.schema import Clamped, Guided, RodZone, Scene, Section, Straight, ZonesModel
 
@@ -143,7 +143,7 @@ def build(scene: Scene) -> Model:
     force = np.zeros((n + 1, 3))
     force[:, 2] = -to_nodes(h * per_cell(lambda x: weight(x, scene)))
     line = Line(
-        s=s, h=h, ck=np.maximum(compliance, INEXTENSIBLE / scale), mass=to_nodes(h * per_cell(lambda x: x.mass)),
+        s=s, h=h, ck=compliance, mass=to_nodes(h * per_cell(lambda x: x.mass)),
         force=force, element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
         drag_n=drag_n, drag_t=drag_t, added_n=added_n, added_t=added_t, damp=damp, tau=tau,
         current=np.array(fluid.current if fluid and fluid.current else (0.0, 0.0, 0.0)), bits=bits,

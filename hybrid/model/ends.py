@@ -96,6 +96,17 @@ class EndConditions:
             self._end_turn()
         return self.values
 
+    def acceleration(self, t: float, dt: float) -> Floats:
+        """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""
+        if not self._motions:
+            return np.zeros((2, 3))
+        self.at(t + 0.5 * dt)
+        after = self.velocity.copy()
+        self.at(t - 0.5 * dt)
+        out = (after - self.velocity) / dt
+        self.at(t)
+        return np.asarray(out)
+
     def turn_in(self, chords: tuple[Floats, Floats], which: Sequence[bool], duration: float) -> list[tuple[int, float]]:
         """Let tangents start as the cable lies and reach their given directions after `duration` s, at ends `which`.
 

@@ -28,6 +28,33 @@ class Plan:
 COST = {"rod": 0.3e-6, "catenary": 0.1e-6}
 COST_STEP = 50e-6
 USUAL_ITERATIONS = 2.5
+OUTPUTS = 100  # of a run whose scene does not say how often
+
+
+def output_interval(scene: Scene) -> float:
+    """Time between two outputs, s; a scene that does not say how often gets OUTPUTS, or one a step."""
+    time = scene.require_time()
+    return scene.output.every or max(time.duration / OUTPUTS, time.step)
+
+
+def output_times(scene: Scene) -> list[float]:
+    """Times (s) of the outputs after the first."""
+    time, every = scene.require_time(), output_interval(scene)
+    return [k * every for k in range(1, ceil(time.duration / every - 1e-9))] + [time.duration]
+
+
+def step_ends(start: float, stop: float, step: float) -> list[float]:
+    """End times of equal steps, none longer than `step`, from `start` to `stop`."""
+    n = max(1, ceil((stop - start) / step - 1e-9))
+    return [start + (stop - start) * k / n for k in range(1, n)] + [stop]
+
+
+def count_steps(scene: Scene) -> int:
+    """Steps of a run: each interval between two outputs is cut into equal ones."""
+    time, every = scene.require_time(), output_interval(scene)
+    whole = ceil(time.duration / every - 1e-9) - 1
+    last = time.duration - whole * every
+    return whole * max(1, ceil(every / time.step - 1e-9)) + max(1, ceil(last / time.step - 1e-9))
 
 
 def plan(scene: Scene) -> Plan:
@@ -35,6 +62,6 @@ def plan(scene: Scene) -> Plan:
     model = build(scene)
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
-    steps = ceil(scene.time.duration / scene.time.step - 1e-9) if scene.time else 0
+    steps = count_steps(scene) + len(model.ends.breaks) if scene.time else 0
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     return Plan(model.ledger, model.zones, cells, model.unknowns, steps, steps * (USUAL_ITERATIONS * each + COST_STEP))

@@ -13,10 +13,6 @@ from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
 
-# The compliance of an inextensible cable, as a strain at the tension scale: far below any
-# accuracy asked for, far above round-off of a cell's length (1e-16).
-INEXTENSIBLE = 1e-9
-
 
 class Line(NamedTuple):
     """What the plan says: mesh, stiffness, mass and load parameters.
@@ -26,7 +22,7 @@ class Line(NamedTuple):
 
     s: Floats  # (N+1,) m, unstretched arc length of the nodes
     h: Floats  # (N,) m, unstretched cell length
-    ck: Floats  # (N,) 1/N, axial compliance
+    ck: Floats  # (N,) 1/N, axial compliance; 0 when inextensible
     mass: Floats  # (N+1,) kg, of the half cells that meet at the node
     force: Floats  # (N+1, 3) N, weight and buoyancy
     element: NDArray[np.int8]  # (N+1,) 1 where a rod element sits

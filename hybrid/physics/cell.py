@@ -5,8 +5,8 @@
     l, il    |e| and 1/|e|                                -      m, 1/m
     d        e / l                                        3      -      inertial
     h        unstretched length                           -      m
-    ck       compliance 1/EA                              -      1/N
-    T, Ts    tension (Newton variable), (l/h - 1)/ck      -      N
+    ck       compliance 1/EA, 0 when inextensible         -      1/N
+    T        tension                                      -      N
     e1, e2   de/dt, d2e/dt2                               3      m/s..  inertial
     d1       dd/dt                                        3      1/s    inertial
     tau      stiffness-proportional damping time          -      s
@@ -33,18 +33,16 @@ def chord(e):
 
 
 @inner
-def strain_tension(e, l, h, ck):
-    """Ts = (l/h - 1)/ck, free of cancellation in l - h."""
-    return (dot(e, e) - h * h) / ((l + h) * h * ck)
+def pull(d, il, T):
+    """Axial force T d and dn/de = (T/l)(I - d d^T); dn/dT is d."""
+    return scale(T, d), mscale(T * il, project(d))
 
 
 @inner
-def stretch(d, il, h, ck, T, Ts):
-    """Axial force Ts d and dn/de = d d^T/(h ck) + (T/l)(I - d d^T)."""
-    t = T * il
-    a = 1.0 / (h * ck) - t
-    xy, xz, yz = a * d[0] * d[1], a * d[0] * d[2], a * d[1] * d[2]
-    return scale(Ts, d), (a * d[0] * d[0] + t, xy, xz, xy, a * d[1] * d[1] + t, yz, xz, yz, a * d[2] * d[2] + t)
+def stretch(e, d, l, h, ck, T):
+    """The law of length, l - h - h ck T = 0, linearised: row.de - hck dT = gap.  l - h is free of cancellation."""
+    hck = h * ck
+    return d, hck, hck * T - (dot(e, e) - h * h) / (l + h)
 
 
 @inner
@@ -58,16 +56,10 @@ def turning(d, il, e1, cv):
 
 
 @inner
-def damped_stretch(d, il, h, ck, T, Ts, e1, d1, tau, cv):
-    """As `stretch`, with l replaced by l + tau dl/dt in the law of tension."""
-    Td = Ts + tau * dot(d, e1) / (h * ck)
-    P = mscale(T * il, project(d))
-    row = (
-        ((1.0 + tau * cv) * d[0] + tau * d1[0]) / (h * ck),
-        ((1.0 + tau * cv) * d[1] + tau * d1[1]) / (h * ck),
-        ((1.0 + tau * cv) * d[2] + tau * d1[2]) / (h * ck),
-    )
-    return scale(Td, d), madd(outer(d, row), P)
+def damped_stretch(d, e1, d1, tau, cv):
+    """As `stretch` with l + tau dl/dt in place of l: the row, and what the gap loses."""
+    a = 1.0 + tau * cv
+    return (a * d[0] + tau * d1[0], a * d[1] + tau * d1[1], a * d[2] + tau * d1[2]), tau * dot(d, e1)
 
 
 @inner

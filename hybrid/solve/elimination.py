@@ -1,14 +1,17 @@
 """The march along s: assembly of one block row after the other, eliminated as it is born.
 
-Unknowns of block i: the node (dr_i, 3) and the spin of the cell after it (dpsi_i).  A
-row couples the blocks i-2 .. i+1 and the position i+2.  W holds one block row:
+Unknowns of block i: the tension of the cell before node i (dT_{i-1}), the node (dr_i),
+the spin of the cell after it (dpsi_i); its equations, in that order: the length of the
+cell before, the balance of the node, the spin of the cell after.  Tension stays an
+unknown, so that stiffness never enters as 1/compliance: an inextensible cell is the
+case ck = 0 and nothing else.  W holds one block row:
 
-    columns  0..3   4..7   8..11  12..15  16..18   19
-    block    i-2    i-1    i      i+1     r_{i+2}  right-hand side
+    columns  0..4   5..9   10..14  15..19  20..22   23
+    block    i-2    i-1    i       i+1     r_{i+2}  right-hand side
 
-After elimination  x_i = X_i[7] - X_i[0..3] x_{i+1} - X_i[4..6] dr_{i+2}:  the linear
+After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
 relation that everything before node i imposes on what follows (docs/theory.md, 5).
-Rows without bending take a 3x3 path in the same march.
+Rows without bending take a path with four unknowns in the same march.
 """
 
 from __future__ import annotations
@@ -22,8 +25,8 @@ from hybrid.physics.cell import (
     chord,
     damped_stretch,
     moment_force,
+    pull,
     rotary_force,
-    strain_tension,
     stretch,
     turning,
 )
@@ -52,8 +55,10 @@ from hybrid.physics.rotations import (
     sub,
 )
 
-WIDTH = 20  # columns of W
-ROW = 32  # numbers of X_i
+SIZE = 5  # unknowns of a block
+WIDTH = 24  # columns of W
+SPAN = 9  # columns of X_i
+ROW = SIZE * SPAN  # numbers of X_i
 REPORT = 20  # numbers of `report`
 # report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
 #         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
@@ -83,128 +88,124 @@ def put(W, row, col, A, sign):
 
 
 @inner
-def take(W, o, swap, X, p, l0, l1, l2, l3):
-    """Subtract l . X_p (4 rows of 8) from the eight numbers of W at o; its last column belongs to the right side."""
-    kept = W[o + 7]
-    t0 = W[o] - l0 * X[p] - l1 * X[p + 8] - l2 * X[p + 16] - l3 * X[p + 24]
-    t1 = W[o + 1] - l0 * X[p + 1] - l1 * X[p + 9] - l2 * X[p + 17] - l3 * X[p + 25]
-    t2 = W[o + 2] - l0 * X[p + 2] - l1 * X[p + 10] - l2 * X[p + 18] - l3 * X[p + 26]
-    t3 = W[o + 3] - l0 * X[p + 3] - l1 * X[p + 11] - l2 * X[p + 19] - l3 * X[p + 27]
-    t4 = W[o + 4] - l0 * X[p + 4] - l1 * X[p + 12] - l2 * X[p + 20] - l3 * X[p + 28]
-    t5 = W[o + 5] - l0 * X[p + 5] - l1 * X[p + 13] - l2 * X[p + 21] - l3 * X[p + 29]
-    t6 = W[o + 6] - l0 * X[p + 6] - l1 * X[p + 14] - l2 * X[p + 22] - l3 * X[p + 30]
-    t7 = W[swap] - l0 * X[p + 7] - l1 * X[p + 15] - l2 * X[p + 23] - l3 * X[p + 31]
-    W[o] = t0
-    W[o + 1] = t1
-    W[o + 2] = t2
-    W[o + 3] = t3
-    W[o + 4] = t4
-    W[o + 5] = t5
-    W[o + 6] = t6
-    W[o + 7] = kept
-    W[swap] = t7
+def take(W, o, skip, X, p, l0, l1, l2, l3, l4):
+    """Subtract l . X_p (5 rows of 9) from the row of W whose block begins at o; positions follow at o + 5 + skip."""
+    q1, q2, q3, q4 = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+    t0 = W[o] - l0 * X[p] - l1 * X[q1] - l2 * X[q2] - l3 * X[q3] - l4 * X[q4]
+    t1 = W[o + 1] - l0 * X[p + 1] - l1 * X[q1 + 1] - l2 * X[q2 + 1] - l3 * X[q3 + 1] - l4 * X[q4 + 1]
+    t2 = W[o + 2] - l0 * X[p + 2] - l1 * X[q1 + 2] - l2 * X[q2 + 2] - l3 * X[q3 + 2] - l4 * X[q4 + 2]
+    t3 = W[o + 3] - l0 * X[p + 3] - l1 * X[q1 + 3] - l2 * X[q2 + 3] - l3 * X[q3 + 3] - l4 * X[q4 + 3]
+    t4 = W[o + 4] - l0 * X[p + 4] - l1 * X[q1 + 4] - l2 * X[q2 + 4] - l3 * X[q3 + 4] - l4 * X[q4 + 4]
+    s = o + 5 + skip
+    t5 = W[s] - l0 * X[p + 5] - l1 * X[q1 + 5] - l2 * X[q2 + 5] - l3 * X[q3 + 5] - l4 * X[q4 + 5]
+    t6 = W[s + 1] - l0 * X[p + 6] - l1 * X[q1 + 6] - l2 * X[q2 + 6] - l3 * X[q3 + 6] - l4 * X[q4 + 6]
+    t7 = W[s + 2] - l0 * X[p + 7] - l1 * X[q1 + 7] - l2 * X[q2 + 7] - l3 * X[q3 + 7] - l4 * X[q4 + 7]
+    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
+    W[s], W[s + 1], W[s + 2] = t5, t6, t7
+    return l0 * X[p + 8] + l1 * X[q1 + 8] + l2 * X[q2 + 8] + l3 * X[q3 + 8] + l4 * X[q4 + 8]
 
 
 @inner
-def eliminate_wide(W, X, i):
-    """Eliminate block row i (4 unknowns) with pivoting inside the block; False when the block is singular."""
-    if i >= 2:
-        p = (i - 2) * ROW
-        for r in range(3):  # the spin row does not reach back to block i-2
-            o = r * WIDTH
-            take(W, o + 4, o + 19, X, p, W[o], W[o + 1], W[o + 2], W[o + 3])
-    if i >= 1:
-        p = (i - 1) * ROW
-        for r in range(4):
-            o = r * WIDTH
-            take(W, o + 8, o + 19, X, p, W[o + 4], W[o + 5], W[o + 6], W[o + 7])
-    for c in range(4):
-        best, where = abs(W[c * WIDTH + 8 + c]), c
-        for r in range(c + 1, 4):
-            if abs(W[r * WIDTH + 8 + c]) > best:
-                best, where = abs(W[r * WIDTH + 8 + c]), r
+def pivot(W, size, first, last):
+    """Gauss-Jordan on rows of W, pivoting inside the block that begins at column `first`; False if singular.
+
+    A cofactor inverse would lose eps (k_axial/k_transverse)^2.
+    """
+    for c in range(size):
+        best, where = abs(W[c * WIDTH + first + c]), c
+        for r in range(c + 1, size):
+            if abs(W[r * WIDTH + first + c]) > best:
+                best, where = abs(W[r * WIDTH + first + c]), r
         if not best > 0.0:
             return False
         if where != c:
-            for j in range(8 + c, 20):
+            for j in range(first + c, last):
                 W[c * WIDTH + j], W[where * WIDTH + j] = W[where * WIDTH + j], W[c * WIDTH + j]
-        inv = 1.0 / W[c * WIDTH + 8 + c]
-        for j in range(8 + c, 20):
+        inv = 1.0 / W[c * WIDTH + first + c]
+        for j in range(first + c + 1, last):
             W[c * WIDTH + j] *= inv
-        for r in range(4):
+        for r in range(size):
             if r != c:
-                f = W[r * WIDTH + 8 + c]
-                for j in range(8 + c, 20):
+                f = W[r * WIDTH + first + c]
+                for j in range(first + c + 1, last):
                     W[r * WIDTH + j] -= f * W[c * WIDTH + j]
-    x = i * ROW
-    for r in range(4):
-        for j in range(8):
-            X[x + 8 * r + j] = W[r * WIDTH + 12 + j]
     return True
 
 
 @inner
-def eliminate_narrow(L, D, U, b, X, i):
-    """Eliminate a row of three unknowns, L dr_{i-1} + D dr_i + U dr_{i+1} = b; X_i keeps zeros elsewhere."""
-    b0, b1, b2 = b
+def eliminate_wide(W, X, i):
+    """Eliminate block row i (5 unknowns); False when the block is singular."""
+    if i >= 2:
+        p = (i - 2) * ROW
+        for r in range(1, 4):  # only the balance of the node reaches back to block i-2
+            o = r * WIDTH
+            W[o + 23] -= take(W, o + 5, 1, X, p, W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4])
     if i >= 1:
         p = (i - 1) * ROW
-        D = (
-            D[0] - L[0] * X[p] - L[1] * X[p + 8] - L[2] * X[p + 16],
-            D[1] - L[0] * X[p + 1] - L[1] * X[p + 9] - L[2] * X[p + 17],
-            D[2] - L[0] * X[p + 2] - L[1] * X[p + 10] - L[2] * X[p + 18],
-            D[3] - L[3] * X[p] - L[4] * X[p + 8] - L[5] * X[p + 16],
-            D[4] - L[3] * X[p + 1] - L[4] * X[p + 9] - L[5] * X[p + 17],
-            D[5] - L[3] * X[p + 2] - L[4] * X[p + 10] - L[5] * X[p + 18],
-            D[6] - L[6] * X[p] - L[7] * X[p + 8] - L[8] * X[p + 16],
-            D[7] - L[6] * X[p + 1] - L[7] * X[p + 9] - L[8] * X[p + 17],
-            D[8] - L[6] * X[p + 2] - L[7] * X[p + 10] - L[8] * X[p + 18],
-        )
-        b0 -= L[0] * X[p + 7] + L[1] * X[p + 15] + L[2] * X[p + 23]
-        b1 -= L[3] * X[p + 7] + L[4] * X[p + 15] + L[5] * X[p + 23]
-        b2 -= L[6] * X[p + 7] + L[7] * X[p + 15] + L[8] * X[p + 23]
-    A0 = (D[0], D[1], D[2], U[0], U[1], U[2], b0)
-    A1 = (D[3], D[4], D[5], U[3], U[4], U[5], b1)
-    A2 = (D[6], D[7], D[8], U[6], U[7], U[8], b2)
-    # Gauss-Jordan on rows of 7 with row pivoting: a cofactor inverse would lose eps (k_axial/k_transverse)^2
-    if abs(A1[0]) > abs(A0[0]):
-        A0, A1 = A1, A0
-    if abs(A2[0]) > abs(A0[0]):
-        A0, A2 = A2, A0
-    f = 1.0 / A0[0]
-    p1, p2, p3, p4, p5, p6 = f * A0[1], f * A0[2], f * A0[3], f * A0[4], f * A0[5], f * A0[6]
-    f = A1[0]
-    q1, q2, q3, q4, q5, q6 = (
-        A1[1] - f * p1,
-        A1[2] - f * p2,
-        A1[3] - f * p3,
-        A1[4] - f * p4,
-        A1[5] - f * p5,
-        A1[6] - f * p6,
-    )
-    f = A2[0]
-    r1, r2, r3, r4, r5, r6 = (
-        A2[1] - f * p1,
-        A2[2] - f * p2,
-        A2[3] - f * p3,
-        A2[4] - f * p4,
-        A2[5] - f * p5,
-        A2[6] - f * p6,
-    )
-    if abs(r1) > abs(q1):
-        q1, q2, q3, q4, q5, q6, r1, r2, r3, r4, r5, r6 = r1, r2, r3, r4, r5, r6, q1, q2, q3, q4, q5, q6
-    f = 1.0 / q1
-    q2, q3, q4, q5, q6 = f * q2, f * q3, f * q4, f * q5, f * q6
-    f = 1.0 / (r2 - r1 * q2)
-    r3, r4, r5, r6 = f * (r3 - r1 * q3), f * (r4 - r1 * q4), f * (r5 - r1 * q5), f * (r6 - r1 * q6)
-    q3, q4, q5, q6 = q3 - q2 * r3, q4 - q2 * r4, q5 - q2 * r5, q6 - q2 * r6
-    p3, p4, p5, p6 = p3 - p2 * r3 - p1 * q3, p4 - p2 * r4 - p1 * q4, p5 - p2 * r5 - p1 * q5, p6 - p2 * r6 - p1 * q6
+        for r in range(5):
+            o = r * WIDTH
+            W[o + 23] -= take(W, o + 10, 1, X, p, W[o + 5], W[o + 6], W[o + 7], W[o + 8], W[o + 9])
+    if not pivot(W, 5, 10, 24):
+        return False
     x = i * ROW
-    X[x], X[x + 1], X[x + 2], X[x + 7] = p3, p4, p5, p6
-    X[x + 8], X[x + 9], X[x + 10], X[x + 15] = q3, q4, q5, q6
-    X[x + 16], X[x + 17], X[x + 18], X[x + 23] = r3, r4, r5, r6
-    big = abs(p6) + abs(q6) + abs(r6)
-    return big < math.inf  # a singular block divides by zero, and infinity or NaN ends here
+    for r in range(5):
+        for j in range(SPAN):
+            X[x + SPAN * r + j] = W[r * WIDTH + 15 + j]
+    return True
+
+
+@inner
+def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, W, X, i):
+    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.
+
+    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
+    balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
+    """
+    # W: rows of 4 + 4 + 1 columns: dT_{i-1}, dr_i | dT_i, dr_{i+1} | right-hand side
+    A0 = (-hck, row[0], row[1], row[2], gap)
+    A1 = (back[0], D[0], D[1], D[2], b[0])
+    A2 = (back[1], D[3], D[4], D[5], b[1])
+    A3 = (back[2], D[6], D[7], D[8], b[2])
+    if i >= 1:
+        p = (i - 1) * ROW + SPAN
+        q, s = p + SPAN, p + 2 * SPAN
+        m = (-row[0], -row[1], -row[2])
+        A0 = less(A0, m, X, p, q, s)
+        A1 = less(A1, (L[0], L[1], L[2]), X, p, q, s)
+        A2 = less(A2, (L[3], L[4], L[5]), X, p, q, s)
+        A3 = less(A3, (L[6], L[7], L[8]), X, p, q, s)
+    fill(W, 0, A0, 0.0, 0.0, 0.0, 0.0)
+    fill(W, 1, A1, ahead[0], U[0], U[1], U[2])
+    fill(W, 2, A2, ahead[1], U[3], U[4], U[5])
+    fill(W, 3, A3, ahead[2], U[6], U[7], U[8])
+    if not pivot(W, 4, 0, 9):
+        return False
+    x = i * ROW
+    for r in range(4):
+        for j in range(4):
+            X[x + SPAN * r + j] = W[r * WIDTH + 4 + j]
+        X[x + SPAN * r + 8] = W[r * WIDTH + 8]
+    return True
+
+
+@inner
+def less(A, m, X, p, q, s):
+    """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
+    return (
+        A[0] - m[0] * X[p] - m[1] * X[q] - m[2] * X[s],
+        A[1] - m[0] * X[p + 1] - m[1] * X[q + 1] - m[2] * X[s + 1],
+        A[2] - m[0] * X[p + 2] - m[1] * X[q + 2] - m[2] * X[s + 2],
+        A[3] - m[0] * X[p + 3] - m[1] * X[q + 3] - m[2] * X[s + 3],
+        A[4] - m[0] * X[p + 8] - m[1] * X[q + 8] - m[2] * X[s + 8],
+    )
+
+
+@inner
+def fill(W, r, A, u0, u1, u2, u3):
+    o = r * WIDTH
+    W[o], W[o + 1], W[o + 2], W[o + 3] = A[0], A[1], A[2], A[3]
+    W[o + 4], W[o + 5], W[o + 6], W[o + 7] = u0, u1, u2, u3
+    W[o + 8] = A[4]
 
 
 @inner
@@ -246,13 +247,14 @@ def node_loads(line, i, v, vd, dl, ill, dr, ilr, left, right, cv, ca, report):
 
 
 @kernel
-def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
+def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows):
     """Assemble and eliminate all block rows for the configuration given.
 
     Everything belongs to the end of the step.  `u` is the displacement since its start,
     `r` the position then.  Returns -1, or the node whose block was singular.  `rows`
     with N+1 entries receives every assembled block row before elimination (for tests
-    and independent solvers); with none it is not touched.
+    and independent solvers); with none it is not touched.  `gaps` with N entries stands
+    in for the change of length asked of inextensible cells; with none, the law of length does.
     """
     n = e.shape[0]
     bits = line.bits
@@ -290,6 +292,7 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
     np_, pNm, pnm, pN0, pn0, pNp, pnp = Z3, Z9, Z3, Z9, Z3, Z9, Z3  # force of cell i-1 and its derivatives
     wide_before = False
     d_before, il_before = Z3, 0.0
+    row_before, hck_before, gap_before = Z3, -1.0, 0.0  # there is no cell before the start: dT = 0
     for i in range(n + 1):
         # --- unpack: chord and frame of cell i+1, element at node i+1
         cell = i < n
@@ -331,15 +334,16 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
 
         # --- law: force of cell i and its derivatives
         nc, Nm, nm, N0, n0, Np, npl = Z3, Z9, Z3, Z9, Z3, Z9, Z3
+        row, hck, gap = Z3, 1.0, 0.0
         Q = Z3
         if cell:
-            Ts = strain_tension(get3(e, i), l, line.h[i], line.ck[i])
+            nc, N0 = pull(d, il, T[i])
+            row, hck, gap = stretch(get3(e, i), d, l, line.h[i], line.ck[i], T[i])
             if bits & STIFFNESS_DAMPING:
-                nc, N0 = damped_stretch(d, il, line.h[i], line.ck[i], T[i], Ts, e1, d1, line.tau[i], cv)
-                along = dot(d, e1)
-                report[14] += line.tau[i] * along * along / (line.h[i] * line.ck[i])
-            else:
-                nc, N0 = stretch(d, il, line.h[i], line.ck[i], T[i], Ts)
+                row, late = damped_stretch(d, e1, d1, line.tau[i], cv)
+                gap -= late
+            if gaps.shape[0] > 0 and hck == 0.0:
+                gap = gaps[i]
             if bent:
                 Q = sub(Mn, M)
                 DQ = mscale(-1.0, madd(Bn, A))
@@ -387,25 +391,34 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
                 ends.position[k, 2] - r[i, 2] - u[i, 2],
             )
         good = True
+        # lengths in the unit of the balance, so that pivoting compares like with like
+        size = 1.0 if held else abs(Dii[0]) + abs(Dii[4]) + abs(Dii[8])
+        if not size > 0.0:
+            size = 1.0
         if wide or rows.shape[0] > 0:
-            for j in range(4 * WIDTH):
+            for j in range(SIZE * WIDTH):
                 W[j] = 0.0
+            W[6], W[7], W[8] = -row_before[0], -row_before[1], -row_before[2]
+            W[11], W[12], W[13] = row_before[0], row_before[1], row_before[2]
+            W[10], W[23] = -hck_before, gap_before
             if held:
-                W[8], W[WIDTH + 9], W[2 * WIDTH + 10] = 1.0, 1.0, 1.0
+                W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = 1.0, 1.0, 1.0
             else:
-                put(W, 0, 0, pNm, 1.0)
-                put(W, 0, 4, madd(pNm, G1), -1.0)
-                put(W, 0, 8, Dii, 1.0)
-                put(W, 0, 12, msub(G2, Np), 1.0)
-                put(W, 0, 16, Np, 1.0)
+                put(W, 1, 1, pNm, 1.0)
+                put(W, 1, 6, madd(pNm, G1), -1.0)
+                put(W, 1, 11, Dii, 1.0)
+                put(W, 1, 16, msub(G2, Np), 1.0)
+                put(W, 1, 20, Np, 1.0)
                 for j in range(3):
-                    o = j * WIDTH
-                    W[o + 3] = -pnm[j]
-                    W[o + 7] = nm[j] - pn0[j]
-                    W[o + 11] = n0[j] - pnp[j]
-                    W[o + 15] = npl[j]
-            W[19], W[WIDTH + 19], W[2 * WIDTH + 19] = rhs
-            o = 3 * WIDTH
+                    o = (j + 1) * WIDTH
+                    W[o + 4] = -pnm[j]
+                    W[o + 9] = nm[j] - pn0[j]
+                    W[o + 10] = -d_before[j]
+                    W[o + 14] = n0[j] - pnp[j]
+                    W[o + 15] = d[j]
+                    W[o + 19] = npl[j]
+            W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = rhs
+            o = 4 * WIDTH
             if cell and line.spin[i]:
                 # spin row: d.(M_{i+1} - M_i) - polar w' = 0
                 Qm = sub(Mn, M)
@@ -424,25 +437,33 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
                     residual -= line.polar[i] * wd[i]
                     inertia = line.polar[i] * ca
                 for j in range(3):
-                    W[o + 4 + j] = -sm[j]
-                    W[o + 8 + j] = sm[j] - s0[j]
-                    W[o + 12 + j] = s0[j] - sp[j]
-                    W[o + 16 + j] = sp[j]
-                W[o + 7] = dot(d, b)
-                W[o + 11] = -dot(d, add(bn, a)) - inertia + soft
-                W[o + 15] = dot(d, an)
-                W[o + 19] = -residual
+                    W[o + 6 + j] = -sm[j]
+                    W[o + 11 + j] = sm[j] - s0[j]
+                    W[o + 16 + j] = s0[j] - sp[j]
+                    W[o + 20 + j] = sp[j]
+                W[o + 9] = dot(d, b)
+                W[o + 14] = -dot(d, add(bn, a)) - inertia + soft
+                W[o + 19] = dot(d, an)
+                W[o + 23] = -residual
             else:
-                W[o + 11] = 1.0
+                W[o + 14] = 1.0
             if rows.shape[0] > 0:
-                for j in range(4 * WIDTH):
+                for j in range(SIZE * WIDTH):
                     rows[i, j] = W[j]
         if wide:
+            for j in range(6, 14):
+                W[j] *= size
+            W[23] *= size
             good = eliminate_wide(W, X, i)
-        elif held:
-            good = eliminate_narrow(Z9, (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), Z9, rhs, X, i)
         else:
-            good = eliminate_narrow(mscale(-1.0, G1), Dii, G2, rhs, X, i)
+            sized = (size * row_before[0], size * row_before[1], size * row_before[2])
+            hck_sized, gap_sized = size * hck_before, size * gap_before
+            if held:
+                one = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+                good = eliminate_narrow(sized, hck_sized, gap_sized, Z3, Z9, one, Z3, Z9, rhs, W, X, i)
+            else:
+                back = scale(-1.0, d_before)
+                good = eliminate_narrow(sized, hck_sized, gap_sized, back, mscale(-1.0, G1), Dii, d, G2, rhs, W, X, i)
         if not good:
             return i
 
@@ -450,6 +471,7 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
         if i == n - 1:
             report[9], report[10], report[11] = Mn
         d_before, il_before = d, il
+        row_before, hck_before, gap_before = row, hck, gap
         np_, pNm, pnm, pN0, pn0, pNp, pnp = nc, Nm, nm, N0, n0, Np, npl
         d, l, il, d1, D1, e1, Ra = dn, lnx, iln, d1n, D1n, e1n, Rn
         A, a, B, b, M = An, an, Bn, bn, Mn
@@ -459,28 +481,33 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows):
 
 @kernel
 def substitute(X, x):
-    """Solve back from the end: x (N+1, 4) receives dr and dpsi of every block."""
+    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
     n = x.shape[0] - 1
-    y0, y1, y2, y3, z0, z1, z2 = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
+    y = (0.0, 0.0, 0.0, 0.0, 0.0)
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    total = 0.0
     for i in range(n, -1, -1):
         p = i * ROW
-        for k in range(4):
-            q = p + 8 * k
+        for k in range(SIZE):
+            q = p + SPAN * k
             x[i, k] = (
-                X[q + 7]
-                - X[q] * y0 - X[q + 1] * y1 - X[q + 2] * y2 - X[q + 3] * y3
-                - X[q + 4] * z0 - X[q + 5] * z1 - X[q + 6] * z2
+                X[q + 8]
+                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
+                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
             )  # fmt: skip
-        z0, z1, z2 = y0, y1, y2
-        y0, y1, y2, y3 = x[i, 0], x[i, 1], x[i, 2], x[i, 3]
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    return total < math.inf
 
 
 def workspace(n_cells: int):
-    """Arrays the march needs: W, X, x, report, and an empty `rows`."""
+    """Arrays the march needs: W, X, x, report, and an empty `rows` and `gaps`."""
     return (
-        np.zeros(4 * WIDTH),
+        np.zeros(SIZE * WIDTH),
         np.zeros((n_cells + 1) * ROW),
-        np.zeros((n_cells + 1, 4)),
+        np.zeros((n_cells + 1, SIZE)),
         np.zeros(REPORT),
-        np.zeros((0, 4 * WIDTH)),
+        np.zeros((0, SIZE * WIDTH)),
+        np.zeros(0),
     )

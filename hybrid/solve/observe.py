@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from hybrid.compiled import kernel
-from hybrid.physics.cell import chord, strain_tension, turning
+from hybrid.physics.cell import chord, turning
 from hybrid.physics.element import bending, damped_bending, relative_rotation
 from hybrid.physics.loads import ROTARY, STIFFNESS_DAMPING
 from hybrid.physics.rotations import add, cross, dot, frame, log_rotation, scale, sub
@@ -11,7 +11,7 @@ from hybrid.solve.elimination import get3, get9
 
 
 @kernel
-def observe(line, ends, e, v, a1, w, M, strain, energy):
+def observe(line, ends, e, v, T, a1, w, M, strain, energy):
     """Moments M (N+1, 3) N m inertial and log strains (N+1, 3) rad in the frame of the cell before; energies (5,) J.
 
     energy: kinetic (structure, with rotary inertia), bending, torsion, stretch, gravity is left to the caller.
@@ -29,9 +29,8 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
         strain[i, 0], strain[i, 1], strain[i, 2] = 0.0, 0.0, 0.0
         if right:
             ei = get3(e, i)
-            d, l, il = chord(ei)
-            Ts = strain_tension(ei, l, line.h[i], line.ck[i])
-            energy[3] += 0.5 * line.h[i] * line.ck[i] * Ts * Ts
+            d, _, il = chord(ei)
+            energy[3] += 0.5 * line.h[i] * line.ck[i] * T[i] * T[i]
             if line.bits & ROTARY and line.spin[i]:
                 d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
                 energy[0] += 0.5 * line.rotary[i] * dot(d1, d1) + 0.5 * line.polar[i] * w[i] * w[i]
@@ -45,12 +44,12 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
         Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
         wa, wb = get3(ends.spin, 0), get3(ends.spin, 1)
         if left:
-            d, l, il = chord(get3(e, i - 1))
+            d, _, il = chord(get3(e, i - 1))
             Ra = frame(get3(a1, i - 1), d)
             d1, _ = turning(d, il, sub(vi, get3(v, i - 1)), 0.0)
             wa = add(cross(d, d1), scale(w[i - 1], d))
         if right:
-            d, l, il = chord(get3(e, i))
+            d, _, il = chord(get3(e, i))
             Rb = frame(get3(a1, i), d)
             d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
             wb = add(cross(d, d1), scale(w[i], d))

@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
 from hybrid.physics.loads import MASS_DAMPING
-from hybrid.solve.elimination import WIDTH, march, workspace
+from hybrid.solve.elimination import SIZE, WIDTH, march, workspace
 from hybrid.solve.step import newton, slackest
 from hybrid.solve.timestep import SLACK_FLOOR, Stepper
 
@@ -19,8 +19,11 @@ MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 4
 REACH = 0.1  # of the length: largest shift of a node in one iteration
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
+NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
 HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
-CHECKED_COMPLIANCE = 1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
+CHECKED_COMPLIANCE = (
+    1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
+)
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
@@ -36,36 +39,41 @@ class Equilibrium:
     report: Floats
 
 
-def positive_definite(rows: Floats, ends: Ends, spin: np.ndarray) -> bool:
-    """True when the negative of the Jacobian in `rows` (N+1, 80), made symmetric, is positive definite.
+def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray) -> bool:
+    """True when the stiffness in `rows` (N+1, 5 x 24) of the march, made symmetric, is positive definite.
 
-    Held nodes and cells without spin, whose rows are replaced by the identity, are left out.
+    Tensions are eliminated through the stiffness `axial` (N, 3, 3), d d^T/(h ck), of each
+    cell; held nodes and cells without spin are left out.
     """
-    blocks = rows.reshape(-1, 4, WIDTH)[:, :, : WIDTH - 1]
-    n = 4 * blocks.shape[0]
-    free = np.ones((blocks.shape[0], 4), bool)
+    n = rows.shape[0]
+    J = -rows.reshape(n, SIZE, WIDTH)
+    # blocks (r, psi) of the stiffness: K[i, j] couples block i with block i - 2 + j
+    K = np.zeros((n, 5, 4, 4))
+    for j, first in enumerate((1, 6, 11, 16)):
+        K[:, j] = J[:, 1:5, first : first + 4]
+    K[:, 4, :, :3] = J[:, 1:5, 20:23]
+    for a, b in ((0, 0), (1, 1)):
+        K[a : n - 1 + b, 2, :3, :3] += axial
+    K[:-1, 3, :3, :3] -= axial
+    K[1:, 1, :3, :3] -= axial
+    free = np.ones((n, 4), bool)
     free[0, :3], free[-1, :3] = not ends.held[0], not ends.held[1]
     free[:-1, 3], free[-1, 3] = spin != 0, False
-    free = free.ravel()
-    reach = 11  # columns to the right of the diagonal
-    band = np.zeros((reach + 1, n))
-    for k in range(4):
-        for j in range(reach + 1 - k):  # entry (4 i + k, 4 i + k + j); W holds block i from column 8 on
-            if 8 + k + j < WIDTH - 1:
-                i = np.arange(blocks.shape[0])
-                inside = 4 * i + k + j < n
-                band[j, 4 * i[inside] + k] -= 0.5 * blocks[inside, k, 8 + k + j]
-        for j in range(1, 9 + k):  # entry (4 i + k, 4 i + k - j), the mirror of (4 i + k - j, 4 i + k)
-            column = 8 + k - j
-            if column >= 0 and j <= reach:
-                i = np.arange(blocks.shape[0])
-                inside = 4 * i + k - j >= 0
-                band[j, 4 * i[inside] + k - j] -= 0.5 * blocks[inside, k, column]
-    band[0] *= 2.0
+    held = ~free.ravel()
+    reach = 11
+    band = np.zeros((reach + 1, 4 * n))
+    for offset in range(3):  # blocks on and right of the diagonal, averaged with their mirrors
+        upper = K[: n - offset, 2 + offset]
+        mirror = K[offset:, 2 - offset].transpose(0, 2, 1)
+        mean = 0.5 * (upper + mirror)
+        for k in range(4):
+            for m in range(4):
+                j = 4 * offset + m - k
+                if 0 <= j <= reach:
+                    band[j, k : 4 * (n - offset) : 4] = mean[:, k, m]
     for j in range(reach + 1):
-        both = free[: n - j] & free[j:]
-        band[j, : n - j] *= both
-    band[0, ~free] = 1.0
+        band[j, : 4 * n - j] *= ~(held[: 4 * n - j] | held[j:])
+    band[0, held] = 1.0
     try:
         cholesky_banded(band, lower=True, check_finite=False)
     except LinAlgError:
@@ -77,7 +85,7 @@ class _Solver:
     def __init__(self, line: Line, length: float, scale: float, stop_when_slack: bool) -> None:
         n = line.h.size
         self.line, self.length, self.scale, self.stop_when_slack = line, length, scale, stop_when_slack
-        self.W, self.X, self.x, self.report, self.rows = workspace(n)
+        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.total = 0
 
     def stable(self, ends: Ends, state: State) -> bool:
@@ -86,14 +94,15 @@ class _Solver:
         Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
         and at its real size its round-off would hide the softest modes of a long line.
         """
-        line = self.line._replace(ck=np.maximum(self.line.ck, CHECKED_COMPLIANCE / self.scale))
-        rows = np.zeros((line.s.size, 4 * WIDTH))
-        u = np.zeros_like(state.r)
+        line, n = self.line, self.line.h.size
+        rows = np.zeros((n + 1, SIZE * WIDTH))
         march(
-            line, ends, state.e, u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
-            0.0, 0.0, self.W, self.X, self.report, rows,
+            line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
+            state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, rows,
         )  # fmt: skip
-        return positive_definite(rows, ends, line.spin)
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
+        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin)
 
     def newton(self, line: Line, ends: Ends, start: State, turning: bool = False) -> tuple[Outcome, int, State]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
@@ -108,7 +117,8 @@ class _Solver:
         most = MOST_TURNING if turning else MOST_ITERATIONS
         outcome, iterations, _, where = newton(
             line, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-            0.0, 0.0, REACH * self.length, self.scale, most, turning, self.W, self.X, self.x, self.report, self.rows,
+            0.0, 0.0, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
+            self.report, self.rows,
         )  # fmt: skip
         self.total += iterations
         new.r[:] += u
@@ -116,20 +126,17 @@ class _Solver:
             slack = slackest(line, new.T, SLACK_FLOOR * self.scale)
             if slack >= 0:
                 outcome, where = Outcome.SLACK, slack
-        if outcome == Outcome.OK and line is self.line and line.element.any() and not self.stable(ends, new):
+        # an end moment that keeps its direction in space is not conservative, and this test does not judge it
+        judged = line is self.line and line.element.any() and not ends.moment.any()
+        if outcome == Outcome.OK and judged and not self.stable(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
 
     def prove(self, ends: Ends, state: State) -> float:
-        """Largest force out of balance, N, with the mixed tensions: T d in place of the stiff law's Ts d."""
-        taut = state.copy()
-        # chords stretched exactly as their tension asks: the residual then is that of the mixed form,
-        # free of the round-off that the law of a nearly inextensible cell multiplies by 1e9
-        l = np.linalg.norm(taut.e, axis=1)
-        taut.e[:] *= (self.line.h * (1.0 + self.line.ck * taut.T) / l)[:, None]
+        """Largest force out of balance at a node, N."""
         march(
-            self.line, ends, taut.e, np.zeros_like(taut.r), taut.r, taut.v, taut.vd, taut.T, taut.a1, taut.w,
-            taut.wd, 0.0, 0.0, self.W, self.X, self.report, self.rows,
+            self.line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
+            state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         return float(self.report[15])
 
@@ -157,12 +164,13 @@ def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, 
     state.T[:] = solver.scale
     chords = np.linalg.norm(start.e, axis=1)
     soft, short = np.maximum(line.ck, 1.0 / solver.scale), 0.5 * chords
+    hard = np.maximum(line.ck, NEARLY_STIFF / solver.scale)
     outcome, where = Outcome.OK, -1
     done, part, steps = 0.0, 1.0 / HARDENING, 0
     while done < 1.0 and part > 1e-3:
         goal = min(1.0, done + part)
         longer, harder = min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
-        between = line._replace(h=short ** (1 - longer) * line.h**longer, ck=soft ** (1 - harder) * line.ck**harder)
+        between = line._replace(h=short ** (1 - longer) * line.h**longer, ck=soft ** (1 - harder) * hard**harder)
         outcome, where, found = solver.newton(between if goal < 1.0 else line, ends, state)
         steps += 1
         if outcome == Outcome.OK:

@@ -10,8 +10,7 @@ from __future__ import annotations
 import math
 
 from hybrid.compiled import inner, kernel
-from hybrid.physics.cell import chord, strain_tension
-from hybrid.physics.loads import STIFFNESS_DAMPING
+from hybrid.physics.cell import chord
 from hybrid.physics.rotations import cross, dot, spin_about, transport
 from hybrid.solve.elimination import march, substitute
 
@@ -34,47 +33,23 @@ LARGEST_STEP_TURN = 1.0
 LARGEST_TURN = 0.7
 
 
-@inner
-def tension_change(line, e, d, l, il, T, v, de, cv, i):
-    """(Ts - T) + dTs/de . de: how the mixed tension of cell i follows a change of its chord."""
-    Ts = strain_tension(e, l, line.h[i], line.ck[i])
-    stiff = 1.0 / (line.h[i] * line.ck[i])
-    change = Ts - T + stiff * dot(d, de)
-    if line.bits & STIFFNESS_DAMPING:
-        e1 = (v[i + 1, 0] - v[i, 0], v[i + 1, 1] - v[i, 1], v[i + 1, 2] - v[i, 2])
-        along = dot(d, e1)
-        cross_part = il * (dot(e1, de) - along * dot(d, de))
-        change += line.tau[i] * stiff * (along + cv * dot(d, de) + cross_part)
-    return change
-
-
 @kernel
-def measure(line, e, v, T, x, cv):
-    """Size of a Newton correction x: largest shift, largest turn of a chord, largest change of tension, its cell."""
+def measure(e, T, x):
+    """Size of a Newton correction x: largest shift, largest turn of a chord or spin and its cell, largest change of
+    tension, and the largest tension."""
     n = e.shape[0]
-    shift, turn, pull, spin, where = 0.0, 0.0, 0.0, 0.0, -1
-    big = 0.0
-    for i in range(n):
-        de = (x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2])
-        ei = (e[i, 0], e[i, 1], e[i, 2])
-        d, l, il = chord(ei)
-        dT = abs(tension_change(line, ei, d, l, il, T[i], v, de, cv, i))
-        t = math.sqrt(dot(de, de)) * il
-        if not t <= turn:
-            turn, where = t, i
-        if not dT <= pull:
-            pull = dT
-        if not abs(x[i, 3]) <= spin:
-            spin = abs(x[i, 3])
-        if abs(T[i]) > big:
-            big = abs(T[i])
-        s = abs(x[i, 0]) + abs(x[i, 1]) + abs(x[i, 2])
-        if not s <= shift:
-            shift = s
-    s = abs(x[n, 0]) + abs(x[n, 1]) + abs(x[n, 2])
-    if not s <= shift:
-        shift = s
-    return shift, max(turn, spin), pull, big, where
+    shift, turn, pull, big, where = 0.0, 0.0, 0.0, 0.0, -1
+    for i in range(n + 1):
+        shift = max(shift, abs(x[i, 1]) + abs(x[i, 2]) + abs(x[i, 3]))
+        pull = max(pull, abs(x[i, 0]))
+        if i < n:
+            de = (x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2], x[i + 1, 3] - x[i, 3])
+            ei = (e[i, 0], e[i, 1], e[i, 2])
+            t = max(math.sqrt(dot(de, de) / dot(ei, ei)), abs(x[i, 4]))
+            big = max(big, abs(T[i]))
+            if t > turn:
+                turn, where = t, i
+    return shift, turn, where, pull, big
 
 
 @kernel
@@ -89,14 +64,13 @@ def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning):
     drift = (0.0, 0.0, 0.0)
     for i in range(n):
         de = (
-            part * (x[i + 1, 0] - x[i, 0]),
             part * (x[i + 1, 1] - x[i, 1]),
             part * (x[i + 1, 2] - x[i, 2]),
+            part * (x[i + 1, 3] - x[i, 3]),
         )
         ei = (e[i, 0], e[i, 1], e[i, 2])
         d, l, il = chord(ei)
-        full = (x[i + 1, 0] - x[i, 0], x[i + 1, 1] - x[i, 1], x[i + 1, 2] - x[i, 2])
-        T[i] += part * tension_change(line, ei, d, l, il, T[i], v, full, cv, i)
+        T[i] += part * x[i + 1, 0]
         en = (ei[0] + de[0], ei[1] + de[1], ei[2] + de[2])
         if turning:
             along = dot(d, de)
@@ -116,7 +90,7 @@ def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning):
             u[i + 1, 2] += drift[2]
         e[i, 0], e[i, 1], e[i, 2] = en
         if line.spin[i]:
-            dpsi = part * x[i, 3]
+            dpsi = part * x[i, 4]
             dn, _, _ = chord(en)
             a = transport((a1[i, 0], a1[i, 1], a1[i, 2]), d, dn)
             if dpsi != 0.0:
@@ -124,17 +98,28 @@ def update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning):
             a1[i, 0], a1[i, 1], a1[i, 2] = a
             w[i] += cv * dpsi
             wd[i] += ca * dpsi
-    # velocities last: the damped law of tension reads those of the configuration being left
     for i in range(n + 1):
         for k in range(3):
-            dr = part * x[i, k]
+            dr = part * x[i, k + 1]
             u[i, k] += dr
             v[i, k] += cv * dr
             vd[i, k] += ca * dr
 
 
+@inner
+def first_bad(x, e):
+    """The first cell that is not finite: its chord, or else its correction (substitution goes backwards)."""
+    for i in range(e.shape[0]):
+        if not abs(e[i, 0]) + abs(e[i, 1]) + abs(e[i, 2]) < math.inf:
+            return i
+    for i in range(x.shape[0] - 1, -1, -1):
+        if not abs(x[i, 0]) + abs(x[i, 1]) + abs(x[i, 2]) + abs(x[i, 3]) + abs(x[i, 4]) < math.inf:
+            return i
+    return -1
+
+
 @kernel
-def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most, turning, W, X, x, report, rows):
+def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most, turning, gaps, W, X, x, report, rows):
     """Solve the equilibrium at the end of a step.
 
     Starts from the prediction in (u, e, v, vd, T, a1, w, wd) and leaves the answer
@@ -146,16 +131,12 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
     left = math.inf
     where = -1
     for it in range(1, most + 1):
-        bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, W, X, report, rows)
+        bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
-            for i in range(e.shape[0]):  # a NaN that came in makes every pivot fail: say so instead of "singular"
-                if not abs(e[i, 0]) + abs(e[i, 1]) + abs(e[i, 2]) + abs(T[i]) < math.inf:
-                    return NOT_FINITE, it, left, i
             return SINGULAR, it, left, bad
-        substitute(X, x)
-        shift, turn, pull, big, where = measure(line, e, v, T, x, cv)
-        if not (shift < 1e300 and turn < 1e300 and pull < 1e300):
-            return NOT_FINITE, it, left, where
+        if not substitute(X, x):
+            return NOT_FINITE, it, left, first_bad(x, e)
+        shift, turn, where, pull, big = measure(e, T, x)
         part = 1.0
         if shift > reach and not turning:
             part = reach / shift
@@ -191,7 +172,7 @@ def sharpest(line, e):
 
 
 @kernel
-def advance(line, ends, old, new, u, dt, rho, reach, scale, most, W, X, x, report, rows):
+def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
@@ -234,7 +215,7 @@ def advance(line, ends, old, new, u, dt, rho, reach, scale, most, W, X, x, repor
 
     outcome, iterations, left, where = newton(
         line, ends, old.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-        cv, ca, reach, scale, most, False, W, X, x, report, rows,
+        cv, ca, reach, scale, most, False, gaps, W, X, x, report, rows,
     )  # fmt: skip
 
     # a' = (r' - rp)/(be dt^2) with rp = r + dt v + dt^2 (1/2 - be) a; likewise for the spin, through w'

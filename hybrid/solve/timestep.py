@@ -5,27 +5,25 @@ Chung & Hulbert 1993; Arnold & Bruels 2007; docs/theory.md section 2.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from hybrid.errors import Outcome
-from hybrid.model.state import INEXTENSIBLE, Ends, Floats, Line, State
-from hybrid.solve.elimination import workspace
+from hybrid.model.state import Ends, Floats, Line, State
+from hybrid.solve.elimination import march, substitute, workspace
 from hybrid.solve.step import advance, slackest
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
 REACH = 0.1
-# Length of the probing step that finds consistent accelerations, as a part of the step
-# (error of the same order, round-off 1e-16/IGNITION^2).
-IGNITION = 1e-4
+# dvd'/dr' of the solve for consistent accelerations, 1/s2: so large that no stiffness of a real cable
+# (EI/(m h^4) is 1e20 at the very worst) shows beside inertia, and far from overflow.
+HEAVY = 1e36
 # A rod that bends by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED_BEND = 1.0
 # A catenary cell counts as slack when its tension is not above this part of the tension
-# scale: the error of an inextensible cell's tension (its compliance 1e-9, round-off 1e-16).
+# scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
 SLACK_FLOOR = -1e-6
 
 # report of the march -> powers: start, end (reactions and given moments), applied forces and
@@ -53,14 +51,14 @@ class Stepper:
         self.reach, self.scale = REACH * length, tension_scale
         self.floor = SLACK_FLOOR * tension_scale if stop_when_slack else -np.inf
         n = line.h.size
-        self.W, self.X, self.x, self.report, self.rows = workspace(n)
+        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.u = np.zeros((n + 1, 3))
 
     def step(self, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions of the new time."""
         outcome, iterations, left, where = advance(
             self.line, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
-            self.W, self.X, self.x, self.report, self.rows,
+            self.gaps, self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
         if outcome == Outcome.OK:
             slack = slackest(self.line, new.T, self.floor)
@@ -68,47 +66,41 @@ class Stepper:
                 outcome, where = Outcome.SLACK, slack
         return Taken(Outcome(outcome), iterations, left, where, float(self.report[15]))
 
-    def ignite(self, ends_at: Callable[[float], Ends], state: State, t: float, dt: float) -> Taken:
-        """Give `state` accelerations and tensions consistent with its positions, velocities and loads at t.
+    def ignite(self, ends: Ends, acceleration: Floats, state: State) -> Taken:
+        """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
 
-        A probing step of length IGNITION dt with rho = 0 finds them; its displacement is thrown away.
+        One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
+        the correction is the acceleration; an inextensible cell asks for the change of
+        length that keeps it so, d.(a_{c+1} - a_c) = -|n part of v_{c+1} - v_c|^2 / l.
+        acceleration: (2, 3) m/s2 of the held ends.
         """
-        probe = IGNITION * dt
         state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
-        new = state.copy()
-        old = state._replace(v=self._without_stretching(state, ends_at(t)))
-        taken = self.step(ends_at(t + probe), old, new, probe, 0.0)
-        ends_at(t)
-        if taken.outcome in (Outcome.OK, Outcome.SLACK):
-            state.a[:], state.vd[:], state.T[:] = new.vd, new.vd, new.T
-            state.wa[:], state.wd[:] = new.wd, new.wd
-        return taken
-
-    def _without_stretching(self, state: State, ends: Ends) -> Floats:
-        """Velocities (N+1, 3) nearest to those of `state` that stretch no inextensible cell.
-
-        A run keeps lengths, and so rates of length only to the order of the scheme; a probing
-        step would take that small rate for a collision.  Impulses along the chords remove it:
-        (1/m_c + 1/m_{c+1}) p_c - d_c.d_{c-1} p_{c-1}/m_c - d_c.d_{c+1} p_{c+1}/m_{c+1} = -d_c.(v_{c+1} - v_c).
-        """
-        line, v = self.line, state.v
-        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-        rate = np.einsum("ij,ij->i", d, np.diff(v, axis=0))
-        stiff = line.ck * self.scale <= 2.0 * INEXTENSIBLE
-        if not (stiff & (rate != 0.0)).any():
-            return v
-        lightness = 1.0 / line.mass
-        lightness[[0, -1]] *= 1 - ends.held
-        both = stiff[:-1] & stiff[1:]
-        side = -np.einsum("ij,ij->i", d[:-1], d[1:]) * lightness[1:-1] * both
-        middle = np.where(stiff, lightness[:-1] + lightness[1:], 1.0)
-        bands = np.vstack([np.concatenate([[0.0], side]), middle, np.concatenate([side, [0.0]])])
-        p = solve_banded((1, 1), bands, np.where(stiff, -rate, 0.0))
-        push = p[:, None] * d
-        out = v.copy()
-        out[1:] += push * lightness[1:, None]
-        out[:-1] -= push * lightness[:-1, None]
-        return out
+        l = np.linalg.norm(state.e, axis=1)
+        d = state.e / l[:, None]
+        e1 = np.diff(state.v, axis=0)
+        across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
+        gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
+        self.u[:] = 0.0
+        self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
+        held = ends._replace(position=state.r[[0, -1]])
+        bad = march(
+            self.line, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, gaps, self.W, self.X, self.report, self.rows,
+        )  # fmt: skip
+        if bad >= 0 or not substitute(self.X, self.x):
+            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[15]))
+        state.vd[:] = HEAVY * self.x[:, 1:4]
+        state.a[:] = state.vd
+        state.T[:] += self.x[1:, 0]
+        turning = (self.line.spin == 1) & (self.line.polar > 0)  # a spin without inertia has no acceleration
+        state.wd[turning] = HEAVY * self.x[:-1, 4][turning]
+        state.wa[:] = state.wd
+        self.u[:] = 0.0
+        march(  # once more for the forces that go with them
+            self.line, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
+        )  # fmt: skip
+        return Taken(Outcome.OK, 1, 0.0, -1, float(self.report[15]))
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> Floats:
         """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""

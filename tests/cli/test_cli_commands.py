@@ -1,0 +1,278 @@
+"""Every command, every exit code, and what is said on which stream."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import NamedTuple
+
+import pytest
+
+import hybrid
+from hybrid.cli import main
+
+WIRE = """\
+title: a wire that swings
+environment: {gravity: 9.81}
+cable:
+  sections:
+    - {length: 2.0, mass: 1.0, axial_stiffness: 1.0e5, bending_stiffness: 0.01, damping: 1.0}
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: {kind: free, force: {value: [5, 0, 0], until: 0.02}}
+initial: equilibrium
+model: {kind: zones, zones: [{catenary: 1.0, cells: 5}, {rod: 1.0, cells: 5}]}
+time: {duration: 0.05, step: 0.005}
+output: {every: 0.01, points: 5}
+"""
+
+# The moving end catches up with the wave it sends: no flexible cable stays taut.
+PUSHED = """\
+title: a taut wire whose end moves in
+cable:
+  sections:
+    - {length: 10.0, mass: 1.0, axial_stiffness: 1.0e6}
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: {kind: pinned, position: [10.01, 0, 0], motion: {surge: {amplitude: -3.0, period: 1.0}, ramp: 0.5}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 20}
+time: {duration: 2.0, step: 0.005}
+"""
+
+
+class Said(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+    @property
+    def lines(self) -> list[dict]:
+        return [json.loads(line) for line in self.out.splitlines()]
+
+
+Call = Callable[..., Said]
+
+
+@pytest.fixture
+def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> Iterator[Call]:
+    """Run a command in a folder of its own, where wire.yaml and pushed.yaml are."""
+    monkeypatch.chdir(tmp_path)
+    Path("wire.yaml").write_text(WIRE)
+    Path("pushed.yaml").write_text(PUSHED)
+
+    def run(*arguments: str) -> Said:
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as leaving:
+            main(list(arguments))
+        return Said(leaving.value.code or 0, *capsys.readouterr())
+
+    yield run
+
+
+# ---- 0: done --------------------------------------------------------------------------------------
+
+
+def test_run_writes_a_file_named_after_the_scene_and_says_so_in_one_line(call: Call) -> None:
+    said = call("run", "wire.yaml")
+    assert said.code == 0
+    assert said.out.startswith("0.05 s in 10 steps, ") and said.out.endswith("-> wire.h5\n")
+    assert said.out.count("\n") == 1
+    with hybrid.open("wire.h5") as result:
+        assert result.status == "complete"
+        assert result.times[-1] == 0.05
+
+
+def test_run_output_settings_and_plot(call: Call) -> None:
+    said = call("run", "wire.yaml", "-o", "other.h5", "--set", "time.step=0.01", "--set", "output.points=7", "--plot")
+    assert said.code == 0
+    assert "5 steps" in said.out and said.out.endswith("-> other.h5 and other.png\n")
+    assert Path("other.png").read_bytes().startswith(b"\x89PNG")
+    with hybrid.open("other.h5") as result:
+        assert len(result.s) == 7
+
+
+def test_quiet_says_nothing(call: Call) -> None:
+    assert call("run", "wire.yaml", "--quiet") == (0, "", "")
+    assert call("static", "wire.yaml", "-q") == (0, "", "")
+    assert call("plot", "wire.h5", "-q") == (0, "", "")
+
+
+def test_static_prints_a_table_and_writes_a_file(call: Call) -> None:
+    said = call("static", "wire.yaml")
+    assert said.code == 0
+    for words in (
+        "found by",
+        "out of balance",
+        "largest tension",
+        "smallest tension",
+        "force at start",
+        "lowest point",
+    ):
+        assert words in said.out
+    assert said.out.endswith("-> wire.static.h5\n")
+    facts = call("static", "wire.yaml", "--json").lines[-1]
+    # The start holds the weight and the force at the free end.
+    assert facts["force"]["start"] == pytest.approx([-5.0, 0.0, 2.0 * 9.81], abs=1e-6)
+    assert facts["residual"] < 1e-6
+    assert facts["tension_max"]["s"] == 0.0
+    assert facts["lowest"]["s"] == 2.0
+
+
+def test_plot_takes_its_format_from_the_name(call: Call) -> None:
+    call("run", "wire.yaml")
+    said = call("plot", "wire.h5")
+    assert said.code == 0 and said.out.endswith("t = 0 to 0.05 s -> wire.png\n")
+    said = call("plot", "wire.h5", "-o", "wire.svg", "--times", "0,0.02", "--history", "0.5,1")
+    assert said.code == 0 and Path("wire.svg").read_text().startswith("<?xml")
+
+
+def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
+    # 10^12 steps would not end; and the ledger is the same.
+    said = call("plan", "wire.yaml", "--set", "time.duration=1e9", "--set", "time.step=1e-3")
+    assert said.code == 0
+    assert "asked for by" in said.out and "environment.gravity" in said.out
+    assert "10 cells" in said.out and "1000000000000 steps of 0.001 s" in said.out
+    assert sorted(p.name for p in Path().iterdir()) == ["pushed.yaml", "wire.yaml"]
+    (plan,) = call("plan", "wire.yaml", "--json").lines
+    assert plan["event"] == "plan" and plan["steps"] == 10 and plan["cells"] == 10
+    assert [(z["kind"], z["s_a"], z["s_b"], z["cells"]) for z in plan["zones"]] == [
+        ("catenary", 0, 1, 5),
+        ("rod", 1, 2, 5),
+    ]
+    assert {"what", "on", "why"} == set(plan["ledger"][0])
+
+
+def test_plan_of_a_scene_without_time(call: Call) -> None:
+    Path("wire.yaml").write_text(WIRE.replace("time: {duration: 0.05, step: 0.005}\n", ""))
+    said = call("plan", "wire.yaml")
+    assert said.code == 0 and "statics only" in said.out
+
+
+def test_json_lines_of_a_run(call: Call) -> None:
+    said = call("run", "wire.yaml", "--json")
+    assert said.code == 0
+    progress, done = [line for line in said.lines if line["event"] == "progress"], said.lines[-1]
+    last = progress[-1]
+    assert (last["t"], last["duration"], last["step"]) == (0.05, 0.05, 10)
+    assert last["zones"] == [{"kind": "catenary", "s_a": 0.0, "s_b": 1.0}, {"kind": "rod", "s_a": 1.0, "s_b": 2.0}]
+    assert done["event"] == "done" and done["file"] == "wire.h5" and done["status"] == "complete"
+    assert done["steps"] == 10 and done["wall"] > 0
+    assert [line["event"] for line in call("run", "wire.yaml", "--json", "-q").lines] == ["done"]
+
+
+def test_what_happened_is_told_most_important_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    from hybrid.results.read import Event, Result
+
+    events = [Event(0.0, 1, 1, "other", "b"), Event(0.0, 2, 2, "turned in", "a"), Event(1.5, 3, 3, "other", "c")]
+    monkeypatch.setattr(Result, "events", events)
+    said = call("run", "wire.yaml")
+    assert said.err == "note: t = 0 s: a\nnote: t = 0 s: b (1 more like this)\n"
+    notes = [line for line in call("run", "wire.yaml", "--json").lines if line["event"] == "note"]
+    assert [(n["kind"], n["count"]) for n in notes] == [("turned in", 1), ("other", 2)]
+
+
+# ---- 1: refused -----------------------------------------------------------------------------------
+
+
+def test_a_bad_scene_is_refused_with_file_line_and_column(call: Call) -> None:
+    Path("bad.yaml").write_text(WIRE.replace("mass: 1.0", "mass: -1.0").replace("length: 2.0", "lenght: 2.0"))
+    for command in ("run", "static", "plan"):
+        said = call(command, "bad.yaml")
+        assert said.code == 1 and said.out == ""
+        assert "bad.yaml:5:" in said.err and "cable.sections[0].mass" in said.err and "length?" in said.err
+    (error,) = call("run", "bad.yaml", "--json").lines
+    assert error["event"] == "error" and error["kind"] == "scene" and error["file"] == "bad.yaml"
+    mass = next(c for c in error["complaints"] if c["where"].endswith("mass"))
+    column = Path("bad.yaml").read_text().splitlines()[4].index("-1.0") + 1
+    assert (mass["line"], mass["column"]) == (5, column)
+
+
+def test_an_unknown_setting_suggests_the_right_one(call: Call) -> None:
+    said = call("run", "wire.yaml", "--set", "time.stp=0.01")
+    assert said.code == 1 and "time.stp" in said.err and "step" in said.err.split("try:")[1]
+    assert call("run", "wire.yaml", "--set", "nonsense").code == 1
+    assert not Path("wire.h5").exists()
+
+
+def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
+    Path("wire.yaml").write_text(WIRE.replace("time: {duration: 0.05, step: 0.005}\n", ""))
+    said = call("run", "wire.yaml")
+    assert said.code == 1 and said.err.startswith("wire.yaml: time\n")
+    assert call("static", "wire.yaml").code == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (("run", "absent.yaml"), "absent.yaml"),
+        (("plot", "absent.h5"), "there is no file"),
+        (("plot", "wire.yaml"), "cannot be read as a result"),
+        (("run", "wire.yaml", "-o", "no/such/folder.h5"), "there is no folder"),
+        (("run", "wire.yaml", "-o", "wire.yaml"), "is not a result of hybrid"),
+        (("run", "wire.yaml", "--nonsense"), "hybrid run --help"),
+        (("run",), "SCENE.yaml"),
+        (("rum",), "Did you mean 'run'?"),
+        (("plot", "wire.h5", "--times", "0,x"), "no list of numbers"),
+    ],
+)
+def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: str) -> None:
+    said = call(*arguments)
+    assert said.code == 1 and said.out == ""
+    assert words in said.err and "Traceback" not in said.err
+    (error,) = call(*arguments, "--json").lines
+    assert error["event"] == "error" and words in error["message"]
+
+
+def test_plot_refuses_what_it_cannot_draw(call: Call) -> None:
+    call("run", "wire.yaml", "-q")
+    assert "outside the result" in call("plot", "wire.h5", "--times", "9").err
+    said = call("plot", "wire.h5", "-o", "wire.docx")
+    assert said.code == 1 and "docx" in said.err
+
+
+def test_an_older_result_is_replaced_unless_told_otherwise(call: Call) -> None:
+    assert call("run", "wire.yaml", "-q").code == 0
+    before = Path("wire.h5").read_bytes()
+    said = call("run", "wire.yaml", "--no-overwrite")
+    assert said.code == 1 and "exists" in said.err
+    assert Path("wire.h5").read_bytes() == before
+    assert call("run", "wire.yaml", "-q", "--set", "output.points=9").code == 0
+    assert Path("wire.h5").read_bytes() != before
+
+
+# ---- 2: failed ------------------------------------------------------------------------------------
+
+
+def test_a_failed_computation_names_cause_place_and_snapshot(call: Call) -> None:
+    said = call("run", "pushed.yaml")
+    assert said.code == 2 and said.out == ""
+    assert "tension of a catenary zone vanished" in said.err and "at t = " in said.err and "s = " in said.err
+    assert "snapshot: pushed.snapshot.npz" in said.err and Path("pushed.snapshot.npz").is_file()
+    assert "file:     pushed.h5" in said.err
+    with hybrid.open("pushed.h5") as result:
+        assert result.status == "failed"
+    error = call("run", "pushed.yaml", "--json").lines[-1]
+    assert (error["event"], error["kind"], error["outcome"]) == ("error", "computation", "SLACK")
+    assert error["snapshot"] == "pushed.snapshot.npz" and 0 < error["t"] < 2 and 0 <= error["s"] <= 10
+
+
+def test_a_file_that_cannot_be_finished_is_a_failure(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(scene: object, output: Path, **_: object) -> None:
+        output.write_text("half")
+        raise hybrid.ResultError("disk full")
+
+    monkeypatch.setattr(hybrid, "run", run)
+    assert call("run", "wire.yaml").code == 2
+
+
+def test_a_bug_is_called_a_bug(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*_: object, **__: object) -> None:
+        raise ZeroDivisionError("oh")
+
+    monkeypatch.setattr(hybrid, "run", run)
+    said = call("run", "wire.yaml")
+    assert said.code == 2 and said.err.startswith("this is a bug in hybrid") and "ZeroDivisionError: oh" in said.err
+    assert call("run", "wire.yaml", "--json").lines[-1]["kind"] == "bug"

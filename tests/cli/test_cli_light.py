@@ -1,0 +1,84 @@
+"""Start-up is light: a command imports what it needs and nothing else; help and schema need hardly anything."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hybrid
+
+HEAVY = {"numba", "h5py", "matplotlib", "scipy"}
+HANGING = {
+    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+    "initial": "equilibrium",
+    "model": "catenary",
+    "mesh": {"cells": 4},
+    "time": {"duration": 0.1, "step": 0.001},
+}
+CODE = """
+import sys, json
+from hybrid.cli import main
+try:
+    main(sys.argv[1:])
+except SystemExit as leaving:
+    assert not leaving.code
+print(json.dumps(list(sys.modules)), file=sys.stderr)
+"""
+
+
+def call(*arguments: str) -> tuple[str, set[str]]:
+    """What a command that succeeds prints, and the modules it imports."""
+    done = subprocess.run([sys.executable, "-c", CODE, *arguments], capture_output=True, text=True, check=True)
+    *said, modules = done.stderr.splitlines()
+    assert not said
+    return done.stdout, set(json.loads(modules))
+
+
+@pytest.mark.parametrize("arguments", [["--version"], ["--help"], ["run", "--help"], ["schema"]])
+def test_what_needs_no_numbers_imports_no_numbers(arguments: list[str]) -> None:
+    out, modules = call(*arguments)
+    assert out and not modules & HEAVY
+
+
+def test_plan_computes_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("hanging.yaml").write_text(json.dumps(HANGING))  # JSON is YAML
+    out, modules = call("plan", "hanging.yaml")
+    assert "4 cells" in out and not modules & {"h5py", "matplotlib", "hybrid.simulate", "hybrid.solve.elimination"}
+    hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5").close()
+    out, modules = call("plot", "hanging.h5")
+    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulate"}
+
+
+def test_schema_is_valid_json_schema() -> None:
+    schema = json.loads(call("schema")[0])
+    assert schema["$schema"].startswith("https://json-schema.org/")
+    assert {"cable", "ends", "initial", "model"} <= set(schema["required"])
+    assert schema["additionalProperties"] is False
+
+    def check(part: object) -> None:
+        if isinstance(part, dict):
+            if isinstance(part.get("$ref"), str):
+                assert part["$ref"].removeprefix("#/$defs/") in schema["$defs"]
+            if isinstance(part.get("type"), str):
+                assert part["type"] in {"object", "array", "string", "number", "integer", "boolean", "null"}
+            for inside in part.values():
+                check(inside)
+        elif isinstance(part, list):
+            for inside in part:
+                check(inside)
+
+    check(schema)
+
+
+def test_version_and_help() -> None:
+    assert call("--version")[0] == f"hybrid {hybrid.__version__}\n"
+    assert call()[0] == call("-h")[0]
+    for line in ("Compute the motion of a cable", "Exit codes: 0 done"):
+        assert line in call("--help")[0]
+    assert not any(later in call("--help")[0] for later in ("report", "resume", "trade"))

@@ -1,0 +1,138 @@
+"""What the live line says, at every width."""
+
+from __future__ import annotations
+
+import io
+import sys
+from types import SimpleNamespace
+
+import pytest
+from rich.console import Console
+
+from hybrid.live import LiveLine, Voice, live_line, span, speed, zones_in_short
+from hybrid.model.mesh import Zone
+from hybrid.simulate import Progress
+
+TWO = (Zone("catenary", 0.0, 1.5), Zone("rod", 1.5, 2.0))
+SEVEN = tuple(Zone(("catenary", "rod")[k % 2], 10.0 * k, 10.0 * (k + 1)) for k in range(7))
+
+
+def progress(t: float, wall: float, zones: tuple[Zone, ...] = TWO, duration: float = 20.0) -> Progress:
+    return Progress(t, duration, round(100 * t), 3, zones, wall)
+
+
+def screen(width: int = 80) -> tuple[LiveLine, io.StringIO]:
+    stream = io.StringIO()
+    return LiveLine(Console(file=stream, force_terminal=True, width=width, color_system=None, _environ={})), stream
+
+
+def test_zones_in_short() -> None:
+    assert zones_in_short((Zone("rod", 0, 5),), 40) == "rod"
+    assert zones_in_short(TWO, 40) == "catenary 1.5 m | rod 0.5 m"
+    assert zones_in_short(TWO, 18) == "2 zones, 25 % rod"
+    assert zones_in_short(SEVEN, 40) == "7 zones, 43 % rod"
+
+
+@pytest.mark.parametrize(
+    ("seconds", "text"),
+    [
+        (0.0042, "0.0042 s"),
+        (0.52, "0.52 s"),
+        (12.3, "12 s"),
+        (99.6, "1 min 40 s"),
+        (245, "4 min 05 s"),
+        (12000, "3 h 20 min"),
+    ],
+)
+def test_span(seconds: float, text: str) -> None:
+    assert span(seconds) == text
+
+
+def test_speed() -> None:
+    assert [speed(x) for x in (140.4, 40, 3.21, 0.0412)] == ["140", "40", "3.2", "0.041"]
+
+
+@pytest.mark.parametrize("width", range(5, 160, 5))
+def test_the_line_never_wraps(width: int) -> None:
+    line, _ = screen()
+    for k in range(20):
+        line(progress(k, 0.5 * k))
+        assert line.text(progress(k, 0.5 * k, SEVEN), width).cell_len <= width
+
+
+def test_a_wide_screen_shows_everything_and_a_narrow_one_the_essence() -> None:
+    line, _ = screen()
+    line(progress(2.0, 1.0))
+    line(progress(4.0, 1.5))
+    wide = line.text(progress(4.0, 1.5), 119).plain
+    for words in (" 4.00 / 20 s", "step 400", "3 Newton", "catenary 1.5 m | rod 0.5 m", "4 x real time", "0:04 left"):
+        assert words in wide
+    narrow = line.text(progress(4.0, 1.5), 79).plain
+    for words in (" 4.00 / 20 s", "step 400", "3 it", "2 zones, 25 % rod", "4 x", "0:04 left"):
+        assert words in narrow
+    assert "4.00 / 20 s" in line.text(progress(4.0, 1.5), 20).plain
+
+
+def test_the_line_does_not_dance() -> None:
+    line, _ = screen()
+    widths = set()
+    for k in range(1, 199):
+        p = progress(0.1 * k, 0.05 * k)
+        line(p)
+        if k > 1:
+            widths.add((line.text(p, 119).cell_len, line.text(p, 119).plain.index("/ 20 s")))
+    assert len(widths) == 1
+
+
+def test_the_first_report_promises_nothing() -> None:
+    line, _ = screen()
+    line(progress(0.01, 11.0))  # the kernels were compiled in its time
+    assert "... left" in line.text(progress(0.01, 11.0), 119).plain
+
+
+def test_it_draws_on_a_terminal_and_goes_away_at_the_end() -> None:
+    line, stream = screen()
+    line(progress(1.0, 1.0))
+    line(progress(2.0, 2.0))
+    assert "\n" not in stream.getvalue() and stream.getvalue().count("\r") == 2
+    line(progress(20.0, 3.0))
+    assert stream.getvalue().endswith("\r\x1b[2K")
+    size = len(stream.getvalue())
+    line.close()
+    assert len(stream.getvalue()) == size
+
+
+def test_it_says_nothing_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
+    line = live_line()
+    for t in (1.0, 20.0):
+        line(progress(t, t))
+    assert tuple(capsys.readouterr()) == ("", "")
+
+
+def test_compilation_is_announced_before_it_happens(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("hybrid.compiled.is_warm", lambda: False)
+    assert Voice(as_json=False, quiet=False).compiling()
+    assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
+    assert Voice(as_json=True, quiet=False).compiling()
+    assert capsys.readouterr().out == '{"event": "compiling"}\n'
+    monkeypatch.setattr("hybrid.compiled.is_warm", lambda: True)
+    assert not Voice(as_json=False, quiet=False).compiling()
+    assert tuple(capsys.readouterr()) == ("", "")
+
+
+def test_a_notebook_sees_one_display_that_changes(monkeypatch: pytest.MonkeyPatch) -> None:
+    shown: list[str] = []
+
+    def display(bundle: dict[str, str], *, raw: bool, display_id: bool = False) -> SimpleNamespace:
+        assert raw
+        shown.append(bundle["text/plain"])
+        return SimpleNamespace(update=display)
+
+    monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace())
+    monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))
+    line = LiveLine(Console(file=io.StringIO(), force_jupyter=True))
+    for t in (1.0, 2.0, 20.0):
+        line(progress(t, t))
+    assert "1.00 / 20 s" in shown[0] and "2.00 / 20 s" in shown[1] and shown[2:] == [""]

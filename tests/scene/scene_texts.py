@@ -1,0 +1,137 @@
+"""Scenes and helpers that the tests of this room share."""
+
+from __future__ import annotations
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.read import parse_scene
+
+SUSPENSION = """\
+title: Cable suspension with low- and high-tension zones (Goyal & Perkins, Table 1)
+environment:
+  gravity: 9.8                       # m/s^2, along -z
+  fluid: {density: 1.0}              # kg/m^3; leave the table out and there is no fluid
+cable:
+  sections:                          # from s = 0 on; as many as needed
+    - length: 2.0                    # m, unstretched
+      diameter: 1.0e-3               # m
+      mass: 7.853981634e-4           # kg/m, in air
+      bending_stiffness: 2.454369e-4 # N m^2
+      torsional_stiffness: 1.963495e-4
+      drag: {normal: 1.5, tangential: 0.05}
+      damping: 2.0                   # 1/s, mass proportional: only to settle
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end:   {kind: guided, tangent: [0.8660254, 0, -0.5], force: [0.005, 0, 0.00866025]}
+initial: {kind: straight, direction: [1, 0, 0]}   # or: equilibrium
+model: {kind: zones, zones: [{catenary: 1.5}, {rod: 0.5}]}
+time: {duration: 20.0, step: 0.01}
+output: {every: 0.1}
+"""
+
+# examples/05_touchdown.yaml of the sketch, without what version 0.1 does not know.
+OCEAN = """\
+environment:
+  gravity: 9.81
+  fluid: {density: 1025, current: [0.3, 0, 0]}
+cable:
+  sections:
+    - {length: 250, diameter: 0.05, mass: 20, axial_stiffness: 2.0e8, bending_stiffness: 2.0e3,
+       drag: {normal: 1.2, tangential: 0.05}, added_mass: {normal: 1.0}}
+ends:
+  start: {kind: pinned, position: [0, 0, -100]}
+  end:   {kind: pinned, position: [205, 0, 0], motion: {heave: {amplitude: 2.0, period: 8.0}, ramp: 16.0}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+time: {duration: 100.0, step: 0.02}
+"""
+
+# Every key of the schema at least once, over two scenes that are accepted.
+EVERYTHING = """\
+title: every key
+environment: {gravity: 9.81, fluid: {density: 1000.0, current: [0.1, 0.0, 0.0]}}
+cable:
+  sections:
+    - length: 10.0
+      mass: 1.0
+      diameter: 0.02
+      axial_stiffness: 1.0e6
+      bending_stiffness: [1.0, 2.0]
+      torsional_stiffness: 1.5
+      rotary_inertia: [1.0e-4, 2.0e-4]
+      intrinsic_curvature: [0.1, 0.0, 0.0]
+      drag: {normal: 1.2, tangential: 0.01}
+      added_mass: {normal: 1.0, tangential: 0.1}
+      damping: {mass: 0.1, stiffness: 0.01}
+ends:
+  start:
+    kind: clamped
+    position: [0.0, 0.0, 0.0]
+    tangent: [1.0, 0.0, 0.0]
+    normal: [0.0, 1.0, 0.0]
+    swivel: true
+    motion:
+      surge: {amplitude: 0.1, period: 5.0, phase: 10.0}
+      sway: {amplitude: 0.1, period: 5.0}
+      heave: {amplitude: 0.1, period: 5.0}
+      roll: {amplitude: 3.0, period: 5.0}
+      pitch: {amplitude: 3.0, period: 5.0}
+      yaw: {amplitude: 3.0, period: 5.0}
+      ramp: 10.0
+  end:
+    kind: guided
+    tangent: [1.0, 0.0, 0.0]
+    normal: [0.0, 0.0, 1.0]
+    force: {value: [1.0, 0.0, 0.0], until: 3.0}
+    motion: {pitch: {amplitude: 3.0, period: 5.0}, ramp: 10.0}
+initial: {kind: straight, direction: [1.0, 0.0, 0.0], origin: [0.0, 0.0, 0.0], velocity: [0.0, 0.0, 0.0]}
+model:
+  kind: zones
+  slack: warn
+  zones:
+    - {catenary: 4.0, cells: 20, ratio: 0.5}
+    - {rod: 6.0, cells: 30, ratio: 2.0}
+mesh: {cells: 50, ratio: 1.0}
+time: {duration: 20.0, step: 0.01, rho_inf: 0.5}
+output: {every: 0.1, points: 51, history: [0.0, 10.0]}
+solver: elimination
+"""
+
+EVERYTHING_ELSE = """\
+cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, rotary_inertia: 1.0e-4, damping: 0.3}]}
+ends:
+  start: {kind: pinned, position: [0.0, 0.0, 0.0], motion: {heave: {amplitude: 0.0, period: 5.0}}}
+  end: {kind: free, force: [1.0, 0.0, 0.0], moment: {value: [0.0, 1.0, 0.0], until: 2.0}}
+initial: {kind: points, points: [[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -5.0]]}
+model: {kind: catenary, slack: stop}
+mesh: {nodes: [0.0, 4.0, 10.0]}
+output: {points: [0.0, 5.0, 10.0]}
+"""
+
+AT_REST = """\
+cable: {sections: [{length: 10.0, mass: 1.0}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium, guess: straight, direction: [1.0, 0.0, 0.0]}
+model: {kind: catenary}
+"""
+
+
+def complaints(text: str, overrides: tuple[str, ...] = ()) -> list[Complaint]:
+    """What the reader says about a text; none if it is accepted."""
+    try:
+        parse_scene(text, "scene.yaml", overrides)
+    except SceneError as error:
+        assert str(error).startswith("scene.yaml")
+        return error.complaints
+    return []
+
+
+def marked(text: str) -> tuple[str, int, int]:
+    """The text without its mark `§`, and line and column where the mark was."""
+    before = text[: text.index("§")]
+    return text.replace("§", ""), before.count("\n") + 1, len(before) - (before.rfind("\n") + 1) + 1
+
+
+def change(text: str, old: str, new: str) -> str:
+    """The text with `old`, which must be there once, replaced."""
+    assert text.count(old) == 1, f"{old!r} occurs {text.count(old)} times"
+    return text.replace(old, new)

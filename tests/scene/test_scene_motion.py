@@ -1,0 +1,296 @@
+"""Motion of an end: velocity is the derivative of position, frames turn as the angular velocity says, C2 everywhere."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scene_texts import OCEAN, change
+
+from hybrid.errors import SceneError
+from hybrid.scene.motion import EndMotion, check_motions
+from hybrid.scene.read import parse_scene
+from hybrid.scene.schema import Harmonic, Motion, Scene
+
+Array = NDArray[np.float64]
+
+# Any rotation will do as base frame, as long as no axis is special.
+BASE = np.linalg.qr(np.array([[1.0, 2.0, 3.0], [0.5, -1.0, 2.0], [2.0, 0.3, -1.0]]))[0]
+PLACE = np.array([1.0, -2.0, 3.0])
+
+HARMONIC = Motion(
+    surge=Harmonic(amplitude=1.0, period=5.0, phase=20.0),
+    sway=Harmonic(amplitude=-0.5, period=3.0),
+    heave=Harmonic(amplitude=2.0, period=8.0, phase=90.0),
+    roll=Harmonic(amplitude=40.0, period=6.0, phase=-60.0),
+    pitch=Harmonic(amplitude=70.0, period=7.0),
+    yaw=Harmonic(amplitude=200.0, period=9.0, phase=45.0),
+    ramp=10.0,
+)
+
+
+def _swell(t: Array) -> Array:
+    """A smooth motion that starts from rest, (n, 3)."""
+    x = np.clip(t / 16.0, 0.0, 1.0)
+    ramp = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    return np.stack([ramp * a * np.sin(w * t + p) for a, w, p in ((1, 0.8, 0), (2, 0.6, 1), (0.5, 1.0, 2))], axis=1)
+
+
+def _csv(path: Path, times: Array, columns: dict[str, Array], form: str = "%.12g") -> str:
+    names = [n for kind in columns for n in ((f"{kind}x", f"{kind}y", f"{kind}z"))]
+    table = np.column_stack([times, *columns.values()])
+    np.savetxt(path, table, delimiter=",", header=",".join(["t", *names]), comments="", fmt=form)
+    return str(path)
+
+
+@pytest.fixture
+def recorded(tmp_path: Path) -> Motion:
+    t = np.arange(0.0, 40.0, 0.25)
+    return Motion(file=_csv(tmp_path / "swell.csv", t, {"": PLACE + _swell(t), "r": 40.0 * _swell(t)}))
+
+
+def derivative(f: Callable[[float], Array], t: float, h: float = 1e-3) -> Array:
+    """Sixth-order central difference: error h^6 f''' /140 and round-off eps/h, both below 1e-11 here."""
+    w = {1: 45.0, 2: -9.0, 3: 1.0}
+    return np.asarray(sum(c * (f(t + k * h) - f(t - k * h)) for k, c in w.items()) / (60.0 * h))
+
+
+def _check_derivatives(motion: EndMotion, times: list[float], tolerance: float) -> None:
+    for t in times:
+        position, velocity, frame, spin = motion.at(t)
+        np.testing.assert_allclose(velocity, derivative(lambda u: motion.at(u)[0], t), atol=tolerance)
+        assert frame is not None
+        np.testing.assert_allclose(frame.T @ frame, np.eye(3), atol=1e-14)
+        assert np.linalg.det(frame) == pytest.approx(np.linalg.det(BASE))
+        rate = derivative(lambda u: np.asarray(motion.at(u)[2]), t) @ frame.T
+        np.testing.assert_allclose(rate, np.cross(np.eye(3), spin), atol=tolerance)
+        assert position.shape == (3,)
+
+
+def test_harmonic_derivatives() -> None:
+    # ramp, its end and beyond; differences straddle no more than a jump of the third derivative
+    _check_derivatives(EndMotion(HARMONIC, PLACE, BASE), [0.5, 3.3, 7.0, 9.9, 12.0, 33.3], 1e-9)
+
+
+def test_recorded_derivatives(recorded: Motion) -> None:
+    # between samples, where the spline is one cubic and the difference exact
+    _check_derivatives(EndMotion(recorded, PLACE, BASE), [0.1, 1.1, 7.13, 20.6, 39.3], 1e-9)
+
+
+def test_angles_follow_the_convention() -> None:
+    """R = Rz(yaw) Ry(pitch) Rx(roll), angles in degrees, applied to the base frame."""
+    from scipy.spatial.transform import Rotation
+
+    motion = EndMotion(HARMONIC, PLACE, BASE)
+    for t in (2.0, 11.0, 25.0):
+        x = min(t / 10.0, 1.0)
+        ramp = 10 * x**3 - 15 * x**4 + 6 * x**5
+        angles = [
+            ramp * h.amplitude * np.sin(2 * np.pi * t / h.period + np.radians(h.phase))
+            for h in (HARMONIC.yaw, HARMONIC.pitch, HARMONIC.roll)
+            if h is not None
+        ]
+        expected = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix() @ BASE
+        np.testing.assert_allclose(motion.at(t)[2], expected, atol=1e-14)
+
+
+def test_rotation_vectors_follow_the_convention(recorded: Motion) -> None:
+    from scipy.spatial.transform import Rotation
+
+    motion = EndMotion(recorded, PLACE, BASE)
+    for t in (2.0, 11.0, 25.0):  # samples, where the spline is exact; 12 digits are in the file
+        turn = Rotation.from_rotvec(40.0 * _swell(np.array([t]))[0], degrees=True).as_matrix()
+        np.testing.assert_allclose(motion.at(t)[2], turn @ BASE, atol=1e-10)
+        np.testing.assert_allclose(motion.at(t)[0], PLACE + _swell(np.array([t]))[0], atol=1e-11)
+
+
+def test_small_and_large_angles_join() -> None:
+    """The series below 1e-4 rad and the closed form above it agree to round-off."""
+    from hybrid.scene.motion import _turn_by_vector
+
+    axis, rate = np.array([0.6, 0.0, 0.8]), np.array([0.3, -1.0, 0.2])
+    turn_a, spin_a = _turn_by_vector(axis * 0.99999e-4, rate)
+    turn_b, spin_b = _turn_by_vector(axis * 1.00001e-4, rate)
+    # they differ by the step of 2e-9 rad between them, and by nothing else
+    np.testing.assert_allclose(turn_a, turn_b, atol=3e-9)
+    np.testing.assert_allclose(spin_a, spin_b, atol=3e-9)
+    np.testing.assert_allclose(_turn_by_vector(np.zeros(3), rate)[0], np.eye(3), atol=0)
+
+
+@pytest.mark.parametrize("t", [0.0, 10.0])
+def test_c2_across_start_and_end_of_the_ramp(t: float) -> None:
+    """Acceleration is continuous: its one-sided values differ by O(h), and halve with h."""
+    motion = EndMotion(HARMONIC, PLACE, BASE)
+
+    def jump(h: float) -> float:
+        left = (motion.at(t)[1] - motion.at(t - h)[1]) / h
+        right = (motion.at(t + h)[1] - motion.at(t)[1]) / h
+        return float(np.abs(right - left).max())
+
+    assert jump(1e-4) < 1e-2
+    assert jump(1e-4) == pytest.approx(jump(2e-4) / 2, rel=0.05)
+
+
+def test_starts_at_rest_where_it_is_held(recorded: Motion) -> None:
+    for motion in (EndMotion(HARMONIC, PLACE, BASE), EndMotion(recorded, PLACE, BASE)):
+        position, velocity, frame, spin = motion.at(0.0)
+        np.testing.assert_allclose(position, PLACE, atol=1e-14)
+        np.testing.assert_allclose(frame, BASE, atol=1e-14)
+        assert np.abs(velocity).max() < 1e-14 and np.abs(spin).max() < 1e-14
+
+
+def test_what_does_not_move() -> None:
+    zero = Motion(heave=Harmonic(amplitude=0.0, period=3.0))
+    for motion in (EndMotion(None, PLACE, BASE), EndMotion(zero, PLACE, BASE)):
+        assert not motion.moving
+        position, velocity, frame, spin = motion.at(3.0)
+        assert position is motion.at(4.0)[0]  # shared, hence read-only
+        with pytest.raises(ValueError):
+            position[0] = 1.0
+        assert not velocity.any() and not spin.any() and frame is not None
+    guided = EndMotion(Motion(yaw=Harmonic(amplitude=3.0, period=3.0), ramp=1.0), None)
+    assert guided.moving and guided.at(2.0)[2] is None
+
+
+def test_after_the_record_the_end_stays(recorded: Motion) -> None:
+    """Round-off may ask a hair beyond the last row; no cubic may run away there."""
+    motion = EndMotion(recorded, PLACE, BASE)
+    for last, beyond in zip(motion.at(39.75), motion.at(1e9), strict=True):
+        np.testing.assert_array_equal(last, beyond)
+
+
+# --- refusals ----------------------------------------------------------------------------------
+
+HEAVE = "{heave: {amplitude: 2.0, period: 8.0}, ramp: 16.0}"
+
+
+def _scene(motion: str, position: str = "[205, 0, 0]") -> Scene:
+    return parse_scene(change(OCEAN, f"[205, 0, 0], motion: {HEAVE}", f"{position}, motion: {motion}"), "scene.yaml")
+
+
+def _refusal(motion: str, position: str = "[205, 0, 0]") -> str:
+    with pytest.raises(SceneError) as caught:
+        _scene(motion, position)
+    (complaint,) = caught.value.complaints
+    assert complaint.where.startswith("ends.end.motion") and complaint.line == 10
+    return f"{complaint.value} | {complaint.expected} | {complaint.fix}"
+
+
+@pytest.mark.parametrize("phase", [0, 30, 90, 180, -90])
+def test_harmonics_need_a_ramp(phase: int) -> None:
+    text = _refusal(f"{{surge: {{amplitude: 2.0, period: 8.0, phase: {phase}}}}}")
+    assert "ramp: 16" in text
+    assert ("position jumps" if abs(phase) == 90 else "velocity jumps") in text
+    _scene(f"{{surge: {{amplitude: 2.0, period: 8.0, phase: {phase}}}, ramp: 16}}")
+
+
+def _motion_file(tmp_path: Path, text: str) -> str:
+    path = tmp_path / "fairlead.csv"
+    path.write_text(text)
+    return f"{{file: {path}}}"
+
+
+def _rows(values: dict[float, str]) -> str:
+    return "t,x,y,z\n" + "".join(f"{t},{v}\n" for t, v in values.items())
+
+
+STILL = {float(t): "205,0,0" for t in range(0, 110, 10)}
+
+BAD_FILES = {
+    "empty": ("", "empty"),
+    "no header": ("0,205,0,0\n1,205,0,0\n", "t,x,y,z"),
+    "half the columns": ("t,x,y\n0,205,0\n", "t,x,y,z"),
+    "a column too many": ("t,x,y,z,w\n0,205,0,0,1\n", "t,x,y,z"),
+    "short row": (_rows({**STILL, 20.0: "205,0"}), "line 4: 3 entries"),
+    "word": (_rows({**STILL, 20.0: "205,0,up"}), "line 4: up"),
+    "nan": (_rows({**STILL, 20.0: "205,0,nan"}), "line 4: nan"),
+    "infinity": (_rows({**STILL, 20.0: "205,0,inf"}), "line 4: inf"),
+    "gap": (_rows({**STILL, 20.0: "205,0,"}), "line 4: nothing"),
+    "few rows": ("t,x,y,z\n0,205,0,0\n200,205,0,0\n", "2 rows"),
+    "time stands": (_rows(STILL).replace("20.0,", "10.0,"), "line 4: t = 10 after t = 10"),
+    "time runs back": (_rows(STILL).replace("30.0,", "5.0,"), "line 5: t = 5 after t = 20"),
+    "starts late": (_rows({t + 1: v for t, v in STILL.items()}), "starts at t = 1 s"),
+    "ends early": (_rows({t / 2: v for t, v in STILL.items()}), "ends at t = 50 s"),
+    "elsewhere": (_rows(STILL).replace("205", "204"), "[204, 0, 0] m in its first row | [205, 0, 0] m"),
+    "rotation of a pin": ("t,rx,ry,rz\n" + "".join(f"{t},0,0,0\n" for t in STILL), "clamped"),
+}
+
+
+@pytest.mark.parametrize("name", BAD_FILES)
+def test_bad_file(tmp_path: Path, name: str) -> None:
+    text, said = BAD_FILES[name]
+    assert said in _refusal(_motion_file(tmp_path, text))
+
+
+def test_good_files(tmp_path: Path) -> None:
+    _scene(_motion_file(tmp_path, _rows(STILL)))
+    text = "# from the vessel\n" + _rows(STILL).replace("t,x,y,z", " t , x, y,z") + "\n"
+    assert _scene(_motion_file(tmp_path, "\ufeff" + text)).length == 250.0
+    before = {-20.0: "205,0,0", -10.0: "205,0,0", **STILL}
+    _scene(_motion_file(tmp_path, _rows(before)))
+
+
+def test_not_text(tmp_path: Path) -> None:
+    (tmp_path / "x.csv").write_bytes(b"\xff\xfe\x00\x01")
+    assert "cannot be read" in _refusal(f"{{file: {tmp_path / 'x.csv'}}}")
+    assert "cannot be read" in _refusal(f"{{file: {tmp_path}}}")
+
+
+def test_end_motion_refuses_a_bad_file_too(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match=r"motion\.file"):
+        EndMotion(Motion(file=str(tmp_path / "nowhere.csv")), PLACE)
+
+
+def test_guided_and_clamped_files(tmp_path: Path) -> None:
+    guided = "{kind: guided, tangent: [1, 0, 0], motion: MOTION}"
+    clamped = "{kind: clamped, position: [205, 0, 0], tangent: [1, 0, 0], motion: MOTION}"
+    old = f"{{kind: pinned, position: [205, 0, 0], motion: {HEAVE}}}"
+    both = "t,x,y,z,rx,ry,rz\n" + "".join(f"{t},205,0,0,0,0,0\n" for t in STILL)
+    turned = "t,rx,ry,rz\n" + "".join(f"{t},0,0,10\n" for t in STILL)
+    with pytest.raises(SceneError, match="position of a guided end is free"):
+        parse_scene(change(OCEAN, old, guided.replace("MOTION", _motion_file(tmp_path, both))))
+    parse_scene(change(OCEAN, old, clamped.replace("MOTION", _motion_file(tmp_path, both))))
+    with pytest.raises(SceneError, match="subtract the first row"):
+        parse_scene(change(OCEAN, old, clamped.replace("MOTION", _motion_file(tmp_path, turned))))
+
+
+@pytest.mark.parametrize("form", ["%.4f", "%.4g", "%.12g"])
+@pytest.mark.parametrize("kind", ["smooth", "kink", "step", "start"])
+def test_files_with_and_without_jumps(tmp_path: Path, form: str, kind: str) -> None:
+    t = np.arange(0.0, 101.0, 0.5)
+    values = _swell(t)
+    if kind == "kink":
+        values[:, 1] += np.where(t > 60.0, 0.8 * (t - 60.0), 0.0)
+    if kind == "step":
+        values[:, 2] += np.where(t > 60.0, 0.5, 0.0)
+    if kind == "start":
+        values[:, 0] += 0.8 * t
+    path = _csv(tmp_path / "m.csv", t, {"": values}, form)
+    if kind == "smooth":
+        scene = _scene(f"{{file: {path}}}", "[0, 0, 0]")
+        check_motions(scene)
+        assert np.isfinite(EndMotion(Motion(file=path), np.zeros(3)).at(1e9)[0]).all()
+    else:
+        said = _refusal(f"{{file: {path}}}", "[0, 0, 0]")
+        assert "at t = 0, because the cable starts at rest" in said if kind == "start" else "at t = 60" in said
+
+
+def test_check_motions_names_the_end_without_a_file() -> None:
+    scene = _scene(HEAVE)
+    wrong = scene.model_dump()
+    wrong["ends"]["end"]["motion"]["ramp"] = None
+    with pytest.raises(SceneError) as caught:
+        check_motions(Scene.model_validate(wrong))
+    assert caught.value.complaints[0].where == "ends.end.motion"
+    assert caught.value.complaints[0].line is None
+
+
+def test_at_is_cheap() -> None:
+    """A translation costs microseconds, for it is asked for at every Newton step (bound 10 x the usual 1.6 us)."""
+    import timeit
+
+    motion = EndMotion(Motion(heave=Harmonic(amplitude=2.0, period=8.0), ramp=16.0), PLACE)
+    assert min(timeit.repeat(lambda: motion.at(20.0), number=1000, repeat=5)) / 1000 < 16e-6

@@ -1,0 +1,195 @@
+"""Give every key nonsense: the complaint stands at the place of the mistake, and nothing else is ever raised."""
+
+from __future__ import annotations
+
+import copy
+import math
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from ruamel.yaml import YAML
+from ruamel.yaml.nodes import MappingNode, SequenceNode
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, complaints
+
+from hybrid.errors import SceneError
+from hybrid.scene.read import parse_scene, validate_scene
+from hybrid.scene.table import dotted
+
+TEXTS = {"everything": EVERYTHING, "everything else": EVERYTHING_ELSE, "ocean": OCEAN, "at rest": AT_REST}
+
+
+def _values(node: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
+    """Every value of a text with its path, as ruamel.yaml itself sees it."""
+    if path:
+        yield path, node
+    if isinstance(node, MappingNode):
+        for key, value in node.value:
+            yield from _values(value, (*path, key.value))
+    elif isinstance(node, SequenceNode):
+        for i, value in enumerate(node.value):
+            yield from _values(value, (*path, i))
+
+
+@cache
+def _places(text: str) -> list[tuple[tuple[str | int, ...], Any]]:
+    return list(_values(YAML(typ="safe", pure=True).compose(text)))
+
+
+def _put(text: str, node: Any, nonsense: str) -> str:
+    end = node.end_mark.index
+    # A block table or list ends where the next key begins; keep its line break.
+    written = text[node.start_mark.index : end]
+    return text[: node.start_mark.index] + nonsense + written[len(written.rstrip()) :] + text[end:]
+
+
+LEAVES = [
+    (name, path)
+    for name, text in TEXTS.items()
+    for path, node in _places(text)
+    # one entry of a vector speaks for the others
+    if not isinstance(node, MappingNode | SequenceNode) and (isinstance(path[-1], str) or path[-1] == 1)
+]
+TABLES = [(name, path) for name, text in TEXTS.items() for path, node in _places(text) if isinstance(node, MappingNode)]
+LISTS = [(name, path) for name, text in TEXTS.items() for path, node in _places(text) if isinstance(node, SequenceNode)]
+
+REQUIRED = {
+    "length", "mass", "kind", "amplitude", "period", "density", "duration", "step", "rod", "catenary",
+}  # fmt: skip
+WORDS = {"title", "kind", "slack", "guess", "solver"}
+
+
+def _id(case: Any) -> str:
+    return f"{case[0]}: {dotted(case[1])}"
+
+
+def _say(name: str, path: tuple[str | int, ...], nonsense: str) -> list[Any]:
+    """The complaints at the value itself; there must be one, with its key and its text."""
+    text = TEXTS[name]
+    node = dict(_places(text))[path]
+    found = complaints(_put(text, node, nonsense))
+    line, column = node.start_mark.line + 1, node.start_mark.column + 1
+    here = [c for c in found if (c.line, c.column) == (line, column)]
+    assert here, f"{dotted(path)} = {nonsense}: nothing said at {line}:{column}, but {found}"
+    return here
+
+
+def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
+    """A title may be any line, true is a word for swivel, and damping may be an empty table."""
+    harmless = {"title": ("nonsense",), "swivel": (True,), "damping": ({},)}
+    return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
+
+
+@pytest.mark.parametrize("case", LEAVES, ids=_id)
+def test_nonsense_for_a_value_in_a_file(case: tuple[str, tuple[str | int, ...]]) -> None:
+    name, path = case
+    for nonsense in ("nonsense", ".nan") if path != ("title",) else (".nan",):
+        here = _say(name, path, nonsense)
+        # `damping: 2` stands for {mass: 2}, so the complaint may name that key below.
+        assert any(c.where.startswith(dotted(path)) for c in here)
+        assert all(c.expected and c.value == nonsense for c in here)
+
+
+@pytest.mark.parametrize(
+    "nonsense", ["nonsense", float("nan"), -math.inf, True, None, [], {}, 10**400, b"", object()], ids=repr
+)
+def test_nonsense_for_a_value_in_python(nonsense: Any) -> None:
+    for name, path in LEAVES:
+        if _harmless(path, nonsense):
+            continue
+        data = _load(name)
+        table = data
+        for part in path[:-1]:
+            table = table[part]
+        if nonsense is None and isinstance(path[-1], str) and path[-1] not in REQUIRED:
+            continue  # None is how Python says that a key is absent
+        table[path[-1]] = nonsense
+        with pytest.raises(SceneError) as caught:
+            validate_scene(data)
+        assert any(c.where.startswith(dotted(path)) for c in caught.value.complaints), (name, path)
+
+
+def _load(name: str) -> Any:
+    return copy.deepcopy(_loaded(name))
+
+
+@cache
+def _loaded(name: str) -> Any:
+    return YAML(typ="safe", pure=True).load(TEXTS[name])
+
+
+SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
+SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel"}
+
+
+@pytest.mark.parametrize("case", LEAVES, ids=_id)
+def test_a_negative_number(case: tuple[str, tuple[str | int, ...]]) -> None:
+    name, path = case
+    keys = [part for part in path if isinstance(part, str)]
+    if keys[-1] in SIGNED or keys[:2] == ["initial", "points"]:
+        found = complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
+        assert all(c.line is not None for c in found)
+    elif keys == ["mesh", "nodes"]:
+        assert complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
+    else:
+        (complaint,) = [c for c in _say(name, path, "-7.25") if c.where.startswith(dotted(path))]
+        assert complaint.value == "-7.25" and (">" in complaint.expected or "whole" in complaint.expected)
+
+
+@pytest.mark.parametrize("case", TABLES, ids=_id)
+def test_nonsense_for_a_table(case: tuple[str, tuple[str | int, ...]]) -> None:
+    for nonsense in ("nonsense", "[3]"):
+        _say(*case, nonsense)
+
+
+@pytest.mark.parametrize("case", LISTS, ids=_id)
+def test_nonsense_for_a_list(case: tuple[str, tuple[str | int, ...]]) -> None:
+    for nonsense in ("nonsense", "{}"):
+        _say(*case, nonsense)
+
+
+def test_an_unknown_key_in_every_table() -> None:
+    for name, path in [*TABLES, *((n, ()) for n in TEXTS)]:
+        data = _load(name)
+        table = data
+        for part in path:
+            table = table[part]
+        table["nonsence"] = 1
+        with pytest.raises(SceneError) as caught:
+            validate_scene(data)
+        assert dotted((*path, "nonsence")) in [c.where for c in caught.value.complaints]
+
+
+# --- chance ------------------------------------------------------------------------------------
+
+SNIPPETS = [
+    "nonsense", ".nan", "-1", "0", "1e400", "true", "null", "[]", "{}", "[1, 2, 3]", "{kind: free}", "'", '"', "*a",
+    "&a", "- ", ": ", "\t", "\n", "rod", "catenary", "zones", "1e-320", "1e308", "!!float x", "!!python/object:os",
+    "~", "9" * 400, "é", "{file: '.'}", "<<: 3", "? ", "| ", "%", "#",
+]  # fmt: skip
+
+
+@settings(derandomize=True, max_examples=200, deadline=None)
+@given(data=st.data())
+def test_mutations_raise_nothing_but_scene_errors(data: st.DataObject) -> None:
+    text = data.draw(st.sampled_from([SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST]))
+    places = _places(text)
+    for path, node in sorted(
+        data.draw(st.lists(st.sampled_from(places), max_size=3, unique_by=lambda p: p[0])),
+        key=lambda p: -p[1].start_mark.index,
+    ):
+        del path
+        if node.end_mark.index <= len(text):
+            text = _put(text, node, data.draw(st.sampled_from(SNIPPETS)))
+    for _ in range(data.draw(st.sampled_from([0, 0, 1, 2]))):  # most texts stay YAML, so that the schema is reached
+        i = data.draw(st.integers(0, len(text)))
+        j = data.draw(st.integers(0, 8))
+        text = text[:i] + data.draw(st.sampled_from(["", *SNIPPETS])) + text[i + j :]
+    try:
+        parse_scene(text, "scene.yaml")
+    except SceneError as error:
+        assert error.complaints
+        assert all(c.line is not None and c.column is not None and c.expected for c in error.complaints)

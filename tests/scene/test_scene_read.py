@@ -1,0 +1,293 @@
+"""Reading: the examples load, a scene survives its own text, YAML mistakes and overrides are located."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from pydantic import ValidationError
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, complaints, marked
+
+from hybrid.errors import SceneError
+from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
+from hybrid.scene.schema import (
+    Cable,
+    CatenaryModel,
+    CatenaryZone,
+    Damping,
+    Ends,
+    Equilibrium,
+    Fluid,
+    Free,
+    Guided,
+    Pinned,
+    RodModel,
+    RodZone,
+    Scene,
+    Section,
+    Straight,
+    ZonesModel,
+    missing_time,
+)
+
+ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST]
+
+
+def test_suspension_of_the_sketch() -> None:
+    scene = parse_scene(SUSPENSION)
+    section = scene.cable.sections[0]
+    assert (scene.length, section.mass, section.damping) == (2.0, 7.853981634e-4, Damping(mass=2.0))
+    assert isinstance(scene.ends.start, Pinned) and isinstance(scene.ends.end, Guided)
+    assert scene.ends.end.force == (0.005, 0.0, 0.00866025)
+    assert isinstance(scene.model, ZonesModel)
+    assert scene.model.zones == (CatenaryZone(catenary=1.5), RodZone(rod=0.5))
+    assert scene.output.every == 0.1 and scene.output.points == 101
+
+
+def test_ocean_of_the_sketch() -> None:
+    scene = parse_scene(OCEAN)
+    assert scene.environment.fluid == Fluid(density=1025.0, current=(0.3, 0.0, 0.0))
+    assert isinstance(scene.model, CatenaryModel)
+    assert isinstance(scene.ends.end, Pinned) and scene.ends.end.motion is not None
+    assert list(scene.ends.end.motion.harmonics()) == ["heave"]
+    assert scene.require_time().duration == 100.0
+
+
+@pytest.mark.parametrize("text", ALL)
+def test_round_trip(text: str) -> None:
+    scene = parse_scene(text)
+    again = scene_text(scene)
+    assert parse_scene(again) == scene
+    assert scene_text(parse_scene(again)) == again
+    assert validate_scene(scene.model_dump()) == scene
+
+
+@settings(derandomize=True, max_examples=60, deadline=None)
+@given(
+    title=st.text().map(lambda text: "".join(c for c in text if c.isprintable()).strip()),
+    mass=st.floats(1e-300, 1e300),
+    position=st.tuples(*[st.floats(-1e6, 1e6)] * 3),
+)
+def test_round_trip_is_exact(title: str, mass: float, position: tuple[float, float, float]) -> None:
+    scene = validate_scene(
+        {
+            "title": title,
+            "cable": {"sections": [{"length": 10, "mass": mass}]},
+            "ends": {"start": {"kind": "pinned", "position": position}, "end": "free"},
+            "initial": "equilibrium",
+            "model": "catenary",
+        }
+    )
+    assert parse_scene(scene_text(scene)) == scene
+
+
+def test_python_and_yaml_make_the_same_scene() -> None:
+    built = Scene(
+        cable=Cable(sections=(Section(length=10.0, mass=1.0),)),
+        ends=Ends(start=Pinned(position=(0.0, 0.0, 0.0)), end=Free()),
+        initial=Equilibrium(guess="straight", direction=(1.0, 0.0, 0.0)),
+        model=CatenaryModel(),
+    )
+    assert parse_scene(AT_REST) == built
+    assert validate_scene(built) == built
+    assert validate_scene({name: getattr(built, name) for name in Scene.model_fields}) == built
+
+
+def test_numpy_values_are_welcome() -> None:
+    straight = Straight(direction=np.array([1, 0, 0]), origin=np.zeros(3))
+    assert straight.direction == (1.0, 0.0, 0.0)
+    assert Section(length=np.float32(2.0), mass=np.int64(3), bending_stiffness=np.array([1.0, 1.0])).mass == 3.0
+
+
+def test_scene_is_frozen() -> None:
+    with pytest.raises(ValidationError):
+        parse_scene(AT_REST).cable.sections[0].mass = 3.0  # type: ignore[misc]
+
+
+def test_shorthands() -> None:
+    text = SUSPENSION.replace("model: {kind: zones, zones: [{catenary: 1.5}, {rod: 0.5}]}", "model: rod")
+    assert parse_scene(text).model == RodModel()
+    scene = parse_scene(AT_REST.replace("{kind: free}", "free").replace("{kind: catenary}", "catenary"))
+    assert scene.ends.end == Free() and scene.model == CatenaryModel()
+    text = SUSPENSION.replace("damping: 2.0 ", "damping: {mass: 2}")
+    assert text != SUSPENSION and parse_scene(text) == parse_scene(SUSPENSION)
+
+
+@pytest.mark.parametrize("number", ["1e-3", "1.0e-3", "1E-3", ".001", "0.001", "+1.0e-03"])
+def test_numbers_as_people_write_them(number: str) -> None:
+    assert parse_scene(AT_REST.replace("mass: 1.0", f"mass: {number}")).cable.sections[0].mass == 1e-3
+
+
+@pytest.mark.parametrize("word", ["on", "no", "yes", "off"])
+def test_words_of_yaml_1_1_are_words(word: str) -> None:
+    assert parse_scene(f"title: {word}\n" + AT_REST).title == word
+    (complaint,) = complaints(EVERYTHING.replace("swivel: true", f"swivel: {word}"))
+    assert complaint.where == "ends.start.swivel" and complaint.expected == "true or false"
+
+
+def test_title_is_one_line() -> None:
+    assert parse_scene("title: >\n  two\n  lines\n" + AT_REST).title == "two lines"
+    (complaint,) = complaints("title: |\n  two\n  lines\n" + AT_REST)
+    assert complaint.where == "title" and "line breaks" in complaint.fix
+
+
+def test_anchors_and_merge() -> None:
+    text = AT_REST.replace("[{length: 10.0, mass: 1.0}]", "[&a {length: 5.0, mass: 1.0}, {<<: *a, length: 3.0}, *a]")
+    assert [s.length for s in parse_scene(text).cable.sections] == [5.0, 3.0, 5.0]
+
+
+def test_json_schema_describes_every_field() -> None:
+    schema = Scene.model_json_schema()
+    tables = [schema, *schema["$defs"].values()]
+    lacking = [
+        (t.get("title"), k) for t in tables for k, f in t.get("properties", {}).items() if "description" not in f
+    ]
+    assert len(tables) > 25 and lacking == []
+
+
+# --- text that is not a scene ------------------------------------------------------------------
+
+NOT_YAML = {
+    "tab": ("cable:\n§\tsections: 1\n", "tabs"),
+    "bracket": ("cable: [1, 2\n§", "bracket"),
+    "colon": ("title: a§: b\n", "quotes"),
+    "alias": ("cable: §*nowhere\n", "anchor"),
+    "nothing": ("§", "cable"),
+    "comment only": ("§# nothing here\n", "cable"),
+    "list": ("§- 1\n", "cable"),
+    "word": ("§cable\n", "cable"),
+    "two texts": ("cable: 1\n§---\ncable: 2\n", ""),
+    "control character": ("§cable: \x01\n", ""),
+}
+
+
+@pytest.mark.parametrize("name", NOT_YAML)
+def test_not_yaml(name: str) -> None:
+    text, fix = NOT_YAML[name]
+    text, line, column = marked(text)
+    complaint = complaints(text)[0]
+    assert (complaint.line, complaint.column) == (line, column)
+    assert fix in complaint.fix
+
+
+def test_keys_twice_and_strange_keys_are_all_reported() -> None:
+    text, line, column = marked(AT_REST.replace("model:", "ends: 3\n§model: rod\n? [1]\n: 2\nmodel:"))
+    found = complaints(text)
+    assert [c.value for c in found if "twice" in c.value] == ["ends twice", "model twice"]
+    assert "line 2" in next(c.fix for c in found if c.where == "ends")
+    assert any(c.value == "a list or table as key" and c.line == line + 1 for c in found)
+    assert column == 1
+
+
+def test_endless_alias() -> None:
+    found = complaints("cable: &a [*a]\n")
+    assert any(c.where == "cable[0]" and "alias" in c.value for c in found)
+
+
+def test_deep_nesting_is_refused() -> None:
+    assert complaints("cable: " + "[" * 1000 + "]" * 1000)
+
+
+def test_files(tmp_path) -> None:
+    path = tmp_path / "scene.yaml"
+    with pytest.raises(SceneError, match="exists"):
+        load_scene(path)
+    with pytest.raises(SceneError, match="readable"):
+        load_scene(tmp_path)
+    path.write_bytes(b"\xff\xfe\x00")
+    with pytest.raises(SceneError, match="readable"):
+        load_scene(path)
+    path.write_text(AT_REST)
+    assert load_scene(path).length == 10.0
+    assert load_scene(str(path), ["cable.sections[0].length=7"]).length == 7.0
+    with pytest.raises(SceneError, match=r"scene.yaml:1:41: cable.sections\[0\].mass"):
+        path.write_text(AT_REST.replace("mass: 1.0", "mass: -1.0"))
+        load_scene(path)
+
+
+def test_motion_file_is_next_to_the_scene(tmp_path) -> None:
+    rows = "".join(f"{t},0,0,0\n" for t in range(10))
+    (tmp_path / "still.csv").write_text("t,x,y,z\n" + rows)
+    text = AT_REST.replace("[0.0, 0.0, 0.0]}", "[0.0, 0.0, 0.0], motion: {file: still.csv}}")
+    (tmp_path / "scene.yaml").write_text(text)
+    scene = load_scene(tmp_path / "scene.yaml")
+    assert isinstance(scene.ends.start, Pinned) and scene.ends.start.motion is not None
+    assert scene.ends.start.motion.file == str(tmp_path / "still.csv")
+    assert parse_scene(scene_text(scene)) == scene
+
+
+@pytest.mark.parametrize("data", [None, 3, "cable", [1], {}, {1: 2}, {"cable": object()}])
+def test_python_nonsense(data: object) -> None:
+    with pytest.raises(SceneError) as caught:
+        validate_scene(data)
+    assert all(c.line is None for c in caught.value.complaints)
+
+
+def test_time_is_asked_for_only_where_needed() -> None:
+    scene = parse_scene(AT_REST)
+    assert "duration" in missing_time(scene).fix
+    with pytest.raises(SceneError, match="duration"):
+        scene.require_time()
+
+
+# --- overrides ---------------------------------------------------------------------------------
+
+
+def test_overrides() -> None:
+    scene = parse_scene(
+        SUSPENSION,
+        overrides=[
+            "time.step=0.005",
+            "cable.sections[0].mass=2",
+            "ends.start.position=[0, 0, 1]",
+            "mesh.cells=40",
+            "cable.sections[0].damping.stiffness=1e-3",
+            "model=rod",
+            "ends.end.force={value: [0, 0, 1], until: 2}",
+            "title= a: b ".replace(": ", "-"),
+        ],
+    )
+    assert scene.require_time().step == 0.005
+    assert scene.cable.sections[0].mass == 2.0
+    assert scene.cable.sections[0].damping == Damping(mass=2.0, stiffness=1e-3)
+    assert scene.mesh is not None and scene.mesh.cells == 40
+    assert scene.model == RodModel() and scene.title == "a-b"
+
+
+def test_override_below_a_word() -> None:
+    text = AT_REST.replace("{kind: catenary}", "catenary")
+    assert parse_scene(text, overrides=["model.slack=warn"]).model == CatenaryModel(slack="warn")
+
+
+OVERRIDES = {
+    "time.stp=1": ("time.stp", "did you mean step?"),
+    "tme.step=1": ("tme.step", "did you mean time?"),
+    "cable.sections[3].mass=1": ("cable.sections[3].mass", ""),
+    "cable.mass=1": ("cable.mass", "sections"),
+    "cable.sections.mass=1": ("cable.sections.mass", ""),
+    "title.x=1": ("title.x", ""),
+    "time.step.x=1": ("time.step.x", ""),
+    "time.step": ("override", ""),
+    "=3": ("override", ""),
+    "": ("override", ""),
+    "time..step=3": ("override", ""),
+    "time.step=[1": ("time.step", "bracket"),
+    "time.step={a: 1, a: 2}": ("time.step", "keep one"),
+    "time.step=-1": ("time.step", "sign"),
+    "time.step=": ("time.step", "value"),
+    "model.kind=rood": ("model.kind", "did you mean rod?"),
+    "ends.end.force=3": ("ends.end.force", ""),
+}
+
+
+@pytest.mark.parametrize("override", OVERRIDES)
+def test_override_refused(override: str) -> None:
+    where, fix = OVERRIDES[override]
+    (complaint,) = complaints(SUSPENSION, (override,))
+    assert complaint.where == where and fix in complaint.fix
+    assert complaint.line is None
+
+
+def test_all_overrides_are_judged() -> None:
+    assert len(complaints(SUSPENSION, ("tme.step=1", "time.step=-1", "nothing"))) == 3

@@ -1,0 +1,223 @@
+"""Every refusal at the exact line, column and key, with a fix that helps.
+
+A case is: the scene, a part of it, what stands there instead with `§` where the complaint must
+point, the key it must name, and words that the fix (or what was expected) must contain.
+"""
+
+# ruff: noqa: E501 (the tables of cases read across)
+
+from __future__ import annotations
+
+import re
+
+import pytest
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, change, complaints, marked
+
+PINNED = "{kind: pinned, position: [0, 0, 0]}"
+GUIDED = "{kind: guided, tangent: [0.8660254, 0, -0.5], force: [0.005, 0, 0.00866025]}"
+ZONES = "[{catenary: 1.5}, {rod: 0.5}]"
+MODEL = "{kind: zones, zones: [{catenary: 1.5}, {rod: 0.5}]}"
+STRAIGHT = "{kind: straight, direction: [1, 0, 0]}"
+POINTS = "[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -5.0]]"
+HEAVE = "{heave: {amplitude: 2.0, period: 8.0}, ramp: 16.0}"
+MASS = "mass: 7.853981634e-4"
+BENDING = "bending_stiffness: 2.454369e-4"
+
+CASES = {
+    # --- keys
+    "unknown key": (SUSPENSION, "gravity", "§gravty", "environment.gravty", "did you mean gravity?"),
+    "unknown key of a scene": (SUSPENSION, "title:", "§tilte:", "tilte", "did you mean title?"),
+    "unknown key of a section": (SUSPENSION, MASS, f"{MASS}\n      §mas: 1", "cable.sections[0].mas", "did you mean mass?"),
+    "unknown key, nothing near": (SUSPENSION, "{every", "{§xyzzy: 3, every", "output.xyzzy", "every, points, history"),
+    "missing key": (SUSPENSION, f"- length: 2.0                    # m, unstretched\n      diameter: 1.0e-3               # m\n      {MASS}", "- §length: 2.0\n      diameter: 1.0e-3", "cable.sections[0].mass", "add `mass: ...` (kg/m)"),
+    "missing table": (SUSPENSION, f"§initial: {STRAIGHT}".replace("§", ""), "", "initial", "add `initial: {kind: straight"),
+    "empty value": (SUSPENSION, "gravity: 9.8", "§gravity:", "environment.gravity", "leave the key out"),
+    # --- values
+    "negative": (SUSPENSION, MASS, "mass: §-1", "cable.sections[0].mass", "check the sign"),
+    "with unit": (SUSPENSION, MASS, "mass: §2 kg/m", "cable.sections[0].mass", "write the number alone, 2; the unit is kg/m"),
+    "quoted": (SUSPENSION, MASS, 'mass: §"2"', "cable.sections[0].mass", "write 2 without quotes"),
+    "comma": (SUSPENSION, "gravity: 9.8", "gravity: §9,8", "environment.gravity", "9.8"),
+    "nan": (SUSPENSION, MASS, "mass: §.nan", "cable.sections[0].mass", "finite"),
+    "infinity": (SUSPENSION, "duration: 20.0", "duration: §.inf", "time.duration", "finite"),
+    "overflow": (SUSPENSION, "duration: 20.0", "duration: §1e400", "time.duration", "finite"),
+    "truth for number": (SUSPENSION, MASS, "mass: §true", "cable.sections[0].mass", ""),
+    "list for number": (SUSPENSION, MASS, "mass: §[1, 2]", "cable.sections[0].mass", ""),
+    "pair of three": (SUSPENSION, BENDING, "bending_stiffness: §[1, 2, 3]", "cable.sections[0].bending_stiffness", "there are 3"),
+    "inside a pair": (SUSPENSION, BENDING, "bending_stiffness: [1, §-2]", "cable.sections[0].bending_stiffness[1]", "sign"),
+    "two coordinates": (SUSPENSION, PINNED, "{kind: pinned, position: §[0, 0]}", "ends.start.position", "there are 2"),
+    "inside a vector": (SUSPENSION, PINNED, "{kind: pinned, position: [0, §x, 0]}", "ends.start.position[1]", ""),
+    "vector without brackets": (SUSPENSION, PINNED, "{kind: pinned, position: §0 0 0}", "ends.start.position", "brackets"),
+    "number for table": (SUSPENSION, "{density: 1.0}", "§1025", "environment.fluid", "density"),
+    "table for list": (SUSPENSION, ZONES, "§{rod: 2.0}", "model.zones", "dash"),
+    "number for title": ("title: §2024\n" + AT_REST, None, None, "title", "quotes"),
+    "word not in the list": (EVERYTHING, "slack: warn", "slack: §wran", "model.slack", "did you mean warn?"),
+    "solver": (EVERYTHING, "solver: elimination", "solver: §shoting", "solver", "did you mean shooting?"),
+    "fraction of a cell": (EVERYTHING, "cells: 20", "cells: §20.5", "model.zones[0].cells", "round"),
+    "no cell": (EVERYTHING, "cells: 20", "cells: §0", "model.zones[0].cells", ">= 1"),
+    "one cell": (EVERYTHING, "cells: 50", "cells: §1", "mesh.cells", ">= 2"),
+    "one output point": (EVERYTHING, "points: 51", "points: §1", "output.points", ">= 2"),
+    "rho_inf": (EVERYTHING, "rho_inf: 0.5", "rho_inf: §1.5", "time.rho_inf", "<= 1"),
+    "empty list": (SUSPENSION, ZONES, "§[]", "model.zones", ""),
+    # --- kinds
+    "no kind": (SUSPENSION, PINNED, "§{position: [0, 0, 0]}", "ends.start.kind", "pinned"),
+    "kind misspelt": (SUSPENSION, PINNED, "{kind: §pined, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned?"),
+    "kind is a list": (SUSPENSION, PINNED, "{kind: §[pinned], position: [0, 0, 0]}", "ends.start.kind", "pinned"),
+    "adaptive": (SUSPENSION, MODEL, "{kind: §adaptive, tolerance: 1}", "model.kind", "not available in this version (0.1); use rod, catenary or zones"),
+    "adaptive, a word": (SUSPENSION, MODEL, "§adaptive", "model.kind", "not available in this version (0.1)"),
+    "end is a number": (SUSPENSION, PINNED, "§3", "ends.start", "kind: pinned"),
+    "zone of no kind": (SUSPENSION, ZONES, "[{catenary: 1.5}, §{rood: 0.5}]", "model.zones[1]", "{rod: length}"),
+    "zone of both kinds": (SUSPENSION, ZONES, "[§{catenary: 1.5, rod: 0.5}]", "model.zones[0]", "{rod: length}"),
+    "zone is a number": (SUSPENSION, ZONES, "[§1.5, {rod: 0.5}]", "model.zones[0]", "{rod: length}"),
+    "inside a zone": (SUSPENSION, ZONES, "[{catenary: 1.5}, {rod: §-0.5}]", "model.zones[1].rod", "sign"),
+    # --- conditions that another kind of end takes
+    "pinned force": (SUSPENSION, PINNED, "{kind: pinned, position: [0, 0, 0], §force: [1, 0, 0]}", "ends.start.force", "a pinned end takes no force; use kind: free or guided"),
+    "pinned tangent": (SUSPENSION, PINNED, "{kind: pinned, position: [0, 0, 0], §tangent: [1, 0, 0]}", "ends.start.tangent", "kind: clamped holds a tangent"),
+    "guided without tangent": (SUSPENSION, GUIDED, "§{kind: guided}", "ends.end.tangent", "direction of increasing s"),
+    "guided position": (SUSPENSION, GUIDED, "{kind: guided, tangent: [1, 0, 0], §position: [1, 0, 0]}", "ends.end.position", "kind: clamped"),
+    "free position": (SUSPENSION, GUIDED, "{kind: free, §position: [1, 0, 0]}", "ends.end.position", "kind: pinned"),
+    "free motion": (SUSPENSION, GUIDED, "{kind: free, §motion: {ramp: 3}}", "ends.end.motion", "pinned or clamped"),
+    "zones of a rod": (SUSPENSION, "kind: zones, zones", "kind: rod, §zones", "model.zones", "use kind: zones"),
+    # --- directions
+    "zero tangent": (SUSPENSION, GUIDED, "{kind: guided, tangent: §[0, 0, 0]}", "ends.end.tangent", "not all zero"),
+    "zero direction": (SUSPENSION, STRAIGHT, "{kind: straight, direction: §[0, 0, 0]}", "initial.direction", "not all zero"),
+    "parallel normal": (SUSPENSION, GUIDED, "{kind: guided, tangent: [1, 0, 2], normal: §[-2, 0, -4]}", "ends.end.normal", "not along the tangent"),
+    "parallel normal of a clamp": (EVERYTHING, "normal: [0.0, 1.0, 0.0]", "normal: §[2.0, 0.0, 0.0]", "ends.start.normal", "not along the tangent"),
+    # --- motion
+    "guided surge": (EVERYTHING, "motion: {pitch: {amplitude: 3.0", "motion: {surge: §{amplitude: 3.0", "ends.end.motion.surge", "clamped"),
+    "pinned roll": (OCEAN, "heave", "roll", "ends.end.motion.roll", "clamped"),
+    "motion twice": (OCEAN, "ramp: 16.0", "file: x.csv", "ends.end.motion.heave", "leave file out"),
+    "ramp with file": (OCEAN, HEAVE, "{file: x.csv, ramp: §3}", "ends.end.motion.ramp", "leave ramp out"),
+    "no motion": (OCEAN, HEAVE, "§{}", "ends.end.motion", "leave motion out"),
+    "no ramp": (OCEAN, HEAVE, "§{heave: {amplitude: 2.0, period: 8.0}}", "ends.end.motion", "give `ramp: 16`"),
+    "no ramp, phase 90": (OCEAN, HEAVE, "§{heave: {amplitude: 2.0, period: 8.0, phase: 90}}", "ends.end.motion", "give `ramp: 16`"),
+    "no such file": (OCEAN, HEAVE, "{file: §nowhere.csv}", "ends.end.motion.file", "folder of the scene file"),
+    # --- cable
+    "drag without fluid": (SUSPENSION, "  fluid: {density: 1.0}", "  #", "cable.sections[0].drag", "give environment.fluid"),
+    "added mass without fluid": (OCEAN, "  fluid: {density: 1025, current: [0.3, 0, 0]}\n", "", "cable.sections[0].added_mass", "give environment.fluid"),
+    "fluid without diameter": (SUSPENSION, "- length: 2.0                    # m, unstretched\n      diameter: 1.0e-3", "- §length: 2.0", "cable.sections[0].diameter", "add `diameter: ...` (m)"),
+    "anisotropic without torsion": (EVERYTHING_ELSE, "[{length: 10.0, mass: 1.0, bending_stiffness: 2.0", "[§{length: 10.0, mass: 1.0, bending_stiffness: [2.0, 1.0]", "cable.sections[0].torsional_stiffness", "torsional_stiffness"),
+    "curved without torsion": (EVERYTHING_ELSE, "[{length: 10.0,", "[§{length: 10.0, intrinsic_curvature: [0, 1, 0],", "cable.sections[0].torsional_stiffness", "torsional_stiffness"),
+    "rod that cannot bend": (AT_REST.replace("catenary", "rod"), "[{length", "[§{length", "cable.sections[0].bending_stiffness", "catenary"),
+    "rod zone that cannot bend": (SUSPENSION, BENDING, "bending_stiffness: §0", "cable.sections[0].bending_stiffness", "add `bending_stiffness: ...` (N m^2)"),
+    "rod zone that bends one way": (SUSPENSION, BENDING, "bending_stiffness: §[0, 1]", "cable.sections[0].bending_stiffness", "catenary"),
+    "rod zone that twists freely": (SUSPENSION, "torsional_stiffness: 1.963495e-4", "torsional_stiffness: §0", "cable.sections[0].torsional_stiffness", "leave it out"),
+    # --- lengths
+    "zones too short": (SUSPENSION, ZONES, "§[{catenary: 1.4}, {rod: 0.5}]", "model.zones", "last zone"),
+    "cable too short": (change(OCEAN, "axial_stiffness: 2.0e8, ", ""), "[205, 0, 0]", "§[205, 0, 100]", "ends.end.position", "closer ends, or give axial_stiffness"),
+    "stretched too far": (OCEAN, "[205, 0, 0]", "§[405, 0, 0]", "ends.end.position", "longer cable"),
+    "nodes from elsewhere": (EVERYTHING_ELSE, "nodes: [0.0,", "nodes: [§0.5,", "mesh.nodes[0]", ""),
+    "nodes to elsewhere": (EVERYTHING_ELSE, "nodes: [0.0, 4.0, 10.0]", "nodes: [0.0, 4.0, §9.0]", "mesh.nodes[2]", ""),
+    "nodes not increasing": (EVERYTHING_ELSE, "nodes: [0.0, 4.0", "nodes: §[0.0, 0.0", "mesh.nodes", ""),
+    "nodes and cells": (EVERYTHING_ELSE, "mesh: {", "mesh: {cells: §3, ", "mesh.cells", "nodes"),
+    "output off the cable": (EVERYTHING_ELSE, "points: [0.0, 5.0, 10.0]", "points: [0.0, 5.0, §11.0]", "output.points[2]", "10 m"),
+    "output not increasing": (EVERYTHING_ELSE, "points: [0.0, 5.0, 10.0]", "points: §[0.0, 5.0, 5.0]", "output.points", "sort"),
+    "history off the cable": (EVERYTHING, "history: [0.0, 10.0]", "history: [0.0, §10.1]", "output.history[1]", "10 m"),
+    "step too long": (SUSPENSION, "step: 0.01", "step: §30", "time.step", "smaller step"),
+    # --- start
+    "equilibrium of a loose cable": (AT_REST, "{kind: pinned, position: [0.0, 0.0, 0.0]}", "{kind: free}", "initial.kind", "pinned or clamped"),
+    "straight from nowhere": (SUSPENSION, PINNED, "{kind: free}", "initial.origin", "add `origin: [x, y, z]` (m)"),
+    "straight from elsewhere": (SUSPENSION, STRAIGHT, "{kind: straight, direction: [1, 0, 0], origin: §[1, 0, 0]}", "initial.origin", "leave origin out"),
+    "straight to elsewhere": (OCEAN, "initial: {kind: equilibrium}", "initial: {kind: straight, direction: §[1, 0, 0]}", "initial.direction", "kind: equilibrium"),
+    "straight with a jump": (SUSPENSION, STRAIGHT, "{kind: straight, direction: [1, 0, 0], velocity: §[1, 0, 0]}", "initial.velocity", "leave velocity out"),
+    "polyline too long": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -6.0]]", "initial.points", "11 m"),
+    "polyline elsewhere": (EVERYTHING_ELSE, POINTS, "[§[1.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -6.0]]", "initial.points[0]", "held ends"),
+    "polyline that stops": (EVERYTHING_ELSE, POINTS, "[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], §[10.0, 0.0, 0.0]]", "initial.points[2]", "leave it out"),
+    "polyline of a point": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0]]", "initial.points", "at least 2"),
+    "no time at all": (EVERYTHING, "until: 3.0", "until: §0", "ends.end.force.until", "> 0"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_refusal(name: str) -> None:
+    text, old, new, where, fix = CASES[name]
+    if old is not None:
+        text = change(text, old, new)
+    point = None
+    if "§" in text:
+        text, *point = marked(text)
+    found = complaints(text)
+    assert [c.where for c in found] == [where] or where in [c.where for c in found], found
+    complaint = next(c for c in found if c.where == where)
+    assert len([c for c in found if c == complaint]) == 1
+    if point is not None:
+        assert [complaint.line, complaint.column] == point
+    assert complaint.line is not None
+    assert fix in complaint.fix or fix in complaint.expected, complaint
+    assert not re.search(r"Input should|\b(tuple|dict|float|str|int|NoneType)\b(?!\))|<\w", complaint.expected), (
+        complaint
+    )
+
+
+SEVERAL = {"drag without fluid", "added mass without fluid", "motion twice", "zone of no kind", "polyline elsewhere"}
+
+
+@pytest.mark.parametrize("name", sorted(set(CASES) - SEVERAL))
+def test_one_mistake_one_complaint(name: str) -> None:
+    text, old, new, where, _ = CASES[name]
+    text = change(text, old, new) if old is not None else text
+    found = [c.where for c in complaints(text.replace("§", ""))]
+    assert found == [where]
+
+
+def test_a_complaint_reads_well() -> None:
+    text = change(SUSPENSION, MASS, "mass: 2 kg/m")
+    (complaint,) = complaints(text)
+    assert complaint.text("a.yaml") == (
+        "a.yaml:9:13: cable.sections[0].mass\n"
+        "    given:    2 kg/m\n"
+        "    expected: a number > 0, in kg/m\n"
+        "    try:      write the number alone, 2; the unit is kg/m"
+    )
+
+
+def test_numbers_are_given() -> None:
+    (zones,) = complaints(change(SUSPENSION, ZONES, "[{catenary: 1.4}, {rod: 0.5}]"))
+    assert "1.9 m" in zones.value and "2 m" in zones.expected and "0.1 m too short" in zones.expected
+    (span,) = complaints(change(change(OCEAN, "axial_stiffness: 2.0e8, ", ""), "[205, 0, 0]", "[300, 0, -100]"))
+    assert "300 m from the start" in span.value and "250 m" in span.expected
+    (rod,) = complaints(change(SUSPENSION, BENDING, "bending_stiffness: 0"))
+    assert "model.zones[1]" in rod.expected and "cable.sections[0]" in rod.expected
+
+
+def test_everything_wrong_is_said_at_once_and_in_order() -> None:
+    text = SUSPENSION
+    text = change(text, MASS, "mass: -1")
+    text = change(text, PINNED, "{kind: pinned, position: [0, 0], force: [1, 0, 0]}")
+    text = change(text, "gravity: 9.8", "gravty: 9.8")
+    text = change(text, "step: 0.01", "step: 30")
+    text = change(text, "{every: 0.1}", "{every: 0.1, history: [-1]}")
+    found = complaints(text)
+    assert [c.where for c in found] == [
+        "environment.gravty",
+        "cable.sections[0].mass",
+        "ends.start.position",
+        "ends.start.force",
+        "time.step",
+        "output.history[0]",
+    ]
+
+
+def test_contradictions_show_although_another_table_cannot_be_read() -> None:
+    text = change(change(SUSPENSION, ZONES, "[{catenary: 1.4}, {rod: 0.5}]"), "step: 0.01", "step: x")
+    text = change(text, PINNED, "{kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1, period: 3}}}")
+    assert [c.where for c in complaints(text)] == ["ends.start.motion", "model.zones", "time.step"]
+
+
+ACCEPTED = {
+    "straight, end held": (SUSPENSION, f"start: {PINNED}\n  end:   {GUIDED}", f"start: free\n  end: {PINNED}"),
+    "straight, origin repeated": (SUSPENSION, STRAIGHT, "{kind: straight, direction: [3, 0, 0], origin: [0, 0, 1.0e-9]}"),
+    "straight, nothing held": (SUSPENSION, f"{PINNED}\n  end:   {GUIDED}\ninitial: {STRAIGHT}", "free\n  end: free\ninitial: {kind: straight, direction: [1, 0, 0], origin: [1, 2, 3], velocity: [1, 0, 0]}"),
+    "straight, both held, fits": (OCEAN, "[205, 0, 0], motion: {heave: {amplitude: 2.0, period: 8.0}, ramp: 16.0}}\ninitial: {kind: equilibrium}", "[250, 0, -100]}\ninitial: {kind: straight, direction: [1, 0, 0]}"),
+    "extensible, stretched": (OCEAN, "[205, 0, 0]", "[300, 0, 0]"),
+    "equal stiffnesses need no torsion": (EVERYTHING_ELSE, "bending_stiffness: 2.0", "bending_stiffness: [2.0, 2.0]"),
+    "torsion absent in a rod": (SUSPENSION, "      torsional_stiffness: 1.963495e-4\n", ""),
+    "polyline, extensible": (EVERYTHING_ELSE, "mass: 1.0,", "mass: 1.0, axial_stiffness: 1.0e9,"),
+    "catenary cannot twist": (EVERYTHING_ELSE, "mass: 1.0,", "mass: 1.0, torsional_stiffness: 0,"),
+    "no gravity": (SUSPENSION, "gravity: 9.8", "gravity: 0"),
+    "zones within round-off": (SUSPENSION, ZONES, "[{catenary: 1.5000000001}, {rod: 0.5}]"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ACCEPTED)
+def test_accepted(name: str) -> None:
+    assert complaints(change(*ACCEPTED[name])) == []
