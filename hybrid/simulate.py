@@ -87,7 +87,7 @@ def run(
 
         return run_shooting(scene, output, overwrite)
     model = build(scene)
-    equilibrium = _equilibrium(scene, model) if scene.initial.kind == "equilibrium" else None
+    equilibrium = _equilibrium(model, 0.0) if scene.initial.kind == "equilibrium" else None
     outputs = output_times(scene)
     stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
     observer = Observer(model.line, model.zones, output_points(scene.output.points, model.length), True)
@@ -134,13 +134,16 @@ class _Motion:
         self.slackest = SLACK_FLOOR * model.tension_scale  # N; slacker cells are noted where the scene asks to go on
         if equilibrium is None:
             self.state = model.start.copy()
-            self._turn_ends_in()
+            self._bring_ends_in()
             self._ignite()
         else:
             self.state = equilibrium.state.copy()
             self.stepper.report[:] = equilibrium.report
         self.spare = self.state.copy()
         self.power = self._powers()
+        if scene.time.rho_inf == 1.0 and not model.line.ck.all():
+            text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
+            recorder.event(0.0, 0.0, model.length, "undamped", text)
 
     def advance(self, until: float) -> None:
         """To the time `until`: in one step if all is well, else in halves of halves."""
@@ -208,18 +211,19 @@ class _Motion:
             self.recorder.event(self.t, s, float(self.model.line.s[cell + 1]), "slack", text)
             self.slackest = min(10.0 * tension, 10.0 * self.slackest)
 
-    def _turn_ends_in(self) -> None:
+    def _bring_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""
         assert self.scene.time is not None
         model, e = self.model, self.state.e
         d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
         which = [bool(model.line.element[0]), bool(model.line.element[-1])]
         duration = min(model.time_scale, 0.5 * self.scene.time.duration)
-        for k, angle in model.ends.turn_in(d, which, duration):
+        for k, angle in model.ends.bring_in(d, which, duration):
             s = float(model.line.s[-k])
             text = (
                 f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
-                f"it is turned in over the first {duration:.3g} s; start from an equilibrium to avoid this"
+                f"it is turned in, and a force there grows, over the first {duration:.3g} s; "
+                f"start from an equilibrium to avoid this"
             )
             self.recorder.event(0.0, s, s, "turned in", text)
 
@@ -300,18 +304,18 @@ class _Told:
 
 
 def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
-    """Find the equilibrium of a scene at t = 0; the result has one output.  Errors as of `run`."""
+    """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.  Errors as of `run`."""
     check_motions(scene)
     if scene.solver == "shooting":
         from hybrid.arbitrate import static_shooting
 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
-    found = _equilibrium(scene, model)
+    found = _equilibrium(model, np.inf)
     observer = Observer(model.line, model.zones, output_points(scene.output.points, model.length), False)
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
-        ends = model.ends.at(0.0)
+        ends = model.ends.at(np.inf)
         angle, node = sharpest(model.line, found.state.e)
         if angle > UNRESOLVED_BEND:
             note_bend(recorder, model, 0.0, angle, node)
@@ -333,8 +337,9 @@ def note_bend(recorder: Recorder, model: Model, t: float, angle: float, node: in
 # --- parts of the above ---------------------------------------------------------------
 
 
-def _equilibrium(scene: Scene, model: Model) -> Equilibrium:
-    return solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale, model.slack)
+def _equilibrium(model: Model, t: float) -> Equilibrium:
+    """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
+    return solve_statics(model.line, model.ends.at(t), model.start, model.length, model.tension_scale, model.slack)
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

@@ -10,6 +10,7 @@ import pytest
 
 import hybrid
 
+SAME = np.eye(3)
 STATIC, MOVING = 2e-9, 2e-7  # of the length, and of the largest tension
 LENGTH = 2.0
 
@@ -23,11 +24,14 @@ SECTIONS = [
 MODELS = {
     "rod": {"kind": "rod"},
     "catenary": {"kind": "catenary"},
-    "hybrid": {"kind": "zones", "zones": [{"rod": 0.6, "cells": 12}, {"catenary": 0.8, "cells": 16}, {"rod": 0.6, "cells": 12}]},
+    "hybrid": {
+        "kind": "zones",
+        "zones": [{"rod": 0.6, "cells": 12}, {"catenary": 0.8, "cells": 16}, {"rod": 0.6, "cells": 12}],
+    },
 }
 
 
-def scene(case, rotate=np.eye(3), sections=SECTIONS, **changes):
+def scene(case, rotate=SAME, sections=SECTIONS, **changes):
     """A line in a current, pulled and pushed in three dimensions, without gravity, so that it may be turned anywhere."""
 
     def turned(x):
@@ -50,7 +54,7 @@ def scene(case, rotate=np.eye(3), sections=SECTIONS, **changes):
     return hybrid.validate_scene(data | changes)
 
 
-def released(model, rotate=np.eye(3), sections=SECTIONS):
+def released(model, rotate=SAME, sections=SECTIONS):
     """The same line let go from a straight shape."""
     direction = tuple(float(c) for c in rotate @ np.array([0.2, 0.1, -1.0]))
     return scene(model, rotate, sections, initial={"kind": "straight", "direction": direction})
@@ -71,7 +75,7 @@ AXES = {
 }
 
 
-def compare(a, b, tolerance, rotate=np.eye(3), flip=False):
+def compare(a, b, tolerance, rotate=SAME, flip=False):
     """Two results are the same, b being a turned by `rotate` (and read from the other end with `flip`)."""
     size = np.abs(a.tension).max()
     along = slice(None, None, -1) if flip else slice(None)
@@ -110,10 +114,18 @@ def hanging(model, swapped=False, motion=True):
     first = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.1, -0.4]}
     last = {"kind": "pinned", "position": [1.2, 0.3, 0.2]}
     if motion:
-        last["motion"] = {"heave": {"amplitude": 0.1, "period": 2.5}, "sway": {"amplitude": 0.05, "period": 3.1}, "ramp": 2.0}
+        last["motion"] = {
+            "heave": {"amplitude": 0.1, "period": 2.5},
+            "sway": {"amplitude": 0.05, "period": 3.1},
+            "ramp": 2.0,
+        }
     sections = [{k: v for k, v in s.items() if k != "intrinsic_curvature"} for s in SECTIONS]
     sections[0]["bending_stiffness"] = 0.05
-    zones = {"rod": [("rod", 2.0, 40)], "catenary": [("catenary", 2.0, 40)], "hybrid": [("rod", 0.5, 10), ("catenary", 1.5, 30)]}[model]
+    zones = {
+        "rod": [("rod", 2.0, 40)],
+        "catenary": [("catenary", 2.0, 40)],
+        "hybrid": [("rod", 0.5, 10), ("catenary", 1.5, 30)],
+    }[model]
     if swapped:
         first["tangent"] = [-x for x in first["tangent"]]
         first, last = last, first
@@ -141,7 +153,12 @@ def test_swapped_ends(model):
         ([{"catenary": 2.0, "cells": 40}], [{"catenary": 0.7, "cells": 14}, {"catenary": 1.3, "cells": 26}]),
         (
             [{"rod": 0.6, "cells": 12}, {"catenary": 1.4, "cells": 28}],
-            [{"rod": 0.3, "cells": 6}, {"rod": 0.3, "cells": 6}, {"catenary": 0.4, "cells": 8}, {"catenary": 1.0, "cells": 20}],
+            [
+                {"rod": 0.3, "cells": 6},
+                {"rod": 0.3, "cells": 6},
+                {"catenary": 0.4, "cells": 8},
+                {"catenary": 1.0, "cells": 20},
+            ],
         ),
     ],
 )
@@ -154,7 +171,11 @@ def test_a_zone_split_in_two_of_the_same_kind(whole, split):
 
 @pytest.mark.parametrize("model", MODELS)
 def test_a_section_split_in_two_alike(model):
-    halves = [dict(SECTIONS[0], length=0.3), dict(SECTIONS[0], length=0.5), *[dict(SECTIONS[1], length=x) for x in (0.33, 0.87)]]
+    halves = [
+        dict(SECTIONS[0], length=0.3),
+        dict(SECTIONS[0], length=0.5),
+        *[dict(SECTIONS[1], length=x) for x in (0.33, 0.87)],
+    ]
     compare(hybrid.run(released(model)), hybrid.run(released(model, sections=halves)), MOVING)
 
 

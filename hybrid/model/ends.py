@@ -44,19 +44,22 @@ class Moves(Protocol):
 
 
 class EndLoad(NamedTuple):
-    """A force (N) or moment (N m) on end 0 or 1 that acts until a time."""
+    """A force (N) or moment (N m) on end 0 or 1 that acts until a time (s).
+
+    ramp: time (s) over which it grows from nothing; None: at once, unless the end is `brought_in`.
+    """
 
     what: Literal["force", "moment"]
     end: int
     value: Floats
     until: float
+    ramp: float | None
 
 
 class EndConditions:
     """Evaluates both ends into the arrays of `Ends`.
 
-    `moving` is False when nothing but loads that stop depends on time.  `breaks` lists the
-    times at which a load stops (a step must end there).
+    `breaks` lists the times at which a load stops (a step must end there).
     """
 
     def __init__(
@@ -65,36 +68,45 @@ class EndConditions:
         zero = np.zeros((2, 3))
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
-        self.moving = bool(motions)
         self.breaks = sorted({x.until for x in loads if np.isfinite(x.until)})
         self._loads, self._motions = tuple(loads), motions
-        self._turns: dict[int, tuple[Floats, float]] = {}
-        self._turn_time = np.inf
+        self._given = (frame.copy(), np.zeros((2, 3)))  # frames and their spins without motion
+        self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
+        self._bring_in = 1.0  # s
         self.set_loads(0.0)
-        self.at(0.0)
+        self.at(np.inf)
 
     def set_loads(self, t: float) -> None:
-        """Forces and moments that act just after t."""
-        self.values.force[:] = 0.0
-        self.values.moment[:] = 0.0
-        for load in self._loads:
-            if t < load.until:
-                getattr(self.values, load.what)[load.end] += load.value
+        """Choose the loads that act just after t."""
+        self._acting = [x for x in self._loads if t < x.until]
+        self._growing_until = max((x.ramp or 0.0 for x in self._acting), default=0.0)
+        self._grown = False
 
     def at(self, t: float) -> Ends:
-        """Positions and frames at t; the arrays returned are overwritten by the next call."""
+        """Positions, frames and loads at t; the arrays returned are overwritten by the next call.
+
+        t = infinity asks for what is given when everything has grown and turned in (motions stand at 0).
+        """
         for k, motion in self._motions.items():
-            position, velocity, frame, spin = motion.at(t)
+            position, velocity, frame, spin = motion.at(t if np.isfinite(t) else 0.0)
             self.values.position[k] = position
             self.velocity[k] = velocity
             if frame is not None:
                 self.values.frame[k] = frame.ravel()
                 self.values.spin[k] = spin
-        if t < self._turn_time:
-            self._turn_in(t)
-        elif self._turns:  # done: leave the frames as they are given
-            self._end_turn()
+        if self._turns:
+            self._turn(t)
+        if t < self._growing_until or not self._grown:
+            self._grow(t)
         return self.values
+
+    def _grow(self, t: float) -> None:
+        self._grown = t >= self._growing_until
+        self.values.force[:] = 0.0
+        self.values.moment[:] = 0.0
+        for load in self._acting:
+            part, _ = _rise(t, load.ramp) if load.ramp else (1.0, 0.0)
+            getattr(self.values, load.what)[load.end] += part * load.value
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""
@@ -107,14 +119,15 @@ class EndConditions:
         self.at(t)
         return np.asarray(out)
 
-    def turn_in(self, chords: tuple[Floats, Floats], which: Sequence[bool], duration: float) -> list[tuple[int, float]]:
-        """Let tangents start as the cable lies and reach their given directions after `duration` s, at ends `which`.
+    def bring_in(
+        self, chords: tuple[Floats, Floats], which: Sequence[bool], duration: float
+    ) -> list[tuple[int, float]]:
+        """Let tangents start as the cable lies, and reach their given directions after `duration` s, at ends `which`.
 
         chords: directions (3,) of the first and last cell at t = 0.  A tangent imposed at once on a cable
-        that does not have it is a blow whose strength depends on the mesh alone.  Returns (end,
-        angle in rad) of those that turn.
+        that does not have it is a blow whose strength depends on the mesh alone; a force on such an end
+        grows with it.  Returns (end, angle in rad) of those concerned.
         """
-        turned = []
         for k in range(2):
             tangent = self.values.frame[k].reshape(3, 3)[:, 2]
             axis = np.cross(chords[k], tangent)
@@ -124,29 +137,29 @@ class EndConditions:
                 if sine < 1e-9:  # opposite: any axis across will do
                     axis, sine = first_director(tangent), 1.0
                 self._turns[k] = (axis / sine, angle)
-                turned.append((k, angle))
-        if turned:
-            self._turn_time, self.moving = duration, True
-            self._given = (self.values.frame.copy(), self.values.spin.copy())
-            self.at(0.0)
-        return turned
+        self._bring_in = duration
+        self._loads = tuple(
+            x._replace(ramp=duration) if x.end in self._turns and x.ramp is None else x for x in self._loads
+        )
+        self.set_loads(0.0)
+        self.at(0.0)
+        return [(k, angle) for k, (_, angle) in self._turns.items()]
 
-    def _turn_in(self, t: float) -> None:
-        x = max(t, 0.0) / self._turn_time
-        left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-        rate = 30.0 * x * x * (1.0 - x) ** 2 / self._turn_time
+    def _turn(self, t: float) -> None:
+        part, rate = _rise(t, self._bring_in)
         for k, (axis, angle) in self._turns.items():
             if k not in self._motions:
                 self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
-            back = _rotation(axis, -angle * left)
-            self.values.frame[k] = (back @ self.values.frame[k].reshape(3, 3)).ravel()
-            self.values.spin[k] = back @ self.values.spin[k] + axis * angle * rate
+            if part < 1.0:
+                back = _rotation(axis, -angle * (1.0 - part))
+                self.values.frame[k] = (back @ self.values.frame[k].reshape(3, 3)).ravel()
+                self.values.spin[k] = back @ self.values.spin[k] + axis * angle * rate
 
-    def _end_turn(self) -> None:
-        for k in self._turns:
-            if k not in self._motions:
-                self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
-        self._turns = {}
+
+def _rise(t: float, duration: float) -> tuple[float, float]:
+    """A rise from 0 to 1 with continuous first and second derivative, and its rate (1/s)."""
+    x = min(max(t / duration, 0.0), 1.0)
+    return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2 / duration
 
 
 def _rotation(axis: Floats, angle: float) -> Floats:

@@ -31,6 +31,11 @@ USUAL_ITERATIONS = 2.5
 OUTPUTS = 100  # of a run whose scene does not say how often
 
 
+def parts(length: float, step: float) -> int:
+    """How many equal parts, none longer than `step` but for round-off, make up `length`."""
+    return max(1, ceil(length / step * (1.0 - 1e-12) - 1e-9))
+
+
 def output_interval(scene: Scene) -> float:
     """Time between two outputs, s; a scene that does not say how often gets OUTPUTS, or one a step."""
     time = scene.require_time()
@@ -40,21 +45,21 @@ def output_interval(scene: Scene) -> float:
 def output_times(scene: Scene) -> list[float]:
     """Times (s) of the outputs after the first."""
     time, every = scene.require_time(), output_interval(scene)
-    return [k * every for k in range(1, ceil(time.duration / every - 1e-9))] + [time.duration]
+    return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
 def step_ends(start: float, stop: float, step: float) -> list[float]:
     """End times of equal steps, none longer than `step`, from `start` to `stop`."""
-    n = max(1, ceil((stop - start) / step - 1e-9))
+    n = parts(stop - start, step)
     return [start + (stop - start) * k / n for k in range(1, n)] + [stop]
 
 
 def count_steps(scene: Scene) -> int:
-    """Steps of a run: each interval between two outputs is cut into equal ones."""
+    """Steps of a run: each interval between two outputs is cut into equal ones (a load that stops may add one)."""
     time, every = scene.require_time(), output_interval(scene)
-    whole = ceil(time.duration / every - 1e-9) - 1
+    whole = parts(time.duration, every) - 1
     last = time.duration - whole * every
-    return whole * max(1, ceil(every / time.step - 1e-9)) + max(1, ceil(last / time.step - 1e-9))
+    return whole * parts(every, time.step) + parts(last, time.step)
 
 
 def plan(scene: Scene) -> Plan:
@@ -62,6 +67,6 @@ def plan(scene: Scene) -> Plan:
     model = build(scene)
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
-    steps = count_steps(scene) + len(model.ends.breaks) if scene.time else 0
+    steps = count_steps(scene) if scene.time else 0
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     return Plan(model.ledger, model.zones, cells, model.unknowns, steps, steps * (USUAL_ITERATIONS * each + COST_STEP))

@@ -86,7 +86,8 @@ def _end_conditions(scene: Scene, directors: tuple[Floats, Floats], chords: tupl
             if load is not None:
                 until = getattr(load, "until", None)
                 value = np.array(getattr(load, "value", load), float)
-                loads.append(EndLoad(what, k, value, np.inf if until is None else until))
+                ramp = getattr(load, "ramp", None)
+                loads.append(EndLoad(what, k, value, np.inf if until is None else until, ramp))
         motion = getattr(end, "motion", None)
         if motion is not None:
             motions[k] = EndMotion(motion, getattr(end, "position", None), base)

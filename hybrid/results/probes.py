@@ -122,7 +122,7 @@ class View:
     def _observed(self) -> tuple[Floats, Floats, Floats]:
         n, st = self.line.h.size, self.state
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
-        observe(self.line, self.ends, st.e, st.v, st.T, st.a1, st.w, M, strain, energy)
+        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
         return M, strain, energy
 
     @property

@@ -14,6 +14,7 @@ from hybrid.scene.table import (
     Direction,
     Finding,
     Kinds,
+    NonNegative,
     Number,
     Positive,
     Table,
@@ -84,6 +85,10 @@ class Load(Table):
 
     value: Vector = Field(description="the force or the moment, inertial frame [N or N m]")
     until: Positive | None = Field(default=None, description="time at which it is let go; absent: never [s]")
+    ramp: NonNegative | None = Field(
+        default=None,
+        description="time over which it grows from nothing; absent: at once, or with a tangent that is turned in [s]",
+    )
 
 
 Loading = Annotated[

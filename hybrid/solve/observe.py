@@ -7,11 +7,11 @@ from hybrid.physics.cell import chord, turning
 from hybrid.physics.element import bending, damped_bending, relative_rotation
 from hybrid.physics.loads import ROTARY, STIFFNESS_DAMPING
 from hybrid.physics.rotations import add, cross, dot, frame, log_rotation, scale, sub
-from hybrid.solve.elimination import get3, get9
+from hybrid.solve.march import get3, get9
 
 
 @kernel
-def observe(line, ends, e, v, T, a1, w, M, strain, energy):
+def observe(line, ends, e, v, a1, w, M, strain, energy):
     """Moments M (N+1, 3) N m inertial and log strains (N+1, 3) rad in the frame of the cell before; energies (5,) J.
 
     energy: kinetic (structure, with rotary inertia), bending, torsion, stretch, gravity is left to the caller.
@@ -29,8 +29,10 @@ def observe(line, ends, e, v, T, a1, w, M, strain, energy):
         strain[i, 0], strain[i, 1], strain[i, 2] = 0.0, 0.0, 0.0
         if right:
             ei = get3(e, i)
-            d, _, il = chord(ei)
-            energy[3] += 0.5 * line.h[i] * line.ck[i] * T[i] * T[i]
+            d, l, il = chord(ei)
+            if line.ck[i] > 0.0:  # from the stretch, because a damped cell's tension is more than elastic
+                longer = l - line.h[i]
+                energy[3] += 0.5 * longer * longer / (line.h[i] * line.ck[i])
             if line.bits & ROTARY and line.spin[i]:
                 d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
                 energy[0] += 0.5 * line.rotary[i] * dot(d1, d1) + 0.5 * line.polar[i] * w[i] * w[i]

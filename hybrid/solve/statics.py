@@ -11,7 +11,8 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
 from hybrid.physics.loads import MASS_DAMPING
-from hybrid.solve.elimination import SIZE, WIDTH, march, workspace
+from hybrid.solve.blocks import SIZE, WIDTH
+from hybrid.solve.march import march, workspace
 from hybrid.solve.step import newton, slackest
 from hybrid.solve.timestep import SLACK_FLOOR, Stepper
 

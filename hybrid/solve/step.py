@@ -1,6 +1,6 @@
 """Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
 
-Each iteration is one march along s and one substitution back (solve.elimination),
+Each iteration is one march along s and one substitution back (solve.march),
 then an update of positions, tensions, frames and rates.  The whole step is one
 compiled call.
 """
@@ -12,7 +12,8 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.rotations import cross, dot, spin_about, transport
-from hybrid.solve.elimination import march, substitute
+from hybrid.solve.blocks import substitute
+from hybrid.solve.march import march
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
@@ -26,7 +27,7 @@ ROUND_OFF = 1e-6
 # Changes of tension count against the largest tension of the line, or against this part of
 # the tension scale of the scene where that is larger (a line can be free of tension).
 LOW_TENSION = 1e-3
-# A step in which a chord turns by more than a radian has missed the motion: it is repeated in parts.
+# A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts.
 LARGEST_STEP_TURN = 1.0
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
@@ -171,11 +172,25 @@ def sharpest(line, e):
     return angle, where
 
 
+@inner
+def widest_turn(e, u):
+    """Largest change of a chord e by the displacements u, as a part of its length (an angle in rad), and its cell."""
+    widest, where = 0.0, -1
+    for i in range(e.shape[0]):
+        x, y, z = u[i + 1, 0] - u[i, 0], u[i + 1, 1] - u[i, 1], u[i + 1, 2] - u[i, 2]
+        part = (x * x + y * y + z * z) / (e[i, 0] * e[i, 0] + e[i, 1] * e[i, 1] + e[i, 2] * e[i, 2])
+        if not part <= widest:
+            widest, where = part, i
+    return math.sqrt(widest), where
+
+
 @kernel
 def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
+    A step whose prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused:
+    it has missed the motion, and Newton may end on a branch that has nothing to do with it.
     """
     am = (2.0 * rho - 1.0) / (rho + 1.0)
     af = rho / (rho + 1.0)
@@ -191,6 +206,9 @@ def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x,
             u[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * ai
             new.v[i, k] = old.v[i, k] + dt * ai
             new.vd[i, k] = (am * ai - af * old.vd[i, k]) / (1.0 - af) + ca * be * dt * dt * ai
+    turn, where = widest_turn(old.e, u)
+    if not turn < LARGEST_STEP_TURN:
+        return TURNED_TOO_FAR, 0, turn, where
     for i in range(n):
         ei = (old.e[i, 0], old.e[i, 1], old.e[i, 2])
         en = (
@@ -230,12 +248,9 @@ def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x,
         else:
             new.wa[i] = 0.0
     if outcome == OK:
-        least = math.cos(LARGEST_STEP_TURN)
-        for i in range(n):
-            d, _, _ = chord((new.e[i, 0], new.e[i, 1], new.e[i, 2]))
-            b, _, _ = chord((old.e[i, 0], old.e[i, 1], old.e[i, 2]))
-            if not dot(d, b) > least:
-                outcome, where = TURNED_TOO_FAR, i
+        turn, cell = widest_turn(old.e, u)
+        if not turn < LARGEST_STEP_TURN:
+            outcome, where = TURNED_TOO_FAR, cell
     return outcome, iterations, left, where
 
 

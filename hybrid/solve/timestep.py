@@ -11,7 +11,8 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.model.state import Ends, Floats, Line, State
-from hybrid.solve.elimination import march, substitute, workspace
+from hybrid.solve.blocks import substitute
+from hybrid.solve.march import march, workspace
 from hybrid.solve.step import advance, slackest
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper

@@ -49,7 +49,7 @@ def test_plan_computes_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypa
     monkeypatch.chdir(tmp_path)
     Path("hanging.yaml").write_text(json.dumps(HANGING))  # JSON is YAML
     out, modules = call("plan", "hanging.yaml")
-    assert "4 cells" in out and not modules & {"h5py", "matplotlib", "hybrid.simulate", "hybrid.solve.elimination"}
+    assert "4 cells" in out and not modules & {"h5py", "matplotlib", "hybrid.simulate", "hybrid.solve.march"}
     hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5").close()
     out, modules = call("plot", "hanging.h5")
     assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulate"}

@@ -4,7 +4,7 @@ A case is: the scene, a part of it, what stands there instead with `§` where th
 point, the key it must name, and words that the fix (or what was expected) must contain.
 """
 
-# ruff: noqa: E501 (the tables of cases read across)
+
 
 from __future__ import annotations
 

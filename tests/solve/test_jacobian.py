@@ -12,7 +12,8 @@ import pytest
 
 from hybrid.model.state import Ends, Line, blank_state
 from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
-from hybrid.solve.elimination import SIZE, WIDTH, march, substitute, workspace
+from hybrid.solve.blocks import SIZE, WIDTH, substitute
+from hybrid.solve.march import march, workspace
 from hybrid.solve.step import update
 
 N = 7
@@ -118,6 +119,8 @@ def test_elimination_equals_a_dense_solve(zones, held, inextensible):
     u = np.zeros_like(st.r)
     J, b = assembled(line, ends, st, u)
     W, X, x, report, rows, gaps = workspace(N)
-    assert march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows) == -1
+    assert (
+        march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows) == -1
+    )
     assert substitute(X, x)
     assert np.abs(x.ravel() - np.linalg.solve(J, b)).max() < 1e-14 * np.linalg.cond(J) * np.abs(x).max()

@@ -1,22 +1,10 @@
-"""The march along s: assembly of one block row after the other, eliminated as it is born.
+"""The march along s: geometry, laws and balance of one node after the other, each block row eliminated as it is born.
 
-Unknowns of block i: the tension of the cell before node i (dT_{i-1}), the node (dr_i),
-the spin of the cell after it (dpsi_i); its equations, in that order: the length of the
-cell before, the balance of the node, the spin of the cell after.  Tension stays an
-unknown, so that stiffness never enters as 1/compliance: an inextensible cell is the
-case ck = 0 and nothing else.  W holds one block row:
-
-    columns  0..4   5..9   10..14  15..19  20..22   23
-    block    i-2    i-1    i       i+1     r_{i+2}  right-hand side
-
-After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
-relation that everything before node i imposes on what follows (docs/theory.md, 5).
-Rows without bending take a path with four unknowns in the same march.
+The layout of a block row and its elimination are in solve.blocks; symbols as in
+physics.cell, physics.element and physics.loads.
 """
 
 from __future__ import annotations
-
-import math
 
 import numpy as np
 
@@ -54,11 +42,8 @@ from hybrid.physics.rotations import (
     scale,
     sub,
 )
+from hybrid.solve.blocks import ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
 
-SIZE = 5  # unknowns of a block
-WIDTH = 24  # columns of W
-SPAN = 9  # columns of X_i
-ROW = SIZE * SPAN  # numbers of X_i
 REPORT = 20  # numbers of `report`
 # report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
 #         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
@@ -85,127 +70,6 @@ def put(W, row, col, A, sign):
         W[o] = sign * A[3 * j]
         W[o + 1] = sign * A[3 * j + 1]
         W[o + 2] = sign * A[3 * j + 2]
-
-
-@inner
-def take(W, o, skip, X, p, l0, l1, l2, l3, l4):
-    """Subtract l . X_p (5 rows of 9) from the row of W whose block begins at o; positions follow at o + 5 + skip."""
-    q1, q2, q3, q4 = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
-    t0 = W[o] - l0 * X[p] - l1 * X[q1] - l2 * X[q2] - l3 * X[q3] - l4 * X[q4]
-    t1 = W[o + 1] - l0 * X[p + 1] - l1 * X[q1 + 1] - l2 * X[q2 + 1] - l3 * X[q3 + 1] - l4 * X[q4 + 1]
-    t2 = W[o + 2] - l0 * X[p + 2] - l1 * X[q1 + 2] - l2 * X[q2 + 2] - l3 * X[q3 + 2] - l4 * X[q4 + 2]
-    t3 = W[o + 3] - l0 * X[p + 3] - l1 * X[q1 + 3] - l2 * X[q2 + 3] - l3 * X[q3 + 3] - l4 * X[q4 + 3]
-    t4 = W[o + 4] - l0 * X[p + 4] - l1 * X[q1 + 4] - l2 * X[q2 + 4] - l3 * X[q3 + 4] - l4 * X[q4 + 4]
-    s = o + 5 + skip
-    t5 = W[s] - l0 * X[p + 5] - l1 * X[q1 + 5] - l2 * X[q2 + 5] - l3 * X[q3 + 5] - l4 * X[q4 + 5]
-    t6 = W[s + 1] - l0 * X[p + 6] - l1 * X[q1 + 6] - l2 * X[q2 + 6] - l3 * X[q3 + 6] - l4 * X[q4 + 6]
-    t7 = W[s + 2] - l0 * X[p + 7] - l1 * X[q1 + 7] - l2 * X[q2 + 7] - l3 * X[q3 + 7] - l4 * X[q4 + 7]
-    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
-    W[s], W[s + 1], W[s + 2] = t5, t6, t7
-    return l0 * X[p + 8] + l1 * X[q1 + 8] + l2 * X[q2 + 8] + l3 * X[q3 + 8] + l4 * X[q4 + 8]
-
-
-@inner
-def pivot(W, size, first, last):
-    """Gauss-Jordan on rows of W, pivoting inside the block that begins at column `first`; False if singular.
-
-    A cofactor inverse would lose eps (k_axial/k_transverse)^2.
-    """
-    for c in range(size):
-        best, where = abs(W[c * WIDTH + first + c]), c
-        for r in range(c + 1, size):
-            if abs(W[r * WIDTH + first + c]) > best:
-                best, where = abs(W[r * WIDTH + first + c]), r
-        if not best > 0.0:
-            return False
-        if where != c:
-            for j in range(first + c, last):
-                W[c * WIDTH + j], W[where * WIDTH + j] = W[where * WIDTH + j], W[c * WIDTH + j]
-        inv = 1.0 / W[c * WIDTH + first + c]
-        for j in range(first + c + 1, last):
-            W[c * WIDTH + j] *= inv
-        for r in range(size):
-            if r != c:
-                f = W[r * WIDTH + first + c]
-                for j in range(first + c + 1, last):
-                    W[r * WIDTH + j] -= f * W[c * WIDTH + j]
-    return True
-
-
-@inner
-def eliminate_wide(W, X, i):
-    """Eliminate block row i (5 unknowns); False when the block is singular."""
-    if i >= 2:
-        p = (i - 2) * ROW
-        for r in range(1, 4):  # only the balance of the node reaches back to block i-2
-            o = r * WIDTH
-            W[o + 23] -= take(W, o + 5, 1, X, p, W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4])
-    if i >= 1:
-        p = (i - 1) * ROW
-        for r in range(5):
-            o = r * WIDTH
-            W[o + 23] -= take(W, o + 10, 1, X, p, W[o + 5], W[o + 6], W[o + 7], W[o + 8], W[o + 9])
-    if not pivot(W, 5, 10, 24):
-        return False
-    x = i * ROW
-    for r in range(5):
-        for j in range(SPAN):
-            X[x + SPAN * r + j] = W[r * WIDTH + 15 + j]
-    return True
-
-
-@inner
-def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, W, X, i):
-    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.
-
-    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
-    balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
-    """
-    # W: rows of 4 + 4 + 1 columns: dT_{i-1}, dr_i | dT_i, dr_{i+1} | right-hand side
-    A0 = (-hck, row[0], row[1], row[2], gap)
-    A1 = (back[0], D[0], D[1], D[2], b[0])
-    A2 = (back[1], D[3], D[4], D[5], b[1])
-    A3 = (back[2], D[6], D[7], D[8], b[2])
-    if i >= 1:
-        p = (i - 1) * ROW + SPAN
-        q, s = p + SPAN, p + 2 * SPAN
-        m = (-row[0], -row[1], -row[2])
-        A0 = less(A0, m, X, p, q, s)
-        A1 = less(A1, (L[0], L[1], L[2]), X, p, q, s)
-        A2 = less(A2, (L[3], L[4], L[5]), X, p, q, s)
-        A3 = less(A3, (L[6], L[7], L[8]), X, p, q, s)
-    fill(W, 0, A0, 0.0, 0.0, 0.0, 0.0)
-    fill(W, 1, A1, ahead[0], U[0], U[1], U[2])
-    fill(W, 2, A2, ahead[1], U[3], U[4], U[5])
-    fill(W, 3, A3, ahead[2], U[6], U[7], U[8])
-    if not pivot(W, 4, 0, 9):
-        return False
-    x = i * ROW
-    for r in range(4):
-        for j in range(4):
-            X[x + SPAN * r + j] = W[r * WIDTH + 4 + j]
-        X[x + SPAN * r + 8] = W[r * WIDTH + 8]
-    return True
-
-
-@inner
-def less(A, m, X, p, q, s):
-    """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
-    return (
-        A[0] - m[0] * X[p] - m[1] * X[q] - m[2] * X[s],
-        A[1] - m[0] * X[p + 1] - m[1] * X[q + 1] - m[2] * X[s + 1],
-        A[2] - m[0] * X[p + 2] - m[1] * X[q + 2] - m[2] * X[s + 2],
-        A[3] - m[0] * X[p + 3] - m[1] * X[q + 3] - m[2] * X[s + 3],
-        A[4] - m[0] * X[p + 8] - m[1] * X[q + 8] - m[2] * X[s + 8],
-    )
-
-
-@inner
-def fill(W, r, A, u0, u1, u2, u3):
-    o = r * WIDTH
-    W[o], W[o + 1], W[o + 2], W[o + 3] = A[0], A[1], A[2], A[3]
-    W[o + 4], W[o + 5], W[o + 6], W[o + 7] = u0, u1, u2, u3
-    W[o + 8] = A[4]
 
 
 @inner
@@ -339,9 +203,11 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
         if cell:
             nc, N0 = pull(d, il, T[i])
             row, hck, gap = stretch(get3(e, i), d, l, line.h[i], line.ck[i], T[i])
-            if bits & STIFFNESS_DAMPING:
+            if bits & STIFFNESS_DAMPING and hck > 0.0:  # what does not stretch has no rate of stretching to damp
                 row, late = damped_stretch(d, e1, d1, line.tau[i], cv)
                 gap -= late
+                along = dot(d, e1)
+                report[14] += line.tau[i] * along * along / hck
             if gaps.shape[0] > 0 and hck == 0.0:
                 gap = gaps[i]
             if bent:
@@ -460,10 +326,10 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
             hck_sized, gap_sized = size * hck_before, size * gap_before
             if held:
                 one = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                good = eliminate_narrow(sized, hck_sized, gap_sized, Z3, Z9, one, Z3, Z9, rhs, W, X, i)
+                good = eliminate_narrow(sized, hck_sized, gap_sized, Z3, Z9, one, Z3, Z9, rhs, X, i)
             else:
                 back = scale(-1.0, d_before)
-                good = eliminate_narrow(sized, hck_sized, gap_sized, back, mscale(-1.0, G1), Dii, d, G2, rhs, W, X, i)
+                good = eliminate_narrow(sized, hck_sized, gap_sized, back, mscale(-1.0, G1), Dii, d, G2, rhs, X, i)
         if not good:
             return i
 
@@ -477,28 +343,6 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
         A, a, B, b, M = An, an, Bn, bn, Mn
         wide_before = bent
     return -1
-
-
-@kernel
-def substitute(X, x):
-    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
-    n = x.shape[0] - 1
-    y = (0.0, 0.0, 0.0, 0.0, 0.0)
-    z0, z1, z2 = 0.0, 0.0, 0.0
-    total = 0.0
-    for i in range(n, -1, -1):
-        p = i * ROW
-        for k in range(SIZE):
-            q = p + SPAN * k
-            x[i, k] = (
-                X[q + 8]
-                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
-                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
-            )  # fmt: skip
-            total += abs(x[i, k])
-        z0, z1, z2 = y[1], y[2], y[3]
-        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
-    return total < math.inf
 
 
 def workspace(n_cells: int):

@@ -1,0 +1,282 @@
+"""Block rows along s: their layout, their elimination, and the solve back.
+
+Unknowns of block i: the tension of the cell before node i (dT_{i-1}), the node (dr_i),
+the spin of the cell after it (dpsi_i); its equations, in that order: the length of the
+cell before, the balance of the node, the spin of the cell after.  Tension stays an
+unknown, so that stiffness never enters as 1/compliance: an inextensible cell is the
+case ck = 0 and nothing else.  W holds one block row, five rows of
+
+    columns  0..4   5..9   10..14  15..19  20..22   23
+    block    i-2    i-1    i       i+1     r_{i+2}  right-hand side
+
+After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
+relation that everything before node i imposes on what follows (docs/theory.md, 5).
+Rows without bending have four unknowns and take a path of their own in the same march.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.compiled import inner, kernel
+
+SIZE = 5  # unknowns of a block
+WIDTH = 24  # columns of W
+SPAN = 9  # columns of X_i
+ROW = SIZE * SPAN  # numbers of X_i
+
+
+@inner
+def take(W, o, skip, X, p, l0, l1, l2, l3, l4):
+    """Subtract l . X_p (5 rows of 9) from the row of W whose block begins at o; positions follow at o + 5 + skip."""
+    q1, q2, q3, q4 = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+    t0 = W[o] - l0 * X[p] - l1 * X[q1] - l2 * X[q2] - l3 * X[q3] - l4 * X[q4]
+    t1 = W[o + 1] - l0 * X[p + 1] - l1 * X[q1 + 1] - l2 * X[q2 + 1] - l3 * X[q3 + 1] - l4 * X[q4 + 1]
+    t2 = W[o + 2] - l0 * X[p + 2] - l1 * X[q1 + 2] - l2 * X[q2 + 2] - l3 * X[q3 + 2] - l4 * X[q4 + 2]
+    t3 = W[o + 3] - l0 * X[p + 3] - l1 * X[q1 + 3] - l2 * X[q2 + 3] - l3 * X[q3 + 3] - l4 * X[q4 + 3]
+    t4 = W[o + 4] - l0 * X[p + 4] - l1 * X[q1 + 4] - l2 * X[q2 + 4] - l3 * X[q3 + 4] - l4 * X[q4 + 4]
+    s = o + 5 + skip
+    t5 = W[s] - l0 * X[p + 5] - l1 * X[q1 + 5] - l2 * X[q2 + 5] - l3 * X[q3 + 5] - l4 * X[q4 + 5]
+    t6 = W[s + 1] - l0 * X[p + 6] - l1 * X[q1 + 6] - l2 * X[q2 + 6] - l3 * X[q3 + 6] - l4 * X[q4 + 6]
+    t7 = W[s + 2] - l0 * X[p + 7] - l1 * X[q1 + 7] - l2 * X[q2 + 7] - l3 * X[q3 + 7] - l4 * X[q4 + 7]
+    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
+    W[s], W[s + 1], W[s + 2] = t5, t6, t7
+    return l0 * X[p + 8] + l1 * X[q1 + 8] + l2 * X[q2 + 8] + l3 * X[q3 + 8] + l4 * X[q4 + 8]
+
+
+@inner
+def row_minus(W, o, p, f):
+    """Subtract f times the row of W at p from the row at o, over the pivot block and all to its right.
+
+    All is read before anything is written: that is what lets the compiler use vectors.
+    """
+    t0 = W[o + 10] - f * W[p + 10]
+    t1 = W[o + 11] - f * W[p + 11]
+    t2 = W[o + 12] - f * W[p + 12]
+    t3 = W[o + 13] - f * W[p + 13]
+    t4 = W[o + 14] - f * W[p + 14]
+    t5 = W[o + 15] - f * W[p + 15]
+    t6 = W[o + 16] - f * W[p + 16]
+    t7 = W[o + 17] - f * W[p + 17]
+    t8 = W[o + 18] - f * W[p + 18]
+    t9 = W[o + 19] - f * W[p + 19]
+    t10 = W[o + 20] - f * W[p + 20]
+    t11 = W[o + 21] - f * W[p + 21]
+    t12 = W[o + 22] - f * W[p + 22]
+    t13 = W[o + 23] - f * W[p + 23]
+    W[o + 10] = t0
+    W[o + 11] = t1
+    W[o + 12] = t2
+    W[o + 13] = t3
+    W[o + 14] = t4
+    W[o + 15] = t5
+    W[o + 16] = t6
+    W[o + 17] = t7
+    W[o + 18] = t8
+    W[o + 19] = t9
+    W[o + 20] = t10
+    W[o + 21] = t11
+    W[o + 22] = t12
+    W[o + 23] = t13
+
+
+@inner
+def row_times(W, o, f):
+    """Multiply the same part of the row at o by f."""
+    t0 = f * W[o + 10]
+    t1 = f * W[o + 11]
+    t2 = f * W[o + 12]
+    t3 = f * W[o + 13]
+    t4 = f * W[o + 14]
+    t5 = f * W[o + 15]
+    t6 = f * W[o + 16]
+    t7 = f * W[o + 17]
+    t8 = f * W[o + 18]
+    t9 = f * W[o + 19]
+    t10 = f * W[o + 20]
+    t11 = f * W[o + 21]
+    t12 = f * W[o + 22]
+    t13 = f * W[o + 23]
+    W[o + 10] = t0
+    W[o + 11] = t1
+    W[o + 12] = t2
+    W[o + 13] = t3
+    W[o + 14] = t4
+    W[o + 15] = t5
+    W[o + 16] = t6
+    W[o + 17] = t7
+    W[o + 18] = t8
+    W[o + 19] = t9
+    W[o + 20] = t10
+    W[o + 21] = t11
+    W[o + 22] = t12
+    W[o + 23] = t13
+
+
+@inner
+def pivot(W):
+    """Gauss-Jordan on the five rows of W with pivoting inside the block; False when the block is singular.
+
+    A cofactor inverse would lose eps (k_axial/k_transverse)^2.
+    """
+    for c in range(SIZE):
+        o = c * WIDTH
+        best, where = abs(W[o + 10 + c]), c
+        for r in range(c + 1, SIZE):
+            if abs(W[r * WIDTH + 10 + c]) > best:
+                best, where = abs(W[r * WIDTH + 10 + c]), r
+        if not best > 0.0:
+            return False
+        if where != c:
+            p = where * WIDTH
+            for j in range(10, WIDTH):
+                W[o + j], W[p + j] = W[p + j], W[o + j]
+        row_times(W, o, 1.0 / W[o + 10 + c])
+        for r in range(SIZE):
+            if r != c:
+                row_minus(W, r * WIDTH, o, W[r * WIDTH + 10 + c])
+    return True
+
+
+@inner
+def eliminate_wide(W, X, i):
+    """Eliminate block row i (5 unknowns); False when the block is singular."""
+    if i >= 2:
+        p = (i - 2) * ROW
+        for r in range(1, 4):  # only the balance of the node reaches back to block i-2
+            o = r * WIDTH
+            W[o + 23] -= take(W, o + 5, 1, X, p, W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4])
+    if i >= 1:
+        p = (i - 1) * ROW
+        for r in range(5):
+            o = r * WIDTH
+            W[o + 23] -= take(W, o + 10, 1, X, p, W[o + 5], W[o + 6], W[o + 7], W[o + 8], W[o + 9])
+    if not pivot(W):
+        return False
+    x = i * ROW
+    for r in range(5):
+        for j in range(SPAN):
+            X[x + SPAN * r + j] = W[r * WIDTH + 15 + j]
+    return True
+
+
+@inner
+def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i):
+    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.
+
+    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
+    balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
+    """
+    # rows of dT_{i-1}, dr_i | dT_i, dr_{i+1} | right-hand side
+    A0 = (-hck, row[0], row[1], row[2], gap)
+    A1 = (back[0], D[0], D[1], D[2], b[0])
+    A2 = (back[1], D[3], D[4], D[5], b[1])
+    A3 = (back[2], D[6], D[7], D[8], b[2])
+    if i >= 1:
+        p = (i - 1) * ROW + SPAN
+        q, s = p + SPAN, p + 2 * SPAN
+        A0 = less(A0, (-row[0], -row[1], -row[2]), X, p, q, s)
+        A1 = less(A1, (L[0], L[1], L[2]), X, p, q, s)
+        A2 = less(A2, (L[3], L[4], L[5]), X, p, q, s)
+        A3 = less(A3, (L[6], L[7], L[8]), X, p, q, s)
+    B0 = (A0[0], A0[1], A0[2], A0[3], 0.0, 0.0, 0.0, 0.0, A0[4])
+    B1 = (A1[0], A1[1], A1[2], A1[3], ahead[0], U[0], U[1], U[2], A1[4])
+    B2 = (A2[0], A2[1], A2[2], A2[3], ahead[1], U[3], U[4], U[5], A2[4])
+    B3 = (A3[0], A3[1], A3[2], A3[3], ahead[2], U[6], U[7], U[8], A3[4])
+    # Gauss-Jordan in registers; a pivot of zero makes everything infinite or NaN, which is seen at the end
+    if abs(B1[0]) > abs(B0[0]):
+        B0, B1 = B1, B0
+    if abs(B2[0]) > abs(B0[0]):
+        B0, B2 = B2, B0
+    if abs(B3[0]) > abs(B0[0]):
+        B0, B3 = B3, B0
+    f = 1.0 / B0[0]
+    C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6], f * B0[7], f * B0[8])
+    C1, C2, C3 = first_gone(B1, C0), first_gone(B2, C0), first_gone(B3, C0)
+    if abs(C2[0]) > abs(C1[0]):
+        C1, C2 = C2, C1
+    if abs(C3[0]) > abs(C1[0]):
+        C1, C3 = C3, C1
+    f = 1.0 / C1[0]
+    D1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5], f * C1[6], f * C1[7])
+    D0, D2, D3 = second_gone(C0, D1), second_gone(C2, D1), second_gone(C3, D1)
+    if abs(D3[0]) > abs(D2[0]):
+        D2, D3 = D3, D2
+    f = 1.0 / D2[0]
+    E2 = (f * D2[1], f * D2[2], f * D2[3], f * D2[4], f * D2[5], f * D2[6])
+    E0, E1, E3 = third_gone(D0, E2), third_gone(D1, E2), third_gone(D3, E2)
+    f = 1.0 / E3[0]
+    F3 = (f * E3[1], f * E3[2], f * E3[3], f * E3[4], f * E3[5])
+    big = 0.0
+    big += keep(X, i * ROW, fourth_gone(E0, F3))
+    big += keep(X, i * ROW + SPAN, fourth_gone(E1, F3))
+    big += keep(X, i * ROW + 2 * SPAN, fourth_gone(E2, F3))
+    big += keep(X, i * ROW + 3 * SPAN, F3)
+    return big < math.inf
+
+
+@inner
+def first_gone(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
+            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6], b[8] - f * c[7])  # fmt: skip
+
+
+@inner
+def second_gone(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
+            b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6])  # fmt: skip
+
+
+@inner
+def third_gone(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4], b[6] - f * c[5])
+
+
+@inner
+def fourth_gone(b, c):
+    f = b[0]
+    return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4])
+
+
+@inner
+def keep(X, x, row):
+    X[x], X[x + 1], X[x + 2], X[x + 3] = row[0], row[1], row[2], row[3]
+    X[x + 8] = row[4]
+    return abs(row[4])
+
+
+@inner
+def less(A, m, X, p, q, s):
+    """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
+    return (
+        A[0] - m[0] * X[p] - m[1] * X[q] - m[2] * X[s],
+        A[1] - m[0] * X[p + 1] - m[1] * X[q + 1] - m[2] * X[s + 1],
+        A[2] - m[0] * X[p + 2] - m[1] * X[q + 2] - m[2] * X[s + 2],
+        A[3] - m[0] * X[p + 3] - m[1] * X[q + 3] - m[2] * X[s + 3],
+        A[4] - m[0] * X[p + 8] - m[1] * X[q + 8] - m[2] * X[s + 8],
+    )
+
+
+@kernel
+def substitute(X, x):
+    """Solve back from the end: x (N+1, 5) receives dT, dr and dpsi of every block; False if one is not finite."""
+    n = x.shape[0] - 1
+    y = (0.0, 0.0, 0.0, 0.0, 0.0)
+    z0, z1, z2 = 0.0, 0.0, 0.0
+    total = 0.0
+    for i in range(n, -1, -1):
+        p = i * ROW
+        for k in range(SIZE):
+            q = p + SPAN * k
+            x[i, k] = (
+                X[q + 8]
+                - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * y[3] - X[q + 4] * y[4]
+                - X[q + 5] * z0 - X[q + 6] * z1 - X[q + 7] * z2
+            )  # fmt: skip
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    return total < math.inf

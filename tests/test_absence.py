@@ -1,0 +1,181 @@
+"""What a scene does not ask for is not there: no bit, no number, no dataset, no import; and the plan says so."""
+
+from __future__ import annotations
+
+import io
+import subprocess
+import sys
+from typing import Any
+
+import h5py
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.build import Model, build
+from hybrid.physics.loads import ADDED_MASS, DRAG, FORCES, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
+
+BARE = {"length": 2.0, "mass": 0.1}
+BENDS = BARE | {"bending_stiffness": 1.0e-2}
+WET = {"environment": {"fluid": {"density": 1000.0}}}
+
+# Optional parameters of the line, and the bit whose force reads them.
+PARAMETERS = {
+    "drag_n": DRAG,
+    "drag_t": DRAG,
+    "added_n": ADDED_MASS,
+    "added_t": ADDED_MASS,
+    "damp": MASS_DAMPING,
+    "tau": STIFFNESS_DAMPING,
+    "rotary": ROTARY,
+    "polar": ROTARY,
+}
+
+
+def scene(section: dict[str, Any], model: Any = "catenary", **tables: Any) -> hybrid.Scene:
+    """A cable that hangs from a pin."""
+    return hybrid.validate_scene(
+        {
+            "cable": {"sections": [section]},
+            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+            "initial": "equilibrium",
+            "model": model,
+            "mesh": {"cells": 8},
+            "time": {"duration": 0.05, "step": 0.01},
+        }
+        | tables
+    )
+
+
+HYBRID = {"kind": "zones", "zones": [{"rod": 1.0, "cells": 4}, {"catenary": 1.0}]}
+SCENES = {
+    "bare catenary": (scene(BARE), 0),
+    "bare rod": (scene(BENDS, "rod"), 0),
+    "bare hybrid": (scene(BENDS, HYBRID), 0),
+    "fluid, no coefficients": (scene(BARE | {"diameter": 0.01}, **WET), 0),
+    "drag": (scene(BARE | {"diameter": 0.01, "drag": {"normal": 1.2}}, **WET), DRAG),
+    "added mass": (scene(BARE | {"diameter": 0.01, "added_mass": {"normal": 1.0}}, **WET), ADDED_MASS),
+    "mass damping": (scene(BARE | {"damping": 0.5}), MASS_DAMPING),
+    "stiffness damping": (scene(BENDS | {"damping": {"stiffness": 0.01}}, "rod"), STIFFNESS_DAMPING),
+    "rotary inertia": (scene(BENDS | {"rotary_inertia": 1e-5}, "rod"), ROTARY),
+    "diameter of a rod": (scene(BENDS | {"diameter": 0.01}, "rod"), ROTARY),
+    "diameter of a catenary": (scene(BARE | {"diameter": 0.01}), 0),
+    "damping of zero": (scene(BARE | {"damping": {"mass": 0.0, "stiffness": 0.0}}), 0),
+    "everything": (
+        scene(
+            BENDS
+            | {"diameter": 0.01, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
+            | {"damping": {"mass": 0.5, "stiffness": 0.01}},
+            HYBRID,
+            **WET,
+        ),
+        DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY,
+    ),
+}
+each_scene = pytest.mark.parametrize(("asked", "bits"), SCENES.values(), ids=SCENES.keys())
+
+
+@each_scene
+def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits: int) -> None:
+    line = build(asked).line
+    assert line.bits == bits
+    for name, bit in PARAMETERS.items():
+        value = getattr(line, name)
+        assert (np.isfinite(value) if bits & bit else np.isnan(value)).all(), name
+
+
+@each_scene
+def test_the_ledger_says_what_the_line_does(asked: hybrid.Scene, bits: int) -> None:
+    plan = hybrid.plan(asked)
+    said = {entry.what: entry for entry in plan.ledger}
+    for name, (bit, _) in FORCES.items():
+        assert said[name].on == bool(bits & bit), name
+        assert said[name].why
+    assert said["buoyancy"].on == (asked.environment.fluid is not None)
+    kinds = {zone.kind for zone in plan.zones}
+    assert said["rod cells: bending, torsion (12th order)"].on == ("rod" in kinds)
+    assert said["catenary cells (6th order)"].on == ("catenary" in kinds)
+
+
+@each_scene
+def test_a_parameter_that_is_off_is_never_read(asked: hybrid.Scene, bits: int) -> None:
+    """It is NaN: one read of it and no number of the result would be finite."""
+    result = hybrid.run(asked)
+    assert result.status == "complete"
+    for name in result.names:
+        if result[name].dtype.kind == "f":
+            assert np.isfinite(result[name]).all(), name
+
+
+def test_what_is_off_is_worked_by_nothing() -> None:
+    work = hybrid.run(scene(BARE)).work
+    for name in ("drag", "added_mass", "mass_damping", "stiffness_damping", "applied"):
+        assert not work[name].any(), name
+
+
+@pytest.mark.parametrize("kind", ["catenary", "rod"])
+def test_elements_and_spins_are_where_the_rod_is(kind: str) -> None:
+    line = build(scene(BENDS, kind)).line
+    inner = line.element[1:-1]
+    assert (inner == (kind == "rod")).all() and (line.spin == (kind == "rod")).all()
+    assert not line.element[[0, -1]].any(), "pinned and free ends have no element"
+    assert (line.kb[1:-1] > 0).all() == (kind == "rod")
+
+
+def test_a_joint_is_a_node_without_an_element() -> None:
+    model: Model = build(scene(BENDS, HYBRID))
+    joint = int(np.argmin(np.abs(model.line.s - 1.0)))
+    assert model.line.element.tolist() == [0] + [1] * (joint - 1) + [0] * (model.cells - joint + 1)
+    assert model.line.spin.tolist() == [1] * joint + [0] * (model.cells - joint)
+
+
+def test_a_catenary_has_fewer_unknowns() -> None:
+    assert hybrid.plan(scene(BENDS)).unknowns == 3 * 9 + 8
+    assert hybrid.plan(scene(BENDS, "rod")).unknowns == 3 * 9 + 8 + 8
+    assert hybrid.plan(scene(BENDS, HYBRID)).unknowns == 3 * 9 + 8 + 4
+
+
+ROD_ONLY = {
+    "twist", "bending_moment", "torque", "shear", "moment_start", "moment_end", "energy/bending", "energy/torsion",
+}  # fmt: skip
+
+
+def test_a_catenary_records_no_moments() -> None:
+    names = set(hybrid.run(scene(BENDS)).names)
+    assert not names & ROD_ONLY
+    assert set(hybrid.run(scene(BENDS, "rod")).names) >= names | ROD_ONLY
+
+
+def test_no_history_without_history(tmp_path: Any) -> None:
+    hybrid.run(scene(BARE), output=tmp_path / "run.h5")
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert "history" not in file
+        assert len(file["events/t"]) == 0
+
+
+def test_static_results_have_no_steps_and_no_work() -> None:
+    result = hybrid.static(scene(BARE))
+    assert not [name for name in result.names if name.startswith(("steps/", "work/"))]
+    assert isinstance(result, hybrid.Result) and len(result.times) == 1
+
+
+def test_no_motion_no_reader_of_motion_files() -> None:
+    """Splines are slow to import: a scene without a motion file does without them."""
+    text = "cable: {sections: [{length: 1.0, mass: 1.0}]}\\ninitial: equilibrium\\nmodel: catenary\\n"
+    text += "ends: {start: {kind: pinned, position: [0, 0, 0]}, end: free}"
+    code = f"import sys, hybrid; hybrid.parse_scene('{text}'); assert 'scipy' not in sys.modules"
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
+def test_results_kept_in_memory_write_no_file(tmp_path: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    result = hybrid.run(scene(BARE))
+    assert result.tension.size and not list(tmp_path.iterdir())
+    assert isinstance(result._source, io.BytesIO)
+
+
+@pytest.mark.parametrize("command", ["schema", "--help", "--version"])
+def test_words_need_no_compiler_and_no_plots(command: str) -> None:
+    code = "import sys\nfrom hybrid.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n"
+    code += "    assert not leave.code\nassert not {'numba', 'matplotlib', 'h5py', 'scipy'} & set(sys.modules)"
+    subprocess.run([sys.executable, "-c", code, command], check=True, capture_output=True)

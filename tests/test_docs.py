@@ -1,0 +1,194 @@
+"""What the pages promise: commands run, scenes load, links lead somewhere, numbers are those of the code."""
+
+from __future__ import annotations
+
+import importlib
+import re
+import runpy
+import shlex
+import shutil
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+import hybrid
+from hybrid.cli import main
+
+ROOT = Path(__file__).parents[1]
+README = ROOT / "README.md"
+PAGES = [README, *sorted((ROOT / "docs").glob("*.md"))]
+EXAMPLES = sorted((ROOT / "examples").glob("*.yaml"))
+PICTURES = ROOT / "docs" / "pictures"
+
+
+def blocks(page: Path, language: str) -> list[str]:
+    """Fenced blocks of a page in one language."""
+    return re.findall(rf"^```{language}\n(.*?)^```$", page.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+
+
+def commands() -> Iterator[list[str]]:
+    """Arguments of every `hybrid ...` in the README's shell blocks, in order."""
+    for block in blocks(README, "bash"):
+        for line in block.splitlines():
+            for part in line.split("&&"):
+                words = shlex.split(part, comments=True)
+                if words[:1] == ["hybrid"]:
+                    yield words[1:]
+
+
+@pytest.fixture(scope="module")
+def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the examples, as in a fresh clone."""
+    folder = tmp_path_factory.mktemp("clone")
+    shutil.copytree(ROOT / "examples", folder / "examples")
+    return folder
+
+
+def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(clone)
+    found = list(commands())
+    assert {arguments[0] for arguments in found} == {"run", "plan", "static", "plot", "schema"}
+    for arguments in found:
+        with pytest.raises(SystemExit) as left:
+            main(arguments)
+        assert not left.value.code, f"hybrid {' '.join(arguments)}: {capsys.readouterr().err}"
+    assert (clone / "02_suspension.h5").is_file() and (clone / "02_suspension.png").is_file()
+
+
+def test_readme_says_what_the_first_command_says(
+    clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(clone)
+    with pytest.raises(SystemExit):
+        main(next(iter(commands())))
+    out = capsys.readouterr()
+    promised = blocks(README, "text")[0]
+    for line in promised.splitlines():
+        if line.startswith("note:"):
+            assert line in " ".join(out.err.split()), "README.md shows another note than the program"
+        if " steps, " in line:  # a step more or less is no matter
+            assert re.match(r"20 s in 20\d\d steps, ", line) and re.match(r"20 s in 20\d\d steps, ", out.out)
+            assert line.split("->")[1].split() == out.out.split("->")[1].split()
+
+
+def test_readme_python_runs(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+    monkeypatch.chdir(clone)
+    (block,) = blocks(README, "python")
+    exec(compile(block, "README.md", "exec"), {})
+    said = capsys.readouterr().out
+    assert said.startswith("(201, 101) N\n"), "as the comment beside it says"
+    assert (clone / "suspension.png").stat().st_size > 10_000
+
+
+def test_ci_reads_its_commands_from_the_readme() -> None:
+    first, second, *_ = blocks(README, "bash")
+    assert len(first.splitlines()) == 1, "one line to copy"
+    assert re.fullmatch(
+        r"python3 -m venv \S+ && \. \S+/bin/activate && pip install -e \"\.\[dev\]\" && hybrid run \S+ --plot\n", first
+    )
+    assert second == "pytest\n"
+    script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
+    assert "first=$(block 1)" in script and "second=$(block 2)" in script
+    assert "pip install" not in script
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_scenes_on_pages_load(page: Path) -> None:
+    for text in blocks(page, "yaml"):
+        hybrid.plan(hybrid.parse_scene(text, str(page)))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_links_lead_somewhere(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for target in re.findall(r"\]\(([^)\s]+)\)", text):
+        file, _, anchor = target.partition("#")
+        there = page.parent / file if file else page
+        if there == ROOT / "docs" / "validation.md":
+            continue  # the tests write it
+        assert there.exists(), f"{page.name} links to {target}"
+        if anchor:
+            heads = re.findall(r"^#+ (.*)$", there.read_text(encoding="utf-8"), re.MULTILINE)
+            known = {re.sub(r"[^\w\- ]", "", head.lower()).replace(" ", "-") for head in heads}
+            assert anchor in known, f"{page.name} links to {target}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_pages_name_no_place_but_their_own(page: Path) -> None:
+    assert not re.search(r"/work/|/tmp/|/home/|https?://", page.read_text(encoding="utf-8"))
+
+
+def test_scene_reference_is_fresh() -> None:
+    make = runpy.run_path(str(ROOT / "docs" / "make_scene_reference.py"))
+    page = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
+    assert page == make["page"](), "run: python docs/make_scene_reference.py"
+
+
+def test_cited_files_exist() -> None:
+    """Paths in backticks or code, such as `hybrid/physics/loads.py`."""
+    for page in PAGES:
+        text = page.read_text(encoding="utf-8")
+        for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):
+            assert (ROOT / name).exists() or name == "docs/validation.md", f"{page.name} names {name}"
+
+
+def test_cited_equations_exist() -> None:
+    """Equations are numbered without a gap, and docstrings cite none that is not there."""
+    text = (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+    numbers = [int(n) for n in re.findall(r"^\(T(\d+)\)  ", text, re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1))
+    for file in (ROOT / "hybrid").rglob("*.py"):
+        cited = re.findall(r"\(T(\d+)\)", file.read_text(encoding="utf-8"))
+        assert {int(n) for n in cited} <= set(numbers), file
+
+
+# Every constant of docs/theory.md section 12 that stands alone in the code: module, name, value, as on the page.
+CONSTANTS = (
+    ("solve.step", "TOLERANCE", 1e-9, "10⁻⁹"),
+    ("solve.step", "ROUND_OFF", 1e-6, "10⁻⁶"),
+    ("solve.step", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
+    ("solve.step", "LARGEST_TURN", 0.7, "0.7 rad"),
+    ("solve.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
+    ("solve.timestep", "REACH", 0.1, "0.1 L"),
+    ("solve.statics", "REACH", 0.1, "0.1 L"),
+    ("solve.timestep", "MOST_ITERATIONS", 20, "20 in motion"),
+    ("solve.statics", "MOST_ITERATIONS", 40, "40 in statics"),
+    ("solve.statics", "LOAD_STEPS", (1, 8, 64), "1, 8, 64 steps"),
+    ("solve.timestep", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
+    ("solve.timestep", "UNRESOLVED_BEND", 1.0, "1 rad per cell"),
+    ("solve.timestep", "HEAVY", 1e36, "10³⁶ 1/s²"),
+    ("simulate", "HALVINGS", 10, "| halvings of a step | 10 |"),
+    ("model.mesh", "DEFAULT_CELLS", 100, "| cells of a silent scene | 100 |"),
+)
+
+
+@pytest.mark.parametrize(("module", "name", "value", "said"), CONSTANTS, ids=[f"{m}.{n}" for m, n, *_ in CONSTANTS])
+def test_constants_are_those_of_the_code(module: str, name: str, value: object, said: str) -> None:
+    assert getattr(importlib.import_module(f"hybrid.{module}"), name) == value
+    assert said in (ROOT / "docs" / "theory.md").read_text(encoding="utf-8")
+
+
+# --- examples ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.stem)
+def test_example_loads_and_is_planned(example: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert hybrid.load_scene(example).title
+    with pytest.raises(SystemExit) as left:
+        main(["plan", str(example)])
+    assert not left.value.code
+    assert "unknowns" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("example", [*EXAMPLES, ROOT / "examples" / "08_python_api.py"], ids=lambda p: p.stem)
+def test_example_has_a_header_and_a_picture(example: Path) -> None:
+    text = example.read_text(encoding="utf-8")
+    for entry in ("Shows:", "Physics:", "Look at:", "Run time:", "Source:"):
+        assert entry in text, entry
+    picture = PICTURES / f"{example.stem}.png"
+    assert 10_000 < picture.stat().st_size <= 150_000, "run: python docs/figures/make_pictures.py"
+
+
+def test_every_picture_is_small() -> None:
+    assert all(picture.stat().st_size <= 150_000 for picture in PICTURES.iterdir())
