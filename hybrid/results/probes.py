@@ -59,13 +59,16 @@ class Grid:
     """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
 
     nodes: cubic, from node values (positions, velocities); cells: linear, from values at
-    the middle of the cells; sides: linear, from node values that may differ on the two
+    the middle of the cells; held: the same with the values at both ends of the line as
+    well (tensions, which the supports know); sides: linear, from node values that may differ on the two
     sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
     shows the side before it.
     """
 
     def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
+        n = nodes_s.size
         cubic: list[tuple[int, int, float]] = []
+        held: list[tuple[int, int, float]] = []
         middle: list[tuple[int, int, float]] = []
         linear: list[tuple[int, int, float]] = []
         self.side_nodes: list[int] = []
@@ -91,13 +94,21 @@ class Grid:
                 cubic += [(g, a + j, p * p * (p - 1) * H * w) for j, w in slope(k + 1)]
                 linear += [(g, offset + k, 1 - p), (g, offset + k + 1, p)]
                 if c.size == 1:
-                    middle.append((g, a, 1.0))
+                    weights = [(a, 1.0)]
                 else:
                     m = min(max(int(np.searchsorted(c, s[g])) - 1, 0), c.size - 2)
                     q = (s[g] - c[m]) / (c[m + 1] - c[m])
-                    middle += [(g, a + m, 1 - q), (g, a + m + 1, q)]
-        n = nodes_s.size
+                    weights = [(a + m, 1 - q), (a + m + 1, q)]
+                middle += [(g, j, w) for j, w in weights]
+                # columns of `held`: start, cells, end; next to an end its value takes part
+                if s[g] < middles[0]:
+                    weights = [(-1, 1 - s[g] / middles[0]), (0, s[g] / middles[0])]
+                elif s[g] > middles[-1]:
+                    q = (s[g] - middles[-1]) / (nodes_s[-1] - middles[-1])
+                    weights = [(n - 2, 1 - q), (n - 1, q)]
+                held += [(g, j + 1, w) for j, w in weights]
         self.nodes = _sparse(cubic, (s.size, n))
+        self.held = _sparse(held, (s.size, n + 1))
         self.cells = _sparse(middle, (s.size, n - 1))
         self.sides = _sparse(linear, (s.size, len(self.side_nodes)))
         self.s = s
@@ -112,6 +123,17 @@ class View:
     @cached_property
     def d(self) -> Floats:
         return np.asarray(self.state.e / np.linalg.norm(self.state.e, axis=1)[:, None])
+
+    @cached_property
+    def tension(self) -> Floats:
+        """Tension on the grid: of the cells, and at the ends the pull of what holds them."""
+        d = self.d
+        ends = []
+        for k, first, second in ((0, 0, 1), (1, -1, -2)):
+            t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
+            force = self.reaction(k) if k else -self.reaction(k)
+            ends.append(float(force @ t) / float(np.linalg.norm(t)))
+        return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
 
     @cached_property
     def tangent(self) -> Floats:
@@ -224,7 +246,7 @@ _S, _SX, _X = ("s",), ("s", "xyz"), ("xyz",)
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.state.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.state.v, frame="inertial"),
-    "tension": Probe("N", "tension (effective tension in a fluid)", _S, lambda v: v.grid.cells @ v.state.T),
+    "tension": Probe("N", "tension (effective tension in a fluid)", _S, lambda v: v.tension),
     "theta": Probe(
         "rad", "angle of the tangent to the z axis", _S, lambda v: np.arccos(np.clip(v.tangent[:, 2], -1, 1))
     ),

@@ -81,11 +81,12 @@ class Section(Table):
         description="bending stiffness EI, or [about a1, about a2]; needed in rod zones [N m^2]",
     )
     torsional_stiffness: NonNegative | None = Field(
-        default=None, description="torsional stiffness GJ; absent: chosen from the bending stiffness [N m^2]"
+        default=None, description="torsional stiffness GJ; absent: bending stiffness / 1.3 [N m^2]"
     )
     rotary_inertia: OneOrTwo | None = Field(
         default=None,
-        description="rotary inertia per length: transverse, or [transverse, polar]; absent: neglected [kg m]",
+        description="rotary inertia per length: transverse, or [transverse, polar]; "
+        "absent: that of a solid round section, or none without a diameter [kg m]",
     )
     intrinsic_curvature: Vector | None = Field(
         default=None, description="curvatures about a1 and a2 and twist of the unloaded cable, material axes [1/m]"

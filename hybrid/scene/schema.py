@@ -8,7 +8,7 @@ The tables live in three files (`cable`, `ends`, `task`); import them from here.
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Any, Literal
 
 from pydantic import Field, model_validator
 
@@ -63,6 +63,11 @@ class Scene(Table):
         """Unstretched length of the cable [m]."""
         return self.cable.length
 
+    @classmethod
+    def model_json_schema(cls, *args: Any, **kwargs: Any) -> dict[str, Any]:
+        """JSON Schema of a scene file; bounds in the words that editors know."""
+        return dict(_standard(super().model_json_schema(*args, **kwargs)))
+
     def require_time(self) -> Time:
         """The `time` table; SceneError if the scene has none."""
         if self.time is None:
@@ -73,6 +78,16 @@ class Scene(Table):
     def _no_contradiction(self) -> Scene:
         refuse(contradictions({name: getattr(self, name) for name in type(self).model_fields}))
         return self
+
+
+# pydantic leaves a bound under its own name where a validator of ours stands before the number
+_STANDARD = {"gt": "exclusiveMinimum", "ge": "minimum", "lt": "exclusiveMaximum", "le": "maximum"}
+
+
+def _standard(schema: Any) -> Any:
+    if isinstance(schema, dict):
+        return {_STANDARD.get(k, k) if not isinstance(v, dict) else k: _standard(v) for k, v in schema.items()}
+    return [_standard(x) for x in schema] if isinstance(schema, list) else schema
 
 
 def missing_time(scene: Scene) -> Complaint:

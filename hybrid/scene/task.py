@@ -218,12 +218,14 @@ OutputPoints = Annotated[
 class Output(Table):
     """What is kept."""
 
-    every: Positive | None = Field(default=None, description="time between outputs; absent: chosen [s]")
+    every: Positive | None = Field(
+        default=None, description="time between outputs; absent: a hundredth of the duration [s]"
+    )
     points: OutputPoints = Field(
         default=101, description="number of output points, evenly spread, or a list of their arc lengths [m]"
     )
     history: tuple[NonNegative, ...] | None = Field(
-        default=None, min_length=1, description="arc lengths that are kept at every time step [m]"
+        default=None, min_length=1, description="arc lengths that plots follow over time [m]"
     )
 
     @model_validator(mode="after")

@@ -4,8 +4,6 @@ A case is: the scene, a part of it, what stands there instead with `§` where th
 point, the key it must name, and words that the fix (or what was expected) must contain.
 """
 
-
-
 from __future__ import annotations
 
 import re

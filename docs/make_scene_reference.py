@@ -1,0 +1,167 @@
+"""Write docs/scene.md from the JSON schema of a scene.
+
+    python docs/make_scene_reference.py            # writes the page
+    python docs/make_scene_reference.py --check    # exit code 1 if the page is stale
+
+Descriptions, units, bounds and defaults are those of the models in hybrid/scene; to change
+the page, change them there.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from hybrid.scene.schema import Scene
+
+PAGE = Path(__file__).with_name("scene.md")
+
+HEAD = """\
+# The scene
+
+A scene is a YAML file, or the same tables in Python: `hybrid.validate_scene({...})`.
+SI units; the inertial frame has z up; arc length s is unstretched and runs from `ends.start` to `ends.end`.
+Angles are in degrees, as people write them.
+A table that is left out is not there, and a key that does not exist is refused.
+`hybrid schema` prints the JSON schema, with which editors complete and check a scene as you type;
+`hybrid run scene.yaml --set time.step=0.005` changes a value without touching the file.
+
+This page is made from that schema by `python docs/make_scene_reference.py`.
+
+```yaml
+title: Two sections, hung between two points, one of them moving
+environment:
+  fluid: {density: 1025, current: [0.3, 0, 0]}
+cable:
+  sections:
+    - {length: 20, mass: 2.0, diameter: 0.03, bending_stiffness: 40, drag: {normal: 1.2}}
+    - {length: 80, mass: 0.8, diameter: 0.02, axial_stiffness: 2.0e+6, drag: {normal: 1.2}, added_mass: {normal: 1.0}}
+ends:
+  start: {kind: clamped, position: [0, 0, -60], tangent: [1, 0, 1]}
+  end: {kind: pinned, position: [70, 0, 0], motion: {heave: {amplitude: 0.5, period: 8.0}, ramp: 16.0}}
+initial: equilibrium
+model: {kind: zones, zones: [{rod: 20, cells: 40, ratio: 2.0}, {catenary: 80}]}
+time: {duration: 60.0, step: 0.02}
+output: {every: 0.2, history: [0, 20, 100]}
+```
+"""
+
+TAIL = """\
+## What is refused
+
+Everything below is said at once, with file, line, column, the value, what was expected and what to try:
+unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
+cable is long; zones that do not add up to the length; a rod zone over a section without bending stiffness; drag,
+added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
+an initial shape that misses a held end; a normal along its tangent.
+
+## Motion files
+
+A CSV file whose first line names its columns, `t,x,y,z` or `t,rx,ry,rz` or all seven: time in s, position in m
+(inertial, absolute), rotation vector in degrees counted from the end's own frame.  Lines that begin with `#` are
+skipped.  It must begin at or before t = 0, cover the duration, have 12 samples a period or more, start from rest
+where the end is held, and be smooth: a jump of velocity is refused with the time at which it happens.
+Between samples the motion is a cubic spline with continuous acceleration.
+"""
+
+
+def words(schema: dict[str, Any]) -> str:
+    """What a value may be, in words."""
+    arms = [arm for key in ("anyOf", "oneOf") for arm in schema.get(key, []) if arm.get("type") != "null"]
+    if arms:
+        return " or ".join(dict.fromkeys(words(arm) for arm in arms))
+    if "$ref" in schema:
+        name = schema["$ref"].rsplit("/", 1)[-1]
+        return f"[{name}](#{name.lower()})"
+    if "const" in schema:
+        return f"`{schema['const']}`"
+    if "enum" in schema:
+        return " or ".join(f"`{value}`" for value in schema["enum"])
+    kind = schema.get("type")
+    if kind == "array":
+        if "prefixItems" in schema:
+            return f"{schema['minItems']} numbers{bounds(schema['prefixItems'][0])}"
+        least = schema.get("minItems", 0)
+        return f"list of {words(schema['items'])}" + (f", at least {least}" if least > 1 else "")
+    if kind in ("number", "integer"):
+        return ("number" if kind == "number" else "whole number") + bounds(schema)
+    return {"string": "text", "boolean": "`true` or `false`"}.get(str(kind), str(kind))
+
+
+def bounds(schema: dict[str, Any]) -> str:
+    signs = {"gt": ">", "exclusiveMinimum": ">", "ge": "≥", "minimum": "≥", "lt": "<", "le": "≤", "maximum": "≤"}
+    said = [f"{sign} {schema[key]:g}" for key, sign in signs.items() if key in schema]
+    return " " + " and ".join(said) if said else ""
+
+
+def default(name: str, schema: dict[str, Any], required: list[str]) -> str:
+    if name in required:
+        return "**required**"
+    value = schema.get("default")
+    if "const" in schema or value is None or value == "" or isinstance(value, dict):
+        return ""
+    return f"`{json.dumps(value)}`".replace('"', "")
+
+
+def unit(description: str) -> tuple[str, str]:
+    """The description without its unit, and the unit; units stand in brackets at the end."""
+    if not description.endswith("]"):
+        return description, ""
+    text, _, measure = description[:-1].rpartition(" [")
+    return text, "" if measure == "-" else measure
+
+
+def table(schema: dict[str, Any]) -> Iterator[str]:
+    yield "| key | value | unit | default | meaning |"
+    yield "|---|---|---|---|---|"
+    for name, field in schema["properties"].items():
+        text, measure = unit(field.get("description", ""))
+        cells = (f"`{name}`", words(field), measure, default(name, field, schema.get("required", [])), text)
+        yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
+
+
+def referred(schema: Any) -> Iterator[str]:
+    """Names of the tables a schema refers to, in the order they are met."""
+    if isinstance(schema, dict):
+        if "$ref" in schema:
+            yield schema["$ref"].rsplit("/", 1)[-1]
+        for value in schema.values():
+            yield from referred(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            yield from referred(value)
+
+
+def page() -> str:
+    """The whole page."""
+    schema = Scene.model_json_schema()
+    tables = schema.pop("$defs")
+    order: list[str] = []
+
+    def visit(name: str) -> None:
+        if name not in order:
+            order.append(name)
+            for inner in referred(tables[name]["properties"]):
+                visit(inner)
+
+    for name in referred(schema["properties"]):
+        visit(name)
+    lines = [HEAD, "## Scene", "", schema["description"], "", *table(schema), ""]
+    for name in order:
+        lines += [f"### {name}", "", " ".join(tables[name]["description"].split()), "", *table(tables[name]), ""]
+    return "\n".join([*lines, TAIL])
+
+
+def main(arguments: list[str]) -> int:
+    text = page()
+    if "--check" in arguments:
+        return 0 if PAGE.is_file() and PAGE.read_text(encoding="utf-8") == text else 1
+    PAGE.write_text(text, encoding="utf-8")
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(sys.argv[1:]))

@@ -1,0 +1,107 @@
+"""The production solver against the arbiter: two methods that share nothing but the scene.
+
+Both are of second order, with different constants; so their difference must fall by four
+when mesh and step are halved, and its Richardson limit must vanish.  In statics the
+extrapolated answers agree far better than either alone; in motion the difference itself
+is bounded.
+The lines are short: the arbiter loses a digit for every 2.3 lengths sqrt(EI/T) of rod.
+"""
+
+import numpy as np
+import pytest
+
+import hybrid
+
+# Discretisation of fourth order at 80 and 160 cells on the sharpest bend here (the clamp).
+PLACE, TENSION, MOMENT = 1e-7, 2e-4, 1e-6  # of the length, the applied force, the moment
+
+ZONES = {
+    "rod": [("rod", 1.0)],
+    "catenary": [("catenary", 1.0)],
+    "rod-catenary": [("rod", 0.4), ("catenary", 0.6)],
+    "catenary-rod": [("catenary", 0.6), ("rod", 0.4)],
+    "catenary-rod-catenary": [("catenary", 0.3), ("rod", 0.4), ("catenary", 0.3)],
+    "rod-catenary-rod": [("rod", 0.3), ("catenary", 0.4), ("rod", 0.3)],
+}
+
+
+def scene(zones, cells, solver, **changes):
+    section = {
+        "length": 1.0, "mass": 0.1, "diameter": 0.01, "bending_stiffness": 0.5, "torsional_stiffness": 0.4,
+        "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0}, "damping": 0.5,
+    }  # fmt: skip
+    data = {
+        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0, "current": [0.0, 2.0, 0.5]}},
+        "cable": {"sections": [section]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0.3, -0.2]},
+            "end": {"kind": "free", "force": [20.0, 3.0, 2.0]},
+        },
+        "initial": {"kind": "equilibrium", "direction": [1, 0.1, 0.1]},
+        "model": {"kind": "zones", "zones": [{kind: x, "cells": max(2, round(x * cells))} for kind, x in zones]},
+        "output": {"points": 11},
+        "solver": solver,
+    }
+    return hybrid.validate_scene(data | changes)
+
+
+def limit(values):
+    """Richardson's limit from values at h and h/2 of a second-order method."""
+    coarse, fine = values
+    return (4.0 * fine - coarse) / 3.0
+
+
+@pytest.mark.parametrize("zones", ZONES)
+def test_statics(zones):
+    found = {
+        solver: [hybrid.static(scene(ZONES[zones], cells, solver)) for cells in (80, 160)]
+        for solver in ("elimination", "shooting")
+    }
+    for name, unit in (("position", 1.0), ("tension", 20.0)):
+        a, b = (limit([r[name][0] for r in found[s]]) for s in ("elimination", "shooting"))
+        inner = slice(None) if name == "position" else [i for i in range(11) if i not in joints(ZONES[zones])]
+        apart = np.abs(a - b)[inner].max() / unit
+        direct = np.abs(found["elimination"][1][name][0] - found["shooting"][1][name][0])[inner].max() / unit
+        print(f"{zones}: {name} apart by {direct:.1e} at 160 cells, {apart:.1e} extrapolated")
+        assert apart < (PLACE if name == "position" else TENSION)
+    if "rod" in zones:
+        moments = [limit([np.linalg.norm(r.bending_moment[0][1:3]) for r in found[s]]) for s in found]
+        print(f"{zones}: moments {moments}")
+        assert abs(moments[0] - moments[1]) <= MOMENT * max(moments[1], 1.0)
+
+
+def joints(zones):
+    """Output points that lie on a joint, where tension has two values."""
+    bounds = np.cumsum([x for _, x in zones])[:-1]
+    return [round(10 * x) for x in bounds]
+
+
+@pytest.mark.parametrize("zones", ZONES)
+def test_motion(zones):
+    """From equilibrium, with a start that heaves: mesh and step halved together."""
+    motion = {"heave": {"amplitude": 0.05, "period": 0.4}, "sway": {"amplitude": 0.03, "period": 0.5}, "ramp": 0.4}
+    kind = "clamped" if zones.startswith("rod") else "pinned"
+    start = {"kind": kind, "position": [0, 0, 0], "motion": motion}
+    if kind == "clamped":
+        start["tangent"] = [1, 0.3, -0.2]
+    ends = {"start": start, "end": {"kind": "free", "force": [20.0, 3.0, 2.0]}}
+    apart = []
+    for cells, step in ((20, 0.02), (40, 0.01)):
+        a, b = (
+            hybrid.run(
+                scene(
+                    ZONES[zones],
+                    cells,
+                    solver,
+                    ends=ends,
+                    time={"duration": 0.6, "step": step},
+                    output={"every": 0.2, "points": 11},
+                )
+            )
+            for solver in ("elimination", "shooting")
+        )
+        assert np.abs(a.times - b.times).max() < 1e-9
+        apart.append(np.abs(a.position - b.position).max())
+    print(f"{zones}: apart by {apart[0]:.1e} and {apart[1]:.1e} m, ratio {apart[0] / apart[1]:.2f}")
+    assert apart[1] < 2e-3
+    assert 2.5 < apart[0] / apart[1] < 7.0

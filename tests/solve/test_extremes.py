@@ -1,0 +1,147 @@
+"""The march at the extremes of size and stiffness, against LAPACK on the same equations.
+
+Lines of 1 km, 1 km away from the origin, 10 to 20 000 cells, EI from 1e-9 to 1e6 N m2, in
+statics and dynamics.  The bound on agreement is 1e-9 of the largest correction, or the
+round-off that bending costs in double precision, where that is more: the element sees
+EI/h^3 beside T/h, and a linear solve loses (EI/(T h^2)) (L/h)^2 eps; the last case here
+(EI = 1e6, h = 5 cm) loses seven digits in either solver, and Newton mends them.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+from scipy.linalg import solve_banded
+
+import hybrid
+from hybrid.model.build import build
+from hybrid.solve.blocks import SIZE, WIDTH, substitute
+from hybrid.solve.march import march
+from hybrid.solve.statics import solve_statics
+from hybrid.solve.timestep import Stepper
+
+LENGTH, FAR = 1000.0, 1000.0
+EPS = 2.2e-16
+
+
+def hanging(kind, cells, stiffness):
+    part = max(3, 3 * cells // 10)
+    zones = {
+        "rod": [{"rod": LENGTH, "cells": cells}],
+        "catenary": [{"catenary": LENGTH, "cells": cells}],
+        "hybrid": [
+            {"rod": 300.0, "cells": part},
+            {"catenary": 400.0, "cells": cells - 2 * part},
+            {"rod": 300.0, "cells": part},
+        ],
+    }[kind]
+    return hybrid.validate_scene(
+        {
+            "cable": {"sections": [{"length": LENGTH, "mass": 1.0, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}]},
+            "ends": {
+                "start": {"kind": "pinned", "position": [FAR, FAR, FAR]},
+                "end": {"kind": "pinned", "position": [FAR + 900.0, FAR, FAR + 100.0]},
+            },
+            "initial": {"kind": "equilibrium"},
+            "model": {"kind": "zones", "zones": zones},
+        }
+    )  # fmt: skip
+
+
+def banded(rows, tension):
+    """The block rows of the march as LAPACK wants them: in bands, tensions in units of `tension`, rows of size one."""
+    n = rows.shape[0]
+    blocks = rows.reshape(n, SIZE, WIDTH).copy()
+    blocks[:, :, [0, 5, 10, 15]] *= tension
+    blocks /= np.abs(blocks[:, :, :-1]).max(axis=2, keepdims=True)
+    low, up = 14, 13
+    ab = np.zeros((low + up + 1, SIZE * n))
+    i = np.arange(n)
+    for k, c in itertools.product(range(SIZE), range(WIDTH - 1)):
+        column, row = SIZE * (i - 2) + (c if c < 20 else c + 1), SIZE * i + k
+        inside = (column >= 0) & (column < SIZE * n) & (blocks[:, k, c] != 0)
+        ab[up + row[inside] - column[inside], column[inside]] += blocks[inside, k, c]
+    return (low, up), ab, blocks[:, :, -1].ravel()
+
+
+def disagreement(model, state, cv, ca):
+    """March against LAPACK for one Newton system, relative to the largest correction of each kind of unknown."""
+    stepper = Stepper(model.line, model.length, model.tension_scale, False)
+    rows = np.zeros((model.line.s.size, SIZE * WIDTH))
+    u = np.zeros_like(state.r)
+    march(
+        model.line, model.ends.at(0.0), state.e, u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+        cv, ca, stepper.gaps, stepper.W, stepper.X, stepper.report, rows,
+    )  # fmt: skip
+    assert substitute(stepper.X, stepper.x)
+    bands, ab, rhs = banded(rows, model.tension_scale)
+    reference = solve_banded(bands, ab, rhs).reshape(-1, SIZE)
+    reference[:, 0] *= model.tension_scale
+    return max(np.abs((stepper.x - reference)[:, k]).max() / np.abs(reference[:, k]).max() for k in (0, slice(1, 4)))
+
+
+@pytest.mark.parametrize("stiffness", [1e-9, 1e-3, 1e3, 1e6])
+@pytest.mark.parametrize("cells", [10, 100, 1000, pytest.param(20_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("kind", ["rod", "catenary", "hybrid"])
+def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
+    if kind == "catenary" and stiffness != 1e-9:
+        pytest.skip("bending does not matter to a catenary")
+    model = build(hanging(kind, cells, stiffness))
+    line = model.line
+    found = solve_statics(line, model.ends.at(0.0), model.start, model.length, model.tension_scale)
+    h, tension = LENGTH / cells, 5600.0
+    # relative to the weight: what is out of balance is round-off of moments EI/h^2 per node at worst
+    assert found.residual < 1e-9 * model.tension_scale + 100 * EPS * stiffness / h**2
+
+    # a Newton system far from its solution: a wavy line of the right length, and one step of time
+    wavy = model.start.copy()
+    wavy.e[:, 2] += 0.3 * line.h * np.sin(np.linspace(0, 6, cells))
+    wavy.e[:] *= (line.h / np.linalg.norm(wavy.e, axis=1))[:, None]
+    bound = 1e-9 + EPS * max(1.0, stiffness / (tension * h**2)) * (LENGTH / h) ** 2
+    static = disagreement(model, wavy, 0.0, 0.0)
+    moving = disagreement(model, wavy, 200.0, 4e4)
+    print(f"{kind}, {cells} cells, EI {stiffness:g}: residual {found.residual:.1e} N, LAPACK {static:.1e} {moving:.1e}")
+    assert static < bound
+    assert moving < (1e-9 if cells <= 1000 else 1e-8)
+
+    stepper = Stepper(line, model.length, model.tension_scale, True)
+    state = found.state.copy()
+    state.v[:, 1] = np.sin(np.pi * line.s / LENGTH)
+    stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), state)
+    new = state.copy()
+    for _ in range(5):
+        taken = stepper.step(model.ends.at(0.0), state, new, 0.01, 0.5)
+        assert taken.outcome == 0 and taken.iterations <= 4
+        state, new = new, state
+
+
+@pytest.mark.parametrize("stiffness", [0.1, 1.0, 10.0])
+@pytest.mark.parametrize("tension", [1e4, 1e2, 1.0])
+def test_long_line_at_low_tension(stiffness, tension):
+    """1000 m, 5000 cells, pulled by `tension`: at most four iterations a step."""
+    scene = hybrid.validate_scene(
+        {
+            "environment": {"gravity": 0.0},
+            "cable": {"sections": [{"length": 1000.0, "mass": 0.5, "bending_stiffness": stiffness, "torsional_stiffness": stiffness}]},
+            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [tension, 0, 0]}},
+            "initial": {"kind": "straight", "direction": [1, 0, 0]},
+            "model": {"kind": "rod"},
+            "mesh": {"cells": 5000},
+            "time": {"duration": 1.0, "step": 0.01},
+        }
+    )  # fmt: skip
+    model = build(scene)
+    stepper = Stepper(model.line, model.length, model.tension_scale, True)
+    state = model.start.copy()
+    x = model.line.s / 1000.0
+    state.v[:, 1], state.v[:, 2] = np.sin(3 * np.pi * x) * x, 0.3 * np.sin(5 * np.pi * x) * x
+    stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), state)
+    new = state.copy()
+    most = 0
+    for _ in range(50):
+        taken = stepper.step(model.ends.at(0.0), state, new, 0.01, 0.5)
+        assert taken.outcome == 0
+        most = max(most, taken.iterations)
+        state, new = new, state
+    print(f"EI {stiffness}, T {tension}: at most {most} iterations a step")
+    assert most <= 4

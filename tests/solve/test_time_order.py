@@ -1,0 +1,59 @@
+"""Order in time: two for positions and tensions, for rod, catenary and hybrid.
+
+Self-convergence of a sagging line whose end moves smoothly in three dimensions, in water.
+Norm: root mean square over outputs and arc length.  Two-sided: an order of three would mean
+that the test measures something else.
+"""
+
+import numpy as np
+import pytest
+
+import hybrid
+
+MODELS = {
+    "rod": {"kind": "zones", "zones": [{"rod": 2.0, "cells": 40}]},
+    "catenary": {"kind": "zones", "zones": [{"catenary": 2.0, "cells": 40}]},
+    "hybrid": {
+        "kind": "zones",
+        "zones": [{"catenary": 0.7, "cells": 14}, {"rod": 0.6, "cells": 12}, {"catenary": 0.7, "cells": 14}],
+    },
+}
+
+
+def scene(model, step, rho):
+    section = {
+        "length": 2.0, "mass": 0.5, "diameter": 0.02, "bending_stiffness": 0.002, "torsional_stiffness": 0.0016,
+        "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    motion = {
+        "heave": {"amplitude": 0.1, "period": 2.5},
+        "sway": {"amplitude": 0.1, "period": 3.1, "phase": 40},
+        "ramp": 2.0,
+    }
+    return hybrid.validate_scene(
+        {
+            "environment": {"gravity": 9.81, "fluid": {"density": 1000.0}},
+            "cable": {"sections": [section]},
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, 0]},
+                "end": {"kind": "pinned", "position": [1.2, 0.3, 0.2], "motion": motion},
+            },
+            "initial": {"kind": "equilibrium"},
+            "model": MODELS[model],
+            "time": {"duration": 2.0, "step": step, "rho_inf": rho},
+            "output": {"every": 0.1},
+        }
+    )
+
+
+@pytest.mark.parametrize("rho", [0.5, 0.8])
+@pytest.mark.parametrize("model", MODELS)
+def test_second_order(model, rho):
+    results = [hybrid.run(scene(model, step, rho)) for step in (0.02, 0.01, 0.005, 0.0025)]
+    orders = {}
+    for name in ("position", "tension"):
+        change = [np.sqrt(np.mean((a[name] - b[name]) ** 2)) for a, b in zip(results, results[1:], strict=False)]
+        orders[name] = [float(np.log2(a / b)) for a, b in zip(change, change[1:], strict=False)]
+    print(f"{model}, rho_inf {rho}: order {orders}")
+    assert np.abs(np.array(orders["position"]) - 2.0).max() < 0.2
+    assert 1.8 <= min(orders["tension"]) and max(orders["tension"]) < 2.5
