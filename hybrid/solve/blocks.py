@@ -27,29 +27,42 @@ ROW = SIZE * SPAN  # numbers of X_i
 
 
 @inner
-def take(W, o, skip, X, p, l0, l1, l2, l3, l4):
-    """Subtract l . X_p (5 rows of 9) from the row of W whose block begins at o; positions follow at o + 5 + skip."""
-    q1, q2, q3, q4 = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
-    t0 = W[o] - l0 * X[p] - l1 * X[q1] - l2 * X[q2] - l3 * X[q3] - l4 * X[q4]
-    t1 = W[o + 1] - l0 * X[p + 1] - l1 * X[q1 + 1] - l2 * X[q2 + 1] - l3 * X[q3 + 1] - l4 * X[q4 + 1]
-    t2 = W[o + 2] - l0 * X[p + 2] - l1 * X[q1 + 2] - l2 * X[q2 + 2] - l3 * X[q3 + 2] - l4 * X[q4 + 2]
-    t3 = W[o + 3] - l0 * X[p + 3] - l1 * X[q1 + 3] - l2 * X[q2 + 3] - l3 * X[q3 + 3] - l4 * X[q4 + 3]
-    t4 = W[o + 4] - l0 * X[p + 4] - l1 * X[q1 + 4] - l2 * X[q2 + 4] - l3 * X[q3 + 4] - l4 * X[q4 + 4]
-    s = o + 5 + skip
-    t5 = W[s] - l0 * X[p + 5] - l1 * X[q1 + 5] - l2 * X[q2 + 5] - l3 * X[q3 + 5] - l4 * X[q4 + 5]
-    t6 = W[s + 1] - l0 * X[p + 6] - l1 * X[q1 + 6] - l2 * X[q2 + 6] - l3 * X[q3 + 6] - l4 * X[q4 + 6]
-    t7 = W[s + 2] - l0 * X[p + 7] - l1 * X[q1 + 7] - l2 * X[q2 + 7] - l3 * X[q3 + 7] - l4 * X[q4 + 7]
+def take(W, o, X, i, l1, l2, l3, l4):
+    """Subtract (l1..l3, l4) . (dr, dpsi rows of X_i) from the row of W whose block i+1 begins at column o.
+
+    All is read before anything is written, here and below: that leaves the compiler free.
+    Returns what is to be taken from the right-hand side.
+    """
+    p = i * ROW + SPAN
+    q, s, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN
+    t0 = W[o] - l1 * X[p] - l2 * X[q] - l3 * X[s] - l4 * X[v]
+    t1 = W[o + 1] - l1 * X[p + 1] - l2 * X[q + 1] - l3 * X[s + 1] - l4 * X[v + 1]
+    t2 = W[o + 2] - l1 * X[p + 2] - l2 * X[q + 2] - l3 * X[s + 2] - l4 * X[v + 2]
+    t3 = W[o + 3] - l1 * X[p + 3] - l2 * X[q + 3] - l3 * X[s + 3] - l4 * X[v + 3]
+    t4 = W[o + 4] - l1 * X[p + 4] - l2 * X[q + 4] - l3 * X[s + 4] - l4 * X[v + 4]
+    t5 = W[o + 6] - l1 * X[p + 5] - l2 * X[q + 5] - l3 * X[s + 5] - l4 * X[v + 5]
+    t6 = W[o + 7] - l1 * X[p + 6] - l2 * X[q + 6] - l3 * X[s + 6] - l4 * X[v + 6]
+    t7 = W[o + 8] - l1 * X[p + 7] - l2 * X[q + 7] - l3 * X[s + 7] - l4 * X[v + 7]
     W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
-    W[s], W[s + 1], W[s + 2] = t5, t6, t7
-    return l0 * X[p + 8] + l1 * X[q1 + 8] + l2 * X[q2 + 8] + l3 * X[q3 + 8] + l4 * X[q4 + 8]
+    W[o + 6], W[o + 7], W[o + 8] = t5, t6, t7
+    return l1 * X[p + 8] + l2 * X[q + 8] + l3 * X[s + 8] + l4 * X[v + 8]
+
+
+@inner
+def take_tension(W, o, X, i, l0):
+    """As `take` for the dT row of X_i."""
+    p = i * ROW
+    t0, t1, t2 = W[o] - l0 * X[p], W[o + 1] - l0 * X[p + 1], W[o + 2] - l0 * X[p + 2]
+    t3, t4, t5 = W[o + 3] - l0 * X[p + 3], W[o + 4] - l0 * X[p + 4], W[o + 6] - l0 * X[p + 5]
+    t6, t7 = W[o + 7] - l0 * X[p + 6], W[o + 8] - l0 * X[p + 7]
+    W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4] = t0, t1, t2, t3, t4
+    W[o + 6], W[o + 7], W[o + 8] = t5, t6, t7
+    return l0 * X[p + 8]
 
 
 @inner
 def row_minus(W, o, p, f):
-    """Subtract f times the row of W at p from the row at o, over the pivot block and all to its right.
-
-    All is read before anything is written: that is what lets the compiler use vectors.
-    """
+    """Subtract f times the row of W at p from the row at o, over the pivot block and all to its right."""
     t0 = W[o + 10] - f * W[p + 10]
     t1 = W[o + 11] - f * W[p + 11]
     t2 = W[o + 12] - f * W[p + 12]
@@ -81,41 +94,31 @@ def row_minus(W, o, p, f):
 
 
 @inner
-def row_times(W, o, f):
-    """Multiply the same part of the row at o by f."""
-    t0 = f * W[o + 10]
-    t1 = f * W[o + 11]
-    t2 = f * W[o + 12]
-    t3 = f * W[o + 13]
-    t4 = f * W[o + 14]
-    t5 = f * W[o + 15]
-    t6 = f * W[o + 16]
-    t7 = f * W[o + 17]
-    t8 = f * W[o + 18]
-    t9 = f * W[o + 19]
-    t10 = f * W[o + 20]
-    t11 = f * W[o + 21]
-    t12 = f * W[o + 22]
-    t13 = f * W[o + 23]
-    W[o + 10] = t0
-    W[o + 11] = t1
-    W[o + 12] = t2
-    W[o + 13] = t3
-    W[o + 14] = t4
-    W[o + 15] = t5
-    W[o + 16] = t6
-    W[o + 17] = t7
-    W[o + 18] = t8
-    W[o + 19] = t9
-    W[o + 20] = t10
-    W[o + 21] = t11
-    W[o + 22] = t12
-    W[o + 23] = t13
+def solved_minus(X, x, y, f):
+    """Subtract f times the solved row of X at y from that at x."""
+    t0 = X[x] - f * X[y]
+    t1 = X[x + 1] - f * X[y + 1]
+    t2 = X[x + 2] - f * X[y + 2]
+    t3 = X[x + 3] - f * X[y + 3]
+    t4 = X[x + 4] - f * X[y + 4]
+    t5 = X[x + 5] - f * X[y + 5]
+    t6 = X[x + 6] - f * X[y + 6]
+    t7 = X[x + 7] - f * X[y + 7]
+    t8 = X[x + 8] - f * X[y + 8]
+    X[x] = t0
+    X[x + 1] = t1
+    X[x + 2] = t2
+    X[x + 3] = t3
+    X[x + 4] = t4
+    X[x + 5] = t5
+    X[x + 6] = t6
+    X[x + 7] = t7
+    X[x + 8] = t8
 
 
 @inner
-def pivot(W):
-    """Gauss-Jordan on the five rows of W with pivoting inside the block; False when the block is singular.
+def solve_block(W, X, i):
+    """X_i from the five rows of W, with pivoting inside the block; False when the block is singular.
 
     A cofactor inverse would lose eps (k_axial/k_transverse)^2.
     """
@@ -131,10 +134,18 @@ def pivot(W):
             p = where * WIDTH
             for j in range(10, WIDTH):
                 W[o + j], W[p + j] = W[p + j], W[o + j]
-        row_times(W, o, 1.0 / W[o + 10 + c])
-        for r in range(SIZE):
-            if r != c:
-                row_minus(W, r * WIDTH, o, W[r * WIDTH + 10 + c])
+        inverse = 1.0 / W[o + 10 + c]
+        for r in range(c + 1, SIZE):
+            row_minus(W, r * WIDTH, o, W[r * WIDTH + 10 + c] * inverse)
+    for c in range(SIZE - 1, -1, -1):
+        o, x = c * WIDTH, i * ROW + c * SPAN
+        for j in range(SPAN):
+            X[x + j] = W[o + 15 + j]
+        for r in range(c + 1, SIZE):
+            solved_minus(X, x, i * ROW + r * SPAN, W[o + 10 + r])
+        inverse = 1.0 / W[o + 10 + c]
+        for j in range(SPAN):
+            X[x + j] *= inverse
     return True
 
 
@@ -142,22 +153,17 @@ def pivot(W):
 def eliminate_wide(W, X, i):
     """Eliminate block row i (5 unknowns); False when the block is singular."""
     if i >= 2:
-        p = (i - 2) * ROW
         for r in range(1, 4):  # only the balance of the node reaches back to block i-2
             o = r * WIDTH
-            W[o + 23] -= take(W, o + 5, 1, X, p, W[o], W[o + 1], W[o + 2], W[o + 3], W[o + 4])
+            W[o + 23] -= take(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
     if i >= 1:
-        p = (i - 1) * ROW
-        for r in range(5):
+        for r in range(SIZE):
             o = r * WIDTH
-            W[o + 23] -= take(W, o + 10, 1, X, p, W[o + 5], W[o + 6], W[o + 7], W[o + 8], W[o + 9])
-    if not pivot(W):
-        return False
-    x = i * ROW
-    for r in range(5):
-        for j in range(SPAN):
-            X[x + SPAN * r + j] = W[r * WIDTH + 15 + j]
-    return True
+            l0 = W[o + 5]
+            W[o + 23] -= take(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
+            if l0 != 0.0:  # the balance of the node, through block i-2
+                W[o + 23] -= take_tension(W, o + 10, X, i - 1, l0)
+    return solve_block(W, X, i)
 
 
 @inner
