@@ -68,6 +68,7 @@ class Outcome(IntEnum):
     SLACK = 4
     TURNED_TOO_FAR = 5
     UNSTABLE = 6
+    GAINS_ENERGY = 7
 
     @property
     def cause(self) -> str:
@@ -85,6 +86,7 @@ _CAUSE = {
     Outcome.SINGULAR: "the equations have no unique solution: something can move without resistance",
     Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
     Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
+    Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
 }
 
@@ -95,6 +97,7 @@ _REMEDY = {
     Outcome.SINGULAR: "hold the cable at one end at least, or give it a force, tension or bending stiffness",
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
+    Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
     Outcome.UNSTABLE: "start from another shape (initial.direction, initial.points), or run the motion with damping",
 }
 

@@ -158,7 +158,7 @@ CONSTANTS = (
     ("solve.timestep", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
     ("solve.timestep", "UNRESOLVED_BEND", 1.0, "1 rad per cell"),
     ("solve.timestep", "HEAVY", 1e36, "10³⁶ 1/s²"),
-    ("simulate", "HALVINGS", 10, "| halvings of a step | 10 |"),
+    ("motion", "HALVINGS", 10, "| halvings of a step | 10 |"),
     ("model.mesh", "DEFAULT_CELLS", 100, "| cells of a silent scene | 100 |"),
 )
 

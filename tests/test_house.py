@@ -41,7 +41,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/export": ("errors", "results/read"),
     "results/record": ("errors", "results/read"),
     "results/probes": ("errors", "physics", "model", "solve", "results/record"),
-    "simulate": ("errors", "scene", "physics", "model", "solve", "adapt", "results", "arbitrate", "live"),
+    "motion": ("errors", "scene", "model", "solve", "adapt", "results"),
+    "simulate": ("errors", "scene", "model", "solve", "adapt", "results", "motion", "arbitrate", "live"),
     "arbitrate": ("errors", "scene", "model", "solve/shooting", "results"),
     "live": ("errors", "compiled", "results", "model", "simulate", ""),
     "cli": ("errors", "scene", "model", "results", "simulate", "live", "compiled", ""),
@@ -51,7 +52,18 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 # Packages from outside that only these places may import.  A scene has no arrays; its motions and the records
 # they are read from are functions of time and need some.
 ONLY = {
-    "numpy": ("physics", "model", "solve", "adapt", "results", "simulate", "arbitrate", "scene/motion", "scene/record"),
+    "numpy": (
+        "physics",
+        "model",
+        "solve",
+        "adapt",
+        "results",
+        "motion",
+        "simulate",
+        "arbitrate",
+        "scene/motion",
+        "scene/record",
+    ),
     "scipy": ("model", "solve", "adapt", "results", "scene/motion", "scene/record"),
     "numba": ("compiled",),
     "h5py": ("results/record", "results/read"),

@@ -81,7 +81,7 @@ def tension_scale(scene: Scene, sections: Sequence[Section]) -> float:
         for name, arm in (("force", 1.0), ("moment", length)):
             load = getattr(end, name, None)
             if load is not None:
-                candidates.append(float(np.linalg.norm(getattr(load, "value", load))) / arm)
+                candidates.append(float(np.abs(getattr(load, "value", load)).max()) / arm)
         motion = getattr(end, "motion", None)
         if motion is not None:
             parts = [getattr(motion, x) for x in ("surge", "sway", "heave")]

@@ -134,6 +134,8 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
     for it in range(1, most + 1):
         bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
+            if not report[15] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
+                return NOT_FINITE, it, left, int(report[16])
             return SINGULAR, it, left, bad
         if not substitute(X, x):
             return NOT_FINITE, it, left, first_bad(x, e)

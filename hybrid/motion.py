@@ -1,0 +1,233 @@
+"""A cable in motion: its state, the work done on it, and what is watched at every step."""
+
+from __future__ import annotations
+
+import io
+import tempfile
+import time as clock
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ComputationError, Outcome
+from hybrid.model.build import Model
+from hybrid.model.state import Floats
+from hybrid.results.probes import Observer
+from hybrid.results.record import Recorder
+from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
+from hybrid.solve.statics import Equilibrium
+from hybrid.solve.step import sharpest, slackest
+from hybrid.solve.timestep import POWERS, SLACK_FLOOR, UNRESOLVED_BEND, Stepper, Taken
+
+HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
+# Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
+# noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
+GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
+
+
+class Motion:
+    """A cable in motion: its state, the work done on it, and what to do when a step fails."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        model: Model,
+        observer: Observer,
+        recorder: Recorder,
+        target: Path | io.BytesIO,
+        equilibrium: Equilibrium | None,
+    ) -> None:
+        assert scene.time is not None
+        self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
+        self.stepper = Stepper(model.line, model.length, model.tension_scale, model.slack == "stop")
+        self.t, self.steps, self.iterations = 0.0, 0, 0
+        self.cpu = clock.process_time()
+        self.work = np.zeros(len(POWERS))
+        self.worst_bend = UNRESOLVED_BEND  # rad; worse ones are noted
+        self.gain_noted = GAIN_NOTED
+        self.most_put_in = self.potential_before = self.alive_before = 0.0  # J
+        self.slackest = SLACK_FLOOR * model.tension_scale  # N; slacker cells are noted where the scene asks to go on
+        if equilibrium is None:
+            self.state = model.start.copy()
+            self._bring_ends_in()
+            self._ignite()
+        else:
+            self.state = equilibrium.state.copy()
+            self.stepper.report[:] = equilibrium.report
+        self.spare = self.state.copy()
+        self.power = self._powers()
+        if scene.time.rho_inf == 1.0 and not model.line.ck.all():
+            text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
+            recorder.event(0.0, 0.0, model.length, "undamped", text)
+
+    def advance(self, until: float) -> None:
+        """To the time `until`: in one step if all is well, else in halves of halves."""
+        assert self.scene.time is not None
+        dt = until - self.t
+        smallest = dt * 0.5**HALVINGS
+        repeats = wasted = 0
+        while self.t < until:
+            end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
+            ends = self.model.ends.at(end)
+            taken = self.stepper.step(ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf)
+            if taken.outcome == Outcome.OK:
+                self._accept(taken, end, repeats, wasted)
+                wasted = 0
+            elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
+                # A slack catenary is no matter of the step: its answer would be grid noise at any dt.
+                self._stop(taken, end - self.t)
+            else:
+                wasted += taken.iterations
+                repeats += 1
+                dt *= 0.5
+
+    def save(self) -> None:
+        """Write an output."""
+        ends = self.model.ends.at(self.t)
+        values = self.observer.values(ends, self.state, self.stepper.report, self.work)
+        self.recorder.save(self.t, values, self.observer.zone_rows)
+        self._watch_energy(values)
+
+    def restart(self) -> None:
+        """A load has just stopped: accelerations jump, so find consistent ones."""
+        self.model.ends.set_loads(self.t)
+        self._ignite()
+        self.power = self._powers()
+
+    def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:
+        dt = end - self.t
+        self.state, self.spare = self.spare, self.state
+        self.t, self.steps, self.iterations = end, self.steps + 1, taken.iterations
+        power = self._powers()
+        self.work += 0.5 * dt * (self.power + power)
+        self.power = power
+        self._watch_bends()
+        if self.model.slack == "warn":
+            self._watch_slack()
+        self.recorder.log(
+            {
+                "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
+                "residual": taken.residual, "repeats": repeats, "cpu": clock.process_time() - self.cpu,
+            }
+        )  # fmt: skip
+
+    def _watch_bends(self) -> None:
+        """Note a bend that the mesh cannot resolve: when it shows first, and whenever it is half as bad again."""
+        angle, node = sharpest(self.model.line, self.state.e)
+        if angle > self.worst_bend:
+            note_bend(self.recorder, self.model, self.t, angle, node)
+            self.worst_bend = 1.5 * angle
+
+    def _watch_energy(self, values: Mapping[str, Any]) -> None:
+        """No scheme may create energy: note it when it shows, stop when it is as much as all that was put in."""
+        gained = float(values["work/scheme"])
+        fell = abs(float(values["energy/potential"]) - self.potential_before)
+        alive = sum(float(values[x]) for x in values if x.startswith("energy/")) - float(values["energy/potential"])
+        if self.t == 0.0:
+            self.potential_before, self.alive_before = float(values["energy/potential"]), alive
+            return
+        put_in = float(np.abs(self.work).sum()) + fell + self.alive_before
+        self.most_put_in = max(self.most_put_in, put_in)
+        fastest = int(np.argmax(np.abs(self.state.v).sum(axis=1)))
+        floor = 1e-9 * self.model.tension_scale * self.model.length
+        if gained > GAIN_STOPS * self.most_put_in + floor:
+            self._stop(Taken(Outcome.GAINS_ENERGY, 0, 0.0, fastest, 0.0), 0.0)
+        if gained > self.gain_noted * self.most_put_in + floor:
+            s = float(self.model.line.s[fastest])
+            part = 100 * gained / self.most_put_in
+            text = (
+                f"the computation has created {gained:.3g} J, {part:.0f} % of all put in: {Outcome.GAINS_ENERGY.remedy}"
+            )
+            self.recorder.event(self.t, s, s, "gains energy", text)
+            self.gain_noted *= 3.0
+
+    def _watch_slack(self) -> None:
+        """Note a catenary cell without tension: when it shows first, and whenever it is ten times as bad."""
+        cell = slackest(self.model.line, self.state.T, self.slackest)
+        if cell >= 0:
+            s, tension = float(self.model.line.s[cell]), float(self.state.T[cell])
+            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
+            self.recorder.event(self.t, s, float(self.model.line.s[cell + 1]), "slack", text)
+            self.slackest = min(10.0 * tension, 10.0 * self.slackest)
+
+    def _bring_ends_in(self) -> None:
+        """Tangents that the initial shape does not have are reached smoothly, and the result says so."""
+        assert self.scene.time is not None
+        model, e = self.model, self.state.e
+        d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
+        which = [bool(model.line.element[0]), bool(model.line.element[-1])]
+        duration = min(model.time_scale, 0.5 * self.scene.time.duration)
+        for k, angle in model.ends.bring_in(d, which, duration):
+            s = float(model.line.s[-k])
+            text = (
+                f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
+                f"it is turned in, and a force there grows, over the first {duration:.3g} s; "
+                f"start from an equilibrium to avoid this"
+            )
+            self.recorder.event(0.0, s, s, "turned in", text)
+
+    def _powers(self) -> Floats:
+        ends = self.model.ends
+        return self.stepper.powers(ends.values, ends.velocity, self.state)
+
+    def _ignite(self) -> None:
+        assert self.scene.time is not None
+        ends = self.model.ends
+        acceleration = ends.acceleration(self.t, 1e-3 * self.scene.time.step)
+        taken = self.stepper.ignite(ends.at(self.t), acceleration, self.state)
+        if taken.outcome != Outcome.OK:
+            self._stop(taken, 0.0)
+
+    def _stop(self, taken: Taken, dt: float) -> None:
+        """The computation cannot go on: leave the last good state on disk, and say where and why."""
+        line = self.model.line
+        where = min(max(taken.where, 0), line.s.size - 1)
+        s = float(line.s[where])
+        if taken.outcome == Outcome.SLACK:
+            detail = f"tension {self.spare.T[where]:.3g} N at the end of the step that starts there"
+        elif taken.outcome == Outcome.GAINS_ENERGY:
+            detail = f"{self.most_put_in:.3g} J were put in; the fastest point is at this place"
+        elif dt == 0.0:
+            detail = "no accelerations are consistent with the shape and the loads"
+        else:
+            detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
+        ends = self.model.ends.at(self.t + dt)
+        apart = float(np.linalg.norm(ends.position[1] - ends.position[0]))
+        if ends.held.all() and self.model.inextensible and apart >= self.model.length:
+            longest = f"the cable does not stretch beyond {self.model.length:.6g} m"
+            detail += f"; the ends are then {apart:.6g} m apart, and {longest}"
+        error = ComputationError(taken.outcome, self.t, s, detail, self._snapshot(dt, taken))
+        if self.t > self.recorder.last:
+            self.save()
+        self.recorder.event(self.t, s, s, taken.outcome.name.lower(), str(error))
+        raise error
+
+    def _snapshot(self, dt: float, taken: Taken) -> Path | None:
+        """The last good state with all that a repetition of the failed step needs; None when it cannot be written."""
+        if isinstance(self.target, Path):
+            path = self.target.with_suffix(".snapshot.npz")
+        else:
+            path = Path(tempfile.gettempdir()) / f"hybrid-{clock.strftime('%Y%m%d-%H%M%S')}.snapshot.npz"
+        content: dict[str, Any] = {"t": self.t, "dt": dt, "outcome": taken.outcome.name, "s": self.model.line.s}
+        content |= {"scene": scene_text(self.scene), **self.state._asdict()}
+        try:
+            np.savez(path, **content)
+        except OSError:
+            return None
+        return path
+
+
+def note_bend(recorder: Recorder, model: Model, t: float, angle: float, node: int) -> None:
+    """Write an event about a bend that the mesh does not resolve."""
+    s = float(model.line.s[node])
+    recorder.event(
+        t, s, s, "unresolved bend",
+        f"the rod bends by {np.degrees(angle):.0f} deg from one cell to the next at s = {s:g} m: "
+        f"curvature and moment are wrong there; cells of {model.line.hn[node] / angle * 0.3:.2g} m would resolve it",
+    )  # fmt: skip
+
+
+# --- parts of the above ---------------------------------------------------------------

@@ -1,0 +1,133 @@
+"""Failure inside the loop: found in the step, said with place, cause and remedy, and nothing lost."""
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.build import build
+from hybrid.solve.timestep import Stepper
+
+SECTION = {"length": 2.0, "mass": 0.5, "bending_stiffness": 0.01, "torsional_stiffness": 0.01}
+
+
+def scene(model="catenary", **changes):
+    """A line hanging between two points, one of which is pushed towards the other."""
+    motion = {"surge": {"amplitude": -0.4, "period": 0.8}, "ramp": 0.4}
+    data = {
+        "cable": {"sections": [SECTION]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion},
+        },
+        "initial": {"kind": "equilibrium"},
+        "model": model,
+        "mesh": {"cells": 40},
+        "time": {"duration": 2.0, "step": 0.01},
+        "output": {"every": 0.05},
+    }
+    return hybrid.validate_scene(data | changes)
+
+
+def test_a_slack_catenary_stops_the_run(tmp_path):
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(scene(), tmp_path / "run.h5")
+    error = stop.value
+    assert error.outcome is hybrid.Outcome.SLACK
+    assert 0.0 < error.t < 2.0
+    assert 0.0 <= error.s <= 2.0
+    assert "rod zone" in str(error)
+    kept = hybrid.open(tmp_path / "run.h5")
+    assert kept.status == "failed"
+    assert "tension" in kept.message
+    assert kept.times[-1] == pytest.approx(error.t)
+    assert kept.tension[:-1].min() > 0.0
+    assert [e.kind for e in kept.events] == ["slack"]
+    snapshot = np.load(error.snapshot)
+    assert float(snapshot["t"]) == error.t
+    assert snapshot["r"].shape == (41, 3)
+    assert hybrid.parse_scene(str(snapshot["scene"])) == scene()
+
+
+def test_slack_can_be_asked_to_warn():
+    result = hybrid.run(scene({"kind": "catenary", "slack": "warn"}, time={"duration": 0.8, "step": 0.01}))
+    assert "slack" in {e.kind for e in result.events}
+    assert result.status == "complete"
+
+
+def test_the_same_line_as_a_rod_goes_through():
+    elastic = {"sections": [SECTION | {"axial_stiffness": 1e5}]}
+    result = hybrid.run(scene("rod", cable=elastic))
+    assert result.status == "complete"
+    assert result.tension.min() < 0.0  # compression, which a rod can carry
+
+
+def test_energy_from_nowhere_is_noted_and_stops():
+    """An inextensible rod that snaps taut again and again, far too fast for its step."""
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(scene("rod"))
+    assert stop.value.outcome is hybrid.Outcome.GAINS_ENERGY
+    assert "were put in" in str(stop.value)
+
+
+def test_a_cable_pulled_beyond_its_length():
+    motion = {"surge": {"amplitude": 0.6, "period": 2.0}, "ramp": 0.4}
+    end = {"kind": "pinned", "position": [1.5, 0, 0], "motion": motion}
+    with pytest.raises(hybrid.ComputationError, match="does not stretch beyond 2 m"):
+        hybrid.run(scene("rod", ends={"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}))
+
+
+@pytest.mark.parametrize("field", ["e", "v", "T", "a1"])
+def test_a_number_that_is_not_finite_is_found_at_once(field):
+    model = build(scene("rod"))
+    stepper = Stepper(model.line, model.length, model.tension_scale, True)
+    old = model.start.copy()
+    getattr(old, field)[17] = np.nan
+    taken = stepper.step(model.ends.at(0.0), old, old.copy(), 0.01, 0.5)
+    assert taken.outcome in (hybrid.Outcome.NOT_FINITE, hybrid.Outcome.TURNED_TOO_FAR)
+    assert taken.iterations <= 1
+
+
+def test_a_force_beyond_all_numbers_is_said():
+    """1e300 N on 1 kg: no step is small enough, and the error says where and when."""
+    free = {"kind": "free", "force": [0.0, 1e300, 0.0]}
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": free}
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(scene("rod", ends=ends, initial={"kind": "straight", "direction": [1, 0, 0]}))
+    assert stop.value.t == 0.0
+    assert stop.value.s is not None
+
+
+def test_nothing_holds_the_line():
+    """Statics of a line that can move without resistance: singular, not a number."""
+    weightless = scene(
+        environment={"gravity": 0.0},
+        ends={"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [1.0, 0, 0]}},
+    )
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.static(weightless)
+    assert stop.value.outcome in (
+        hybrid.Outcome.SINGULAR,
+        hybrid.Outcome.SLACK,
+        hybrid.Outcome.NOT_CONVERGED,
+        hybrid.Outcome.NOT_FINITE,
+    )
+
+
+def test_a_coarse_bend_is_noted():
+    """A cantilever rolled up on eight cells bends by 90 degrees from cell to cell."""
+    ends = {
+        "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
+        "end": {"kind": "free", "moment": [0.0, 0.01 * 2 * np.pi, 0.0]},
+    }
+    result = hybrid.static(scene("rod", environment={"gravity": 0.0}, ends=ends, mesh={"cells": 5}, time=None))
+    (event,) = result.events
+    assert event.kind == "unresolved bend"
+    assert "would resolve it" in event.text
+
+
+def test_undamped_inextensible_is_noted():
+    straight = {"kind": "straight", "direction": [0, 0, -1]}
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}}
+    short = {"duration": 0.1, "step": 0.01, "rho_inf": 1.0}
+    result = hybrid.run(scene(ends=ends, initial=straight, time=short))
+    assert [e.kind for e in result.events] == ["undamped"]
