@@ -1,0 +1,1 @@
+"""The laws: rotations, the cell (tension), the element (bending and twist), loads.  Compiled, and blind to scenes."""
