@@ -69,6 +69,7 @@ class Outcome(IntEnum):
     TURNED_TOO_FAR = 5
     UNSTABLE = 6
     GAINS_ENERGY = 7
+    TWISTED_TOO_FAR = 8
 
     @property
     def cause(self) -> str:
@@ -87,18 +88,20 @@ _CAUSE = {
     Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
     Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
     Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
+    Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
 }
 
 _REMEDY = {
     Outcome.OK: "",
-    Outcome.NOT_CONVERGED: "make time.step smaller, or add cells where the cable bends",
+    Outcome.NOT_CONVERGED: "make time.step smaller (larger, if near round-off), or add cells where the cable bends",
     Outcome.NOT_FINITE: "check the motion and the forces at this time; make time.step smaller",
-    Outcome.SINGULAR: "hold the cable at one end at least, or give it a force, tension or bending stiffness",
+    Outcome.SINGULAR: "hold an end, or give weight, force or bending stiffness; a straight strut needs a small bow",
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
-    Outcome.UNSTABLE: "start from another shape (initial.direction, initial.points), or run the motion with damping",
+    Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
+    Outcome.UNSTABLE: "start from another shape (initial.direction), or run the motion with damping",
 }
 
 
@@ -119,7 +122,10 @@ class ComputationError(HybridError):
         lines = [f"{outcome.cause}{' at ' + at if at else ''}"]
         if detail:
             lines.append(f"    detail:   {detail}")
-        lines.append(f"    try:      {outcome.remedy}")
+        remedy = outcome.remedy
+        if t is None and outcome in (Outcome.NOT_CONVERGED, Outcome.TURNED_TOO_FAR, Outcome.NOT_FINITE):
+            remedy = "start from another shape (initial.direction), or run the motion with damping to rest"
+        lines.append(f"    try:      {remedy}")
         if snapshot is not None:
             lines.append(f"    snapshot: {snapshot}")
         super().__init__("\n".join(lines))

@@ -5,7 +5,6 @@ from __future__ import annotations
 import io
 import tempfile
 import time as clock
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -19,13 +18,10 @@ from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.solve.statics import Equilibrium
-from hybrid.solve.step import sharpest, slackest
-from hybrid.solve.timestep import POWERS, SLACK_FLOOR, UNRESOLVED_BEND, Stepper, Taken
+from hybrid.solve.timestep import POWERS, Stepper, Taken
+from hybrid.watch import Stop, Watch
 
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
-# Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
-# noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
-GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
 
 
 class Motion:
@@ -42,23 +38,22 @@ class Motion:
     ) -> None:
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
-        self.stepper = Stepper(model.line, model.length, model.tension_scale, model.slack == "stop")
+        floor = model.slack_floor if model.slack == "stop" else -np.inf
+        self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
+        self.watch = Watch(recorder, model)
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.cpu = clock.process_time()
         self.work = np.zeros(len(POWERS))
-        self.worst_bend = UNRESOLVED_BEND  # rad; worse ones are noted
-        self.gain_noted = GAIN_NOTED
-        self.most_put_in = self.potential_before = self.alive_before = 0.0  # J
-        self.slackest = SLACK_FLOOR * model.tension_scale  # N; slacker cells are noted where the scene asks to go on
         if equilibrium is None:
             self.state = model.start.copy()
             self._bring_ends_in()
-            self._ignite()
         else:
             self.state = equilibrium.state.copy()
-            self.stepper.report[:] = equilibrium.report
+            self.watch.equilibrium(equilibrium)
+        self._ignite()
         self.spare = self.state.copy()
         self.power = self._powers()
+        self._look(self.watch.shape(0.0, model.ends.values, self.state))
         if scene.time.rho_inf == 1.0 and not model.line.ck.all():
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             recorder.event(0.0, 0.0, model.length, "undamped", text)
@@ -89,7 +84,13 @@ class Motion:
         ends = self.model.ends.at(self.t)
         values = self.observer.values(ends, self.state, self.stepper.report, self.work)
         self.recorder.save(self.t, values, self.observer.zone_rows)
-        self._watch_energy(values)
+        self.watch.rest(self.t, ends, values, self.state)
+        self._look(self.watch.energy(self.t, values, self.work, self.state))
+
+    def _look(self, found: Stop) -> None:
+        """Stop where a watch says that going on has no sense."""
+        if found is not None:
+            self._stop(Taken(found[0], 0, 0.0, found[1], 0.0), 0.0)
 
     def restart(self) -> None:
         """A load has just stopped: accelerations jump, so find consistent ones."""
@@ -104,54 +105,15 @@ class Motion:
         power = self._powers()
         self.work += 0.5 * dt * (self.power + power)
         self.power = power
-        self._watch_bends()
+        self._look(self.watch.shape(end, self.model.ends.values, self.state))
         if self.model.slack == "warn":
-            self._watch_slack()
+            self.watch.tension(end, self.state)
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
                 "residual": taken.residual, "repeats": repeats, "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
-
-    def _watch_bends(self) -> None:
-        """Note a bend that the mesh cannot resolve: when it shows first, and whenever it is half as bad again."""
-        angle, node = sharpest(self.model.line, self.state.e)
-        if angle > self.worst_bend:
-            note_bend(self.recorder, self.model, self.t, angle, node)
-            self.worst_bend = 1.5 * angle
-
-    def _watch_energy(self, values: Mapping[str, Any]) -> None:
-        """No scheme may create energy: note it when it shows, stop when it is as much as all that was put in."""
-        gained = float(values["work/scheme"])
-        fell = abs(float(values["energy/potential"]) - self.potential_before)
-        alive = sum(float(values[x]) for x in values if x.startswith("energy/")) - float(values["energy/potential"])
-        if self.t == 0.0:
-            self.potential_before, self.alive_before = float(values["energy/potential"]), alive
-            return
-        put_in = float(np.abs(self.work).sum()) + fell + self.alive_before
-        self.most_put_in = max(self.most_put_in, put_in)
-        fastest = int(np.argmax(np.abs(self.state.v).sum(axis=1)))
-        floor = 1e-9 * self.model.tension_scale * self.model.length
-        if gained > GAIN_STOPS * self.most_put_in + floor:
-            self._stop(Taken(Outcome.GAINS_ENERGY, 0, 0.0, fastest, 0.0), 0.0)
-        if gained > self.gain_noted * self.most_put_in + floor:
-            s = float(self.model.line.s[fastest])
-            part = 100 * gained / self.most_put_in
-            text = (
-                f"the computation has created {gained:.3g} J, {part:.0f} % of all put in: {Outcome.GAINS_ENERGY.remedy}"
-            )
-            self.recorder.event(self.t, s, s, "gains energy", text)
-            self.gain_noted *= 3.0
-
-    def _watch_slack(self) -> None:
-        """Note a catenary cell without tension: when it shows first, and whenever it is ten times as bad."""
-        cell = slackest(self.model.line, self.state.T, self.slackest)
-        if cell >= 0:
-            s, tension = float(self.model.line.s[cell]), float(self.state.T[cell])
-            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
-            self.recorder.event(self.t, s, float(self.model.line.s[cell + 1]), "slack", text)
-            self.slackest = min(10.0 * tension, 10.0 * self.slackest)
 
     def _bring_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""
@@ -187,9 +149,11 @@ class Motion:
         where = min(max(taken.where, 0), line.s.size - 1)
         s = float(line.s[where])
         if taken.outcome == Outcome.SLACK:
-            detail = f"tension {self.spare.T[where]:.3g} N at the end of the step that starts there"
+            detail = f"the step that starts at this time ends with a tension of {self.spare.T[where]:.3g} N"
         elif taken.outcome == Outcome.GAINS_ENERGY:
-            detail = f"{self.most_put_in:.3g} J were put in; the fastest point is at this place"
+            detail = "the fastest point is at this place"
+        elif taken.outcome == Outcome.TWISTED_TOO_FAR:
+            detail = f"{self.model.cells} cells"
         elif dt == 0.0:
             detail = "no accelerations are consistent with the shape and the loads"
         else:
@@ -218,16 +182,3 @@ class Motion:
         except OSError:
             return None
         return path
-
-
-def note_bend(recorder: Recorder, model: Model, t: float, angle: float, node: int) -> None:
-    """Write an event about a bend that the mesh does not resolve."""
-    s = float(model.line.s[node])
-    recorder.event(
-        t, s, s, "unresolved bend",
-        f"the rod bends by {np.degrees(angle):.0f} deg from one cell to the next at s = {s:g} m: "
-        f"curvature and moment are wrong there; cells of {model.line.hn[node] / angle * 0.3:.2g} m would resolve it",
-    )  # fmt: skip
-
-
-# --- parts of the above ---------------------------------------------------------------

@@ -2,7 +2,6 @@
 
 run      integrate a scene over its duration
 static   find its equilibrium
-plan     say what would be computed, before anything is
 """
 
 from __future__ import annotations
@@ -18,11 +17,11 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.errors import SceneError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times, step_ends
-from hybrid.motion import Motion, note_bend
+from hybrid.motion import Motion
 from hybrid.results.probes import Observer, output_points
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
@@ -30,8 +29,8 @@ from hybrid.scene.motion import check_motions
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.solve.statics import Equilibrium, solve_statics
-from hybrid.solve.step import sharpest
-from hybrid.solve.timestep import POWERS, UNRESOLVED_BEND
+from hybrid.solve.timestep import POWERS
+from hybrid.watch import Watch
 
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
@@ -154,9 +153,11 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
         ends = model.ends.at(np.inf)
-        angle, node = sharpest(model.line, found.state.e)
-        if angle > UNRESOLVED_BEND:
-            note_bend(recorder, model, 0.0, angle, node)
+        watch = Watch(recorder, model)
+        watch.equilibrium(found)
+        stop = watch.shape(0.0, ends, found.state)
+        if stop is not None:
+            raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
         recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
         recorder.close("complete", f"equilibrium: {found.path[-1]}; out of balance {found.residual:.2g} N")
     return open_result(target)
@@ -164,7 +165,10 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 
 def _equilibrium(model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
-    return solve_statics(model.line, model.ends.at(t), model.start, model.length, model.tension_scale, model.slack)
+    return solve_statics(
+        model.line, model.ends.at(t), model.start, model.length, model.tension_scale, model.slack_floor,
+        take_slack=model.slack == "warn",
+    )  # fmt: skip
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

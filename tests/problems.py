@@ -102,7 +102,9 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     """
     time = what.require_time()
     model = build(what)
-    stepper = Stepper(model.line, model.length, model.tension_scale, model.slack == "stop")
+    stepper = Stepper(
+        model.line, model.length, model.tension_scale, model.slack_floor if model.slack == "stop" else -np.inf
+    )
     old = model.start.copy()
     if what.initial.kind == "equilibrium":
         old = solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale).state

@@ -28,7 +28,13 @@ from hybrid.model.properties import (
 from hybrid.model.start import corners, ends_and_frames, initial_nodes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
-from hybrid.scene.schema import Clamped, Guided, RodZone, Scene, Section, Straight, ZonesModel
+from hybrid.scene.schema import Clamped, Guided, Points, RodZone, Scene, Section, Straight, ZonesModel
+
+# A catenary cell counts as slack when its tension is not above this part of the tension
+# scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
+SLACK_FLOOR = -1e-6
+MOST_CELLS = 1_000_000
+SHARPEST_START = np.radians(150.0)
 
 
 @dataclass(frozen=True)
@@ -42,6 +48,7 @@ class Model:
     ledger: tuple[Entry, ...]
     length: float  # m
     tension_scale: float  # N
+    slack_floor: float  # N, tension at or below which a catenary cell is slack
     slack: Literal["stop", "warn"]
     inextensible: bool
 
@@ -95,6 +102,7 @@ def build(scene: Scene) -> Model:
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
     rod = np.array([zones[int(i)].kind == "rod" for i in zone_of])
     _refuse_single_rod_cells(zones, zone_of)
+    _refuse_too_many(n)
 
     def per_cell(f: Callable[[Section], float]) -> Floats:
         return np.array([f(x) for x in of], float)
@@ -105,7 +113,9 @@ def build(scene: Scene) -> Model:
         y[1:] += 0.5 * x
         return y
 
-    scale = tension_scale(scene, sections)
+    scale = tension_scale(scene, sections, bool(rod.any()))
+    # a stiff rod beside a light catenary must not hide that the catenary is slack
+    slack_scale = tension_scale(scene, sections, False)
     fluid = scene.environment.fluid
     bits = 0
     nothing, nothing_node = np.full(n, np.nan), np.full(n + 1, np.nan)
@@ -152,6 +162,9 @@ def build(scene: Scene) -> Model:
     start = blank_state(n)
     start.r[:] = initial_nodes(scene, s)
     start.e[:] = np.diff(start.r, axis=0)
+    if isinstance(scene.initial, Points):
+        _exact_lengths(start, h, compliance == 0.0, scene)
+        _refuse_folds(start.e, s, rod)
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
     start.T[:] = scale
@@ -163,9 +176,43 @@ def build(scene: Scene) -> Model:
     return Model(
         line=line, zones=zones, ends=ends, start=start,
         ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,
+        slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
     )  # fmt: skip
+
+
+def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:
+    """Give inextensible cells exactly their length: points carry round-off, which would be a blow at the first step.
+
+    The gap this leaves at a held end is closed by small shifts of all chords, until both are met.
+    """
+    to = getattr(scene.ends.end, "position", None) if getattr(scene.ends.start, "position", None) else None
+    for _ in range(50 if to else 1):
+        if to:
+            gap = np.array(to, float) - start.r[0] - start.e.sum(axis=0)
+            start.e[:] += gap * (h / h.sum())[:, None]
+        lengths = np.linalg.norm(start.e, axis=1)
+        start.e[stiff] *= (h / lengths)[stiff, None]
+    start.r[1:] = start.r[0] + np.cumsum(start.e, axis=0)
+
+
+def _refuse_too_many(cells: int) -> None:
+    if cells > MOST_CELLS:
+        expected = f"at most {MOST_CELLS} cells: a line has never needed more, and memory would"
+        raise SceneError([Complaint("mesh.cells", str(cells), expected, "grade the mesh with `ratio` instead")])
+
+
+def _refuse_folds(chords: Floats, s: Floats, rod: np.ndarray) -> None:
+    """A rod cannot start folded back onto itself: its bend has no direction there."""
+    d = chords / np.linalg.norm(chords, axis=1)[:, None]
+    cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
+    folded = np.flatnonzero((cosine < np.cos(SHARPEST_START)) & rod[:-1] & rod[1:])
+    if folded.size:
+        angle = np.degrees(np.arccos(cosine[folded[0]]))
+        given = f"a corner of {angle:.0f} deg at s = {s[folded[0] + 1]:g} m in a rod zone"
+        fix = "round it with a few points, or make the zone a catenary"
+        raise SceneError([Complaint("initial.points", given, "corners below 150 deg, because a rod bends", fix)])
 
 
 def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None:

@@ -19,6 +19,7 @@ class Entry:
     what: str
     on: bool
     why: str
+    ignored: bool = False  # the scene asks for it, and the model it chose cannot have it
 
 
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
@@ -71,6 +72,7 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                     f"moment and tangent at ends.{name}",
                     False,
                     "the cable ends in a catenary zone, which transmits no moment",
+                    ignored=True,
                 )
             )
     return tuple(entries)

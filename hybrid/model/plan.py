@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from math import ceil
 
+from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import build
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
@@ -28,12 +30,13 @@ class Plan:
 COST = {"rod": 0.3e-6, "catenary": 0.1e-6}
 COST_STEP = 50e-6
 USUAL_ITERATIONS = 2.5
+MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often
 
 
 def parts(length: float, step: float) -> int:
     """How many equal parts, none longer than `step` but for round-off, make up `length`."""
-    return max(1, ceil(length / step * (1.0 - 1e-12) - 1e-9))
+    return max(1, ceil(min(length / step, 1e18) * (1.0 - 1e-12) - 1e-9))
 
 
 def output_interval(scene: Scene) -> float:
@@ -45,13 +48,24 @@ def output_interval(scene: Scene) -> float:
 def output_times(scene: Scene) -> list[float]:
     """Times (s) of the outputs after the first."""
     time, every = scene.require_time(), output_interval(scene)
+    count = time.duration / every
+    if count > MOST_OUTPUTS:
+        fix = f"output.every: {time.duration / 1000:.3g} makes a thousand"
+        expected = f"at most {MOST_OUTPUTS} outputs"
+        raise SceneError([Complaint("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)])
+    steps = time.duration / time.step
+    if steps > MOST_STEPS:
+        expected = f"at most {MOST_STEPS:g} steps, some months of computing"
+        raise SceneError([Complaint("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")])
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
-def step_ends(start: float, stop: float, step: float) -> list[float]:
+def step_ends(start: float, stop: float, step: float) -> Iterator[float]:
     """End times of equal steps, none longer than `step`, from `start` to `stop`."""
     n = parts(stop - start, step)
-    return [start + (stop - start) * k / n for k in range(1, n)] + [stop]
+    for k in range(1, n):
+        yield start + (stop - start) * k / n
+    yield stop
 
 
 def count_steps(scene: Scene) -> int:

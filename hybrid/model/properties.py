@@ -63,12 +63,21 @@ def weight(section: Section, scene: Scene) -> float:
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
-def tension_scale(scene: Scene, sections: Sequence[Section]) -> float:
-    """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for."""
+def net_weight(scene: Scene) -> float:
+    """Weight of the whole line in its surroundings, N, positive downwards."""
+    return sum(weight(x, scene) * x.length for x in scene.cable.sections)
+
+
+def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool) -> float:
+    """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for.
+
+    bending: whether bending counts, as it does where there is a rod.
+    """
     length = scene.length
     mass = sum(s.mass * s.length for s in sections)
     candidates = [sum(abs(weight(s, scene)) * s.length for s in sections)]
-    candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
+    if bending:
+        candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
     fluid = scene.environment.fluid
     if fluid and fluid.current:
         speed2 = float(np.dot(fluid.current, fluid.current))

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+from scipy.optimize import brentq
 
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
+from hybrid.model.properties import net_weight
 from hybrid.model.state import Floats
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Clamped, Equilibrium, Guided, Points, Scene, Straight
@@ -24,17 +26,45 @@ def initial_nodes(scene: Scene, s: Floats) -> Floats:
         first = np.array(origin, float) if origin else np.array(end, float) - length * direction
         return first + s[:, None] * direction
     assert isinstance(initial, Equilibrium)
-    guess = initial.guess
-    if start and end and guess != "straight":
-        return np.array(start) + (s / length)[:, None] * np.subtract(end, start)
+    down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
+    if start and end and initial.guess != "straight":
+        return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0)
     if initial.direction is not None:
         direction = np.array(initial.direction, float)
     else:
         tangent = getattr(scene.ends.start, "tangent", None) or getattr(scene.ends.end, "tangent", None)
-        direction = np.array(tangent if tangent else (0.0, 0.0, -1.0 if start else 1.0), float)
+        hanging = -1.0 if down == bool(start) else 1.0
+        direction = np.array(tangent if tangent else (0.0, 0.0, hanging), float)
     direction /= np.linalg.norm(direction)
     first = np.array(start, float) if start else np.array(end, float) - length * direction
     return first + s[:, None] * direction
+
+
+def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
+    """Nodes on a circular arc of the cable's length from start to end, bulging down (side -1) or up (+1).
+
+    A straight line when the ends are farther apart than the cable is long; a whole circle
+    when they coincide.  A collinear first shape of a cable that is too long for its ends
+    would leave Newton without a direction to go.
+    """
+    length, chord = float(s[-1]), end - start
+    span = float(np.linalg.norm(chord))
+    along = chord / span if span > 0.0 else np.array([1.0, 0.0, 0.0])
+    bulge = np.array([0.0, 0.0, side]) - side * along[2] * along
+    if np.linalg.norm(bulge) < 1e-6:  # a vertical chord: any direction across will do
+        bulge = first_director(tuple(along))
+    bulge /= np.linalg.norm(bulge)
+    if span >= length:
+        return np.asarray(start + (s / length)[:, None] * chord)
+    part = min(span / length, 1.0 - 1e-12)
+    half = np.pi  # half the arc's angle; a full circle when the ends coincide
+    if part > 0.0:
+        half = float(brentq(lambda x: np.sinc(x / np.pi) - part, 0.0, np.pi))
+    radius = 0.5 * length / half
+    angle = half * (2.0 * s / length - 1.0)
+    x = radius * (np.sin(angle) + np.sin(half))
+    y = radius * (np.cos(angle) - np.cos(half))
+    return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
 
 
 def corners(scene: Scene) -> list[float]:
@@ -46,28 +76,39 @@ def corners(scene: Scene) -> list[float]:
 
 
 def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray) -> tuple[EndConditions, Floats]:
-    """End conditions, and first directors of all cells: carried without twist from the start, the closing twist spread.
+    """End conditions, and first directors of all cells, carried without twist from the start.
 
-    A clamp without `normal` holds the twist that the initial shape has there.
+    An end whose `normal` is given fixes the material frame there; a clamp without one
+    holds the twist that the initial shape has.  Only where both ends fix it, and rod
+    joins them, is there a twist to close, and it is spread over the line.
     """
     d = e / np.linalg.norm(e, axis=1)[:, None]
     start, end = scene.ends.start, scene.ends.end
     first = first_director(getattr(start, "tangent", None) or tuple(d[0]), getattr(start, "normal", None))
     tangents = np.vstack([getattr(start, "tangent", None) or d[0], d, getattr(end, "tangent", None) or d[-1]])
     carried = transported(first, tangents)
-    last = carried[-1]
     if isinstance(end, Clamped | Guided) and end.normal is not None:
         wanted = first_director(end.tangent, end.normal)
-        t = np.array(end.tangent) / np.linalg.norm(end.tangent)
+        t = tangents[-1] / np.linalg.norm(tangents[-1])
+        last = carried[-1]
         twist = float(np.arctan2(np.dot(np.cross(last, wanted), t), np.dot(last, wanted)))
-        if rod.all() and getattr(start, "tangent", None) is not None:
-            part = (np.cumsum(np.ones(e.shape[0])) - 0.5) / e.shape[0] * twist
+        n = e.shape[0]
+        if not _fixes_twist(start):
+            part = np.ones(n + 2)  # the whole line takes the end's orientation
+        elif rod.all():
+            part = np.concatenate([[0.0], (np.arange(n) + 0.5) / n, [1.0]])
         else:
-            part = np.full(e.shape[0], twist)  # the start turns freely: the whole line takes the end's orientation
-        inner = carried[1:-1]
-        carried[1:-1] = inner * np.cos(part)[:, None] + np.cross(d, inner) * np.sin(part)[:, None]
-        last = wanted
-    return _end_conditions(scene, (first, last), (d[0], d[-1])), carried[1:-1]
+            part = np.ones(n + 2)  # the rod at the end takes it; joints let the rest be
+            part[: n - int(np.argmin(rod[::-1])) + 1] = 0.0
+        t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
+        cosine, sine = np.cos(part * twist)[:, None], np.sin(part * twist)[:, None]
+        carried = carried * cosine + np.cross(t, carried) * sine
+    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1])), carried[1:-1]
+
+
+def _fixes_twist(end: object) -> bool:
+    """True for an end that says how the material frame stands, and holds it."""
+    return isinstance(end, Clamped | Guided) and end.normal is not None and not getattr(end, "swivel", False)
 
 
 def _end_conditions(scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats]) -> EndConditions:

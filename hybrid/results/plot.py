@@ -23,7 +23,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-_INK, _GREY, _RANGE, _ALARM = "#222222", "#6E6E6E", "#EBEBEB", "#C00000"
+_Numbers = Sequence[float] | np.ndarray
+_INK, _GREY, _RANGE, _ALARM = "#222222", "#6E6E6E", "#E8E8E8", "#C00000"
 _KIND_COLOURS = {"rod": "#D55E00", "catenary": "#0072B2"}  # kinds that are not named here are drawn in ink
 _POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 _SMALL, _NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
@@ -31,8 +32,9 @@ _SHAPES = 9  # earlier shapes on a page; more become a blur
 _ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
 _STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
-_NAMES |= {x: f"position {x}" for x in "xyz"}
-_WARNINGS = ("slack", "unresolved bend", "undamped", "turned in")  # events a picture must not hide, worst first
+_AXES = ("x", "y", "z")
+_NAMES |= {x: f"position {x}" for x in _AXES}
+_WARNINGS = ("gains energy", "slack", "unresolved bend", "undamped", "turned in")  # not to be hidden; the worst first
 
 
 class _View(NamedTuple):
@@ -61,7 +63,7 @@ _TWO_VIEWS += [([["s", "S", _COLUMN]], [1, 1, w], [1], r) for w, r in ((1.2, 0.4
 
 
 def plot_summary(
-    result: Result, path: str | Path | None = None, *, times: Any = None, history: Sequence[float] | None = None
+    result: Result, path: str | Path | None = None, *, times: _Numbers | None = None, history: _Numbers | None = None
 ) -> Figure:
     """One page: shape, tension and moment along the cable, and histories at some points.
 
@@ -75,8 +77,8 @@ def plot_summary(
 
     figure = Figure(figsize=(8.0, 6.0), dpi=150)
     FigureCanvasAgg(figure)
-    times = _telling_times(result) if times is None else np.sort(np.asarray(times, dtype=float))
-    foot = _head_and_foot(figure, result, times)
+    earlier = _telling_times(result) if times is None else np.sort(np.asarray(times, dtype=float))
+    foot = _head_and_foot(figure, result, earlier)
     body = (0.0, foot + 0.055, 1.0, 0.865 - foot)  # left, bottom, width, height; the legend is below, the head above
     figure.set_layout_engine(ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=body))
     if len(result.times) == 0:
@@ -88,10 +90,11 @@ def plot_summary(
         axes = figure.subplot_mosaic(panels, width_ratios=widths, height_ratios=heights)
         points = _history_points(result, history) if len(result.times) > 1 else np.zeros(0)
         for name, view in zip("sS", views, strict=False):
-            plot_shape(axes[name], result, times=times, view=view, points=points)
+            plot_shape(axes[name], result, times=earlier, view=view, points=points)
         bent = "bending_moment" in result and not set(result["zones/kind"]) <= {"catenary"}
         profiles: list[Any] = ["tension", ("bending_moment", "torque")] if bent else ["tension"]
-        profiles += [n for n in ("curvature", "theta") if n in result] + [views[0].up_label, "x", "y"]
+        angle = "theta" if views[0].up_label == "z" else "phi"
+        profiles += [n for n in ("curvature", angle) if n in result] + [views[0].up_label, "x", "y"]
         for name, quantity in zip("pP" if len(points) else "pPhH", profiles, strict=False):
             plot_profiles(axes[name], result, quantity)
         if len(points):
@@ -105,10 +108,9 @@ def plot_summary(
         for name, y in (("s", foot + 0.0275), ("h", foot + 0.0025))[: 1 + (len(points) > 0)]:
             handles, labels = axes[name].get_legend_handles_labels()
             entries = dict(zip(labels, handles, strict=True))
-            look = {"fontsize": _SMALL, "labelcolor": _INK, "handlelength": 1.6, "borderpad": 0.1, "borderaxespad": 0.0}
-            figure.legend(
-                entries.values(), entries, loc="lower center", bbox_to_anchor=(0.5, y), ncols=9, frameon=False, **look
-            )
+            look: dict[str, Any] = {"fontsize": _SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
+            look |= {"loc": "lower center", "bbox_to_anchor": (0.5, y), "ncols": 8, "frameon": False, "borderpad": 0.1}
+            figure.legend(list(entries.values())[:8], list(entries)[:8], labelcolor=_INK, **look)
     if path is not None:
         try:
             figure.savefig(path, dpi=150)
@@ -118,7 +120,7 @@ def plot_summary(
 
 
 def plot_shape(
-    ax: Axes, result: Result, *, times: Any = None, view: Any = None, points: Sequence[float] | np.ndarray = ()
+    ax: Axes, result: Result, *, times: _Numbers | None = None, view: Any = None, points: _Numbers = ()
 ) -> None:
     """The last shape, coloured by zones, over earlier ones and the area swept, in grey; the same scale both ways.
 
@@ -129,26 +131,23 @@ def plot_shape(
     from matplotlib.collections import PolyCollection
 
     view = _letters(view) if isinstance(view, str) else view or _views(result)[0]
-    position, s = result.position, result.s
+    position, last, s = result.position, result.position[-1], result.s
     earlier = _telling_times(result) if times is None else np.asarray(times, dtype=float)
-    outputs = np.array(view.project(position[:: 1 + len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
+    outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
     strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
     # Edges close the seams between strips; as pixels in a PDF, where each strip would weigh as much as a curve.
-    name = "range over time" if len(position) > 1 else ""
-    look: dict[str, Any] = {"label": name, "facecolor": _RANGE, "edgecolor": _RANGE, "linewidth": 0.4, "zorder": 0.4}
-    ax.add_collection(PolyCollection(list(strips), rasterized=True, **look))
+    name = "range over time" * (len(position) > 1)
+    ax.add_collection(PolyCollection(list(strips), color=_RANGE, lw=0.4, zorder=0.4, rasterized=True, label=name))
     for k, shape in enumerate(result.at(t=earlier, names=["position"])["position"]):
-        grey = 0.75 - 0.3 * k / max(len(earlier) - 1, 1)
-        name = "_" if k + 1 < len(earlier) else "earlier shapes (later: darker)"
+        grey = 0.7 - 0.3 * k / max(len(earlier) - 1, 1)
+        name = "_" * (k > 0) + "earlier shapes (later: darker)"
         ax.plot(*view.project(shape), color=str(grey), linewidth=0.7, zorder=1, label=name)
-    last = position[-1]
-    zones = _last_zones(result)
+    zones = result.zones[-1] or [Zone("cable", float(s[0]), float(s[-1]))]
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
         piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
-        ax.plot(
-            *view.project(piece), color=_KIND_COLOURS.get(zone.kind, _INK), linewidth=2.0, zorder=3, label=zone.kind
-        )
+        colour = _KIND_COLOURS.get(zone.kind, _INK)
+        ax.plot(*view.project(piece), color=colour, linewidth=2.0, zorder=3, label=zone.kind)
     joints = np.array([z.s_b for z in zones[:-1]])
     if len(joints):
         ax.plot(*view.project(_along(joints, s, last)), zorder=5, **_mark("o", "white"), label="joint")
@@ -180,29 +179,29 @@ def plot_profiles(ax: Axes, result: Result, names: str | Sequence[str], *, outpu
     peak = float(np.abs(drawn[0][1]).max())
     drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(_ZERO, 1e-6 * peak)]
     peak = max(float(np.abs(v).max()) for _, v in drawn)
-    factor, unit = _prefix("m" if names[0] in "xyz" else result.units[names[0]], peak)
+    factor, unit = _prefix("m" if names[0] in _AXES else result.units[names[0]], peak)
     for k, (name, values) in enumerate(drawn):
         if len(values) > 1:
             low, high = values.min(axis=0) * factor, values.max(axis=0) * factor
             ax.fill_between(result.s, low, high, color=_GREY, alpha=0.28 - 0.12 * k, linewidth=0, zorder=2)
             usual = max(np.percentile(high, 90), values[output].max() * factor)
-            if 0.0 < 10.0 * usual < high.max():  # a passing spike would press all else to the ground
-                ax.set_ylim(top=1.5 * usual)
-                spike = f"up to {high.max():.3g} {unit} at s = {result.s[high.argmax()]:.4g} m"
-                ax.text(0.97, 0.95, spike, transform=ax.transAxes, ha="right", va="top", fontsize=_SMALL)
+            if len(drawn) == 1 and 0.0 < 10.0 * usual < high.max():  # a spike would press all else to the ground
+                ax.set_ylim(low.min() - 0.1 * usual, 1.5 * usual)
+                spike = f"peak {high.max():.3g} {unit} at s = {result.s[high.argmax()]:.4g} m"
+                ax.text(0.03, 0.91, spike, transform=ax.transAxes, fontsize=_SMALL, color=_INK)
         line: dict[str, Any] = {"color": _INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
         ax.plot(result.s, values[output] * factor, zorder=3, label=_title(name), **line)
-    label = f"{_title(names[0]).replace('bending ', '')} ({unit})"
-    _style(ax, " and ".join([_title(n) for n, _ in drawn]) + _at(result, output), "s (m)", label)
+    short = _title(names[0]).replace("bending ", "")
+    title = _title(names[0]) if len(drawn) == 1 else f"{short}, {', '.join(_title(n) for n, _ in drawn[1:])}"
+    _style(ax, title + _at(result, output), "s (m)", f"{short} ({unit})")
     if len(drawn) > 1:
         ax.legend(fontsize=_SMALL, frameon=False, handlelength=2.2)
     _open_up(ax, peak * factor)
 
 
 def plot_history(
-    ax: Axes, result: Result, name: str, s: Sequence[float] | np.ndarray, *, component: int | None = None,
-    legend: bool = True,
-) -> None:  # fmt: skip
+    ax: Axes, result: Result, name: str, s: _Numbers, *, component: int | None = None, legend: bool = True
+) -> None:
     """A quantity over time at the arc lengths s (m).
 
     component: 0, 1, 2 for x, y, z of a vector, drawn as the change since the first output;
@@ -223,11 +222,12 @@ def plot_history(
         # The dot at the end is the one in the last shape.
         ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
     changes = np.unique(result["zones/t"])[1:]
-    for t in changes if len(changes) <= 40 else ():  # more would hide the curves
-        ax.axvline(t, color=_GREY, linewidth=0.6, linestyle=":", zorder=1, label="zones changed")
+    for k, t in enumerate(changes if len(changes) <= 40 else ()):  # more would hide the curves
+        name = "_" * (k > 0) + "zones changed"  # once in a legend
+        ax.axvline(t, color=_GREY, linewidth=0.9, linestyle=":", zorder=1, label=name)
     title = f"{label} over time" if component is None else f"{label} since t = {result.times[0]:.4g} s"
     _style(ax, title, "t (s)", f"{label} ({unit})")
-    ax.set_xlim(result.times[0], result.times[-1])
+    ax.set_xlim(result.times[0], result.times[-1] + 0.01 * np.ptp(result.times))  # so that the dots are whole
     _open_up(ax, peak * factor)
     if legend:
         ax.legend(fontsize=_SMALL, framealpha=0.75, edgecolor="none", handlelength=1.2, borderpad=0.2)
@@ -239,9 +239,8 @@ def plot_history(
 def _views(result: Result) -> list[_View]:
     """One plane if the cable stays in one, else two projections.
 
-    It does if what leaves the plane is less than 2 % of the cable's extent and much less than
-    the extent across the cable, which may be small too, and if it moves much less that way
-    than it moves at all: a taut line sways by little, but that is what there is to see.
+    It does if what leaves the plane is below 2 % of the cable's extent, much less than what is
+    across the cable in the plane, and no motion to speak of: a taut line sways by little.
     """
     position = result.position.reshape(-1, 3)
     x, y, z = extents = np.ptp(position, axis=0)
@@ -259,8 +258,7 @@ def _views(result: Result) -> list[_View]:
     sideways = result.position[..., :2] @ np.array([-direction[1], direction[0]])
     if np.ptp(sideways) <= flat and np.ptp(sideways, axis=0).max() <= still:
         angle = math.degrees(math.atan2(direction[1], direction[0]))
-        axes, turned = (np.array([*direction, 0.0]), np.array([0.0, 0.0, 1.0])), f"{angle:.3g}° from x"
-        return [_View(*axes, f"horizontal, {turned}", "z")]
+        return [_View(np.array([*direction, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")]
     if z >= max(x, y):
         return [_letters("xz"), _letters("yz")]
     return [_letters("xz"), _letters("xy")] if x >= y else [_letters("yz"), _letters("yx")]
@@ -269,8 +267,7 @@ def _views(result: Result) -> list[_View]:
 def _letters(plane: str) -> _View:
     if len(plane) != 2 or not set(plane) <= set("xyz") or plane[0] == plane[1]:
         raise ResultError(f"view '{plane}' is not a plane\n    expected: two of the letters x, y, z, such as 'xz'")
-    a, b = ("xyz".index(c) for c in plane)
-    return _View(np.eye(3)[a], np.eye(3)[b], *plane)
+    return _View(*(np.eye(3)["xyz".index(c)] for c in plane), *plane)
 
 
 def _magnified(view: _View, position: np.ndarray) -> tuple[float, float]:
@@ -279,14 +276,14 @@ def _magnified(view: _View, position: np.ndarray) -> tuple[float, float]:
     ratio = min(across, up) / max(across, up, 1e-300)
     if not _STILL < ratio < 0.08:  # straighter than that is straight; less straight needs no help
         return 1.0, 1.0
-    most = 0.3 / ratio  # about the shape of the flattest panel
+    most = 0.32 / ratio  # about the shape of the flattest panel
     power = 10.0 ** math.floor(math.log10(most))
-    factor = power * max(m for m in (1, 2, 5) if m * power <= most)
+    factor = power * max(m for m in (1, 1.5, 2, 3, 4, 5, 7) if m * power <= most)
     return (1.0, factor) if up < across else (factor, 1.0)
 
 
 def _ratio(views: list[_View], position: np.ndarray) -> float:
-    """Width over height as drawn; the geometric mean of the views.  A straight line has none, but must not fail."""
+    """Width over height as drawn; the geometric mean of the views; of a straight line, something large or small."""
     sizes = np.array([np.ptp(v.project(position), axis=(1, 2)) * _magnified(v, position) for v in views])
     sizes += 1e-9 * sizes.max() + 1e-300
     return float(np.exp(np.mean(np.log(sizes[:, 0] / sizes[:, 1]))))
@@ -310,7 +307,7 @@ def _telling_times(result: Result) -> np.ndarray:
     return np.sort(result.times[taken])
 
 
-def _history_points(result: Result, history: Sequence[float] | None) -> np.ndarray:
+def _history_points(result: Result, history: _Numbers | None) -> np.ndarray:
     default = result["history"] if "history" in result else np.linspace(result.s[0], result.s[-1], 3)
     points = np.asarray(default if history is None else history, dtype=float)
     if points.ndim != 1 or len(points) == 0:
@@ -318,17 +315,13 @@ def _history_points(result: Result, history: Sequence[float] | None) -> np.ndarr
     return points
 
 
-def _last_zones(result: Result) -> list[Zone]:
-    return result.zones[-1] or [Zone("cable", float(result.s[0]), float(result.s[-1]))]
-
-
 def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
 
 
 def _scalar(result: Result, name: str) -> np.ndarray:
-    if name in "xyz":
-        return np.asarray(result.position[..., "xyz".index(name)])
+    if name in _AXES:
+        return np.asarray(result.position[..., _AXES.index(name)])
     values = result[name]
     return np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
 
@@ -398,14 +391,15 @@ def _open_up(ax: Axes, peak: float) -> None:
 
 def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float:
     """Title and facts above the panels, warnings below; the height of the latter, as a part of the page."""
-    n = len(result.times)
-    facts = [f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s" if n > 1 else "static"] * (n > 0)
-    if n and 0 < len(result.zones[-1]) <= 4:  # more are to be seen, not to be read
-        facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in result.zones[-1]))
+    n, complete = len(result.times), result.status == "complete"
+    facts = [] if complete else [result.status_text]
+    if n:
+        span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
+        facts.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
+        if 0 < len(result.zones[-1]) <= 4:  # more are to be seen, not to be read
+            facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in result.zones[-1]))
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
-    complete = result.status == "complete"
-    facts = facts if complete else [result.status_text, *facts]
     _line(figure, 0.985, result.title or "(no title)", fontsize=10, fontweight="bold", color=_INK)
     _line(figure, 0.95, "; ".join(facts), fontsize=_NORMAL, color=_GREY if complete else _ALARM)
     events = sorted((e for e in result.events if e.kind in _WARNINGS), key=lambda e: (_WARNINGS.index(e.kind), e.t))
@@ -413,13 +407,14 @@ def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float
         return 0.0
     kinds = [e.kind for e in events]
     names = ", ".join(k + f" (× {kinds.count(k)})" * (kinds.count(k) > 1) for k in dict.fromkeys(kinds))
-    _line(figure, 0.024, f"Note: {names}; at t = {events[0].t:.4g} s {events[0].text}", fontsize=_SMALL, color=_ALARM)
+    _line(figure, 0.024, f"Note: {names}; at t = {events[0].t:.4g} s: {events[0].text}", fontsize=_SMALL, color=_ALARM)
     return 0.025
 
 
 def _line(figure: Figure, y: float, text: str, **look: Any) -> None:
     """One line from the left edge, cut to the width of the page.  A $ in it is a $."""
+    text = " ".join(text.split())
     line = figure.text(0.0125, y, text, va="top", parse_math=False, **look)
-    while (share := 0.975 * figure.bbox.width / line.get_window_extent().width) < 1.0:
+    while (share := 0.975 * figure.bbox.width / max(1.0, line.get_window_extent().width)) < 1.0:
         text = text[: min(int(share * len(text)), len(text) - 1)]
         line.set_text(f"{text.rstrip()} …")

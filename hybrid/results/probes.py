@@ -138,7 +138,13 @@ class View:
     @cached_property
     def tangent(self) -> Floats:
         t = self.grid.cells @ self.d
-        return np.asarray(t / np.linalg.norm(t, axis=1)[:, None])
+        size = np.linalg.norm(t, axis=1)
+        # in the very middle of a fold the two sides cancel: take the nearest cell's
+        middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
+        for g in np.flatnonzero(size < 1e-9):
+            t[g] = self.d[int(np.argmin(np.abs(middles - self.grid.s[g])))]
+            size[g] = 1.0
+        return np.asarray(t / size[:, None])
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats]:

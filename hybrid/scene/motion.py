@@ -28,6 +28,9 @@ Array = NDArray[np.float64]
 
 # A harmonic motion counts as starting from rest below this part of its top speed: round-off.
 AT_REST = 1e-6
+# Time steps that a period, and a ramp, must last at least; and the part of its range that a recorded motion
+# may bow within a step.  Six steps a period bow by 13 %, which is a poor answer but the same motion.
+SAMPLES, RAMP_STEPS, MISSED = 6, 3, 0.15
 
 
 class EndMotion:
@@ -166,6 +169,8 @@ def _turn_by_vector(vector: Array, rate: Array) -> tuple[Array, Array]:
 def check_motions(scene: Scene) -> None:
     """SceneError if an end's motion cannot be read, does not start from rest, jumps, or ends too early."""
     found = motion_findings(scene.ends, scene.time.duration if scene.time is not None else None)
+    if scene.time is not None and not found:
+        found = resolution_findings(scene.ends, scene.time.step)
     if found:
         raise SceneError([_complaint((), finding) for finding in found])
 
@@ -180,6 +185,46 @@ def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
         wrong = _file_findings(end, end.motion, duration) if end.motion.file is not None else _harmonic_jump(end.motion)
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
     return found
+
+
+def resolution_findings(ends: Ends, step: float) -> list[Finding]:
+    """Motions that a time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp."""
+    found: list[Finding] = []
+    for name, end in (("start", ends.start), ("end", ends.end)):
+        if isinstance(end, Free) or end.motion is None:
+            continue
+        here, motion = ("ends", name, "motion"), end.motion
+        for what, h in motion.harmonics().items():
+            if h.amplitude and h.period < SAMPLES * step * (1 - 1e-9):
+                expected = f"a period of at least {SAMPLES} time steps of {step:g} s"
+                fix = f"time.step: {h.period / 20:.3g}, or less"
+                found.append(Finding((*here, what, "period"), expected, fix, f"{h.period:g}"))
+        if motion.ramp is not None and motion.harmonics() and motion.ramp < RAMP_STEPS * step * (1 - 1e-9):
+            expected = f"a ramp of at least {RAMP_STEPS} time steps of {step:g} s, or it is a jump"
+            fix = f"ramp: {2 * max(h.period for h in motion.harmonics().values()):.3g}, two periods"
+            found.append(Finding((*here, "ramp"), expected, fix, f"{motion.ramp:g}"))
+        if motion.file is not None:
+            missed = _missed_between(read_record(motion.file), step)
+            if missed is not None:
+                fix = "make time.step smaller, or smooth the record"
+                expected = f"a motion that is nearly straight within a time step of {step:g} s"
+                found.append(Finding((*here, "file"), expected, fix, f"it turns within a step at t = {missed:g} s"))
+    return found
+
+
+def _missed_between(record: Record, step: float) -> float | None:
+    """Time at which a record departs most from its chord over a step, when that is a large part of its range."""
+    last = float(record.times[-1])
+    t = np.linspace(0.0, max(last - step, 0.0), min(20_000, max(2, int(4 * last / step))))
+    for values in (record.shift, record.turn):
+        spline = _spline(record, values)
+        if spline is None:
+            continue
+        bow = np.abs(spline(t + 0.5 * step) - 0.5 * (spline(t) + spline(np.minimum(t + step, last)))).max(axis=1)
+        reach = float(np.ptp(spline(t), axis=0).max())
+        if reach > 0.0 and bow.max() > MISSED * reach:
+            return float(t[int(bow.argmax())])
+    return None
 
 
 def _harmonic_jump(motion: Motion) -> list[Finding]:

@@ -13,7 +13,7 @@ from ruamel.yaml import YAML
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.checks import contradictions
-from hybrid.scene.motion import motion_findings
+from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Scene, Time
 from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
 from hybrid.scene.table import Finding, dotted
@@ -100,7 +100,10 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
         ends, time = tables.get("ends"), tables.get("time")
         if isinstance(ends, Ends):
             duration = time.duration if isinstance(time, Time) else None
-            found += [(finding, False) for finding in motion_findings(ends, duration)]
+            moving = motion_findings(ends, duration)
+            if isinstance(time, Time) and not moving:
+                moving = resolution_findings(ends, time.step)
+            found += [(finding, False) for finding in moving]
     complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
         raise SceneError(_in_order(complaints), file)

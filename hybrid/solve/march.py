@@ -268,7 +268,15 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
             W[11], W[12], W[13] = row_before[0], row_before[1], row_before[2]
             W[10], W[23] = -hck_before, gap_before
             if held:
-                W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = 1.0, 1.0, 1.0
+                # the unit matrix, in the size of the spin row so that pivoting does not mistake it for a small one
+                hold = 1.0
+                if cell and line.spin[i]:
+                    hold += abs(dot(d, add(bn, a))) + abs(An[0]) + abs(Bn[0]) + abs(A[0]) + abs(A[4]) + abs(A[8])
+                    hold += abs(Bn[4]) + abs(Bn[8])
+                    if bits & ROTARY:
+                        hold += line.polar[i] * ca
+                W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = hold, hold, hold
+                rhs = scale(hold, rhs)
             else:
                 put(W, 1, 1, pNm, 1.0)
                 put(W, 1, 6, madd(pNm, G1), -1.0)

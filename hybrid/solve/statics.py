@@ -14,7 +14,7 @@ from hybrid.physics.loads import MASS_DAMPING
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
 from hybrid.solve.step import newton, slackest
-from hybrid.solve.timestep import SLACK_FLOOR, Stepper
+from hybrid.solve.timestep import Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration
@@ -25,6 +25,9 @@ HARDENING = 8  # parts of the way from a soft, short line to the real one; a par
 CHECKED_COMPLIANCE = (
     1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
 )
+NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
+LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
+PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
@@ -38,6 +41,8 @@ class Equilibrium:
     iterations: int
     residual: float
     report: Floats
+    slack: int  # a catenary cell without tension, or -1
+    judged: bool  # False when its stability could not be judged (an end moment)
 
 
 def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray) -> bool:
@@ -82,10 +87,24 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray)
     return True
 
 
+def is_judged(line: Line, ends: Ends, length: float) -> bool:
+    """Whether the test of stability can speak: there is a rod, and no end moment to speak of.
+
+    A moment that keeps its direction in space is not conservative; positive definiteness says nothing then.
+    """
+    bending = float((line.kb * line.hn[:, None]).max(initial=0.0)) / length
+    return bool(line.element.any()) and float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
+
+
+def is_stable(line: Line, ends: Ends, state: State, length: float, scale: float) -> bool:
+    """True when the static stiffness of a state is positive definite, or cannot be judged."""
+    return not is_judged(line, ends, length) or _Solver(line, length, scale, -np.inf).stable(ends, state)
+
+
 class _Solver:
-    def __init__(self, line: Line, length: float, scale: float, stop_when_slack: bool) -> None:
+    def __init__(self, line: Line, length: float, scale: float, floor: float) -> None:
         n = line.h.size
-        self.line, self.length, self.scale, self.stop_when_slack = line, length, scale, stop_when_slack
+        self.line, self.length, self.scale, self.floor = line, length, scale, floor
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.total = 0
 
@@ -123,12 +142,11 @@ class _Solver:
         )  # fmt: skip
         self.total += iterations
         new.r[:] += u
-        if outcome == Outcome.OK and self.stop_when_slack:
-            slack = slackest(line, new.T, SLACK_FLOOR * self.scale)
+        if outcome == Outcome.OK:
+            slack = slackest(line, new.T, self.floor)
             if slack >= 0:
                 outcome, where = Outcome.SLACK, slack
-        # an end moment that keeps its direction in space is not conservative, and this test does not judge it
-        judged = line is self.line and line.element.any() and not ends.moment.any()
+        judged = line is self.line and is_judged(line, ends, self.length)
         if outcome == Outcome.OK and judged and not self.stable(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
@@ -187,10 +205,8 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     time_scale = np.sqrt(float(line.mass.sum()) * length / solver.scale)
     damp = 2.0 * line.mass / time_scale
     damped = line._replace(damp=np.nan_to_num(line.damp) + damp, bits=line.bits | MASS_DAMPING)
-    stepper = Stepper(damped, length, solver.scale, stop_when_slack=False)
+    stepper = Stepper(damped, length, solver.scale)
     old = state.copy()
-    # A start that is compressed (straight between close ends) gets its length back first: the
-    # chords keep their directions and the held end is drawn back by Newton within the first steps.
     new = old.copy()
     dt = 1e-3 * time_scale
     calm = 0
@@ -214,34 +230,74 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     return old
 
 
+def _nudged(solver: _Solver, state: State) -> State:
+    """A state given a small push in all three directions and a turn about itself, off an unstable equilibrium."""
+    pushed = state.copy()
+    x = solver.line.s / solver.length
+    speed = PUSH * solver.length / np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale)
+    for k in range(3):
+        pushed.v[:, k] = speed * np.sin((k + 1) * np.pi * x + 0.3 * k)
+    d = pushed.e / np.linalg.norm(pushed.e, axis=1)[:, None]
+    turned = np.cos(TURN) * pushed.a1 + np.sin(TURN) * np.cross(d, pushed.a1)
+    pushed.a1[:] = np.where(solver.line.spin[:, None] == 1, turned, pushed.a1)
+    return pushed
+
+
 def _roads(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
-    yield "Newton from the starting shape", *solver.newton(solver.line, ends, start)
-    yield _hardened(solver, ends, start)
+    first = ("Newton from the starting shape", *solver.newton(solver.line, ends, start))
+    yield first
+    soft = _hardened(solver, ends, start)
+    yield soft
     yield from _loaded(solver, ends, start)
-    relaxed = _relax(solver, ends, start)
-    yield "damped motion to rest, then Newton", *solver.newton(solver.line, ends, relaxed)
+    settled = ("damped motion to rest, then Newton", *solver.newton(solver.line, ends, _relax(solver, ends, start)))
+    yield settled
+    for _, outcome, _, state in (settled, soft, first):
+        if outcome == Outcome.UNSTABLE:
+            fallen = _relax(solver, ends, _nudged(solver, state))
+            yield "pushed off an unstable equilibrium", *solver.newton(solver.line, ends, fallen)
 
 
 def solve_statics(
-    line: Line, ends: Ends, start: State, length: float, scale: float, slack: str = "stop"
+    line: Line,
+    ends: Ends,
+    start: State,
+    length: float,
+    scale: float,
+    floor: float | None = None,
+    take_slack: bool = False,
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
+    length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
+    (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that.
+
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
-    ladders of end loads; then a damped motion that settles, and Newton again.  Raises
-    ComputationError when none of them arrives, or when a catenary zone is not under
-    tension in the solution.
+    ladders of end loads; then a damped motion that settles, and Newton again; then a push
+    off an unstable equilibrium.  Raises ComputationError when none of them arrives; with
+    `take_slack` a slack solution is taken when there is no taut one.
     """
-    solver = _Solver(line, length, scale, slack == "stop")
+    # at rest a catenary needs more than no tension: without any, every shape is an equilibrium
+    solver = _Solver(line, length, scale, LEAST_TENSION * abs(1e-6 * scale if floor is None else floor))
     path: list[str] = []
-    roads = _roads(solver, ends, start)
-    outcome = Outcome.NOT_CONVERGED
-    while outcome != Outcome.OK and (road := next(roads, None)) is not None:
-        how, outcome, where, state = road
+    failed: list[tuple[Outcome, int, State]] = []
+    for how, outcome, where, state in _roads(solver, ends, start):
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations so far)")
-    if outcome != Outcome.OK:
-        s = float(line.s[min(max(where, 0), line.s.size - 1)])
-        raise ComputationError(outcome, None, s, "; ".join(path))
+        if outcome == Outcome.OK:
+            return _found(solver, ends, state, path)
+        failed.append((outcome, where, state))
+    for worst in (Outcome.SLACK, Outcome.UNSTABLE, failed[0][0]):  # what says most about the line comes first
+        for outcome, where, state in failed:
+            if outcome == worst == Outcome.SLACK and take_slack:
+                return _found(solver, ends, state, path)
+            if outcome == worst:
+                s = float(line.s[min(max(where, 0), line.s.size - 1)])
+                raise ComputationError(outcome, None, s, "; ".join(path))
+    raise AssertionError("one of the roads has failed with the first road's outcome")
+
+
+def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equilibrium:
     residual = solver.prove(ends, state)
-    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy())
+    slack = slackest(solver.line, state.T, solver.floor)
+    judged = is_judged(solver.line, ends, solver.length) or not solver.line.element.any()
+    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), judged)

@@ -11,9 +11,10 @@ import math
 
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
-from hybrid.physics.rotations import cross, dot, spin_about, transport
+from hybrid.physics.element import relative_rotation
+from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.solve.blocks import substitute
-from hybrid.solve.march import march
+from hybrid.solve.march import get9, march
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
@@ -24,6 +25,9 @@ OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # error
 TOLERANCE = 1e-9
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
+# Round-off of a length, as a part of it, and the most (as a part of the tension scale) that it may
+# make of a tension: a step so small that it is more does not converge, and says so.
+ROUND_OFF_LENGTH, MOST_NOISE = 1e-15, 1e-3
 # Changes of tension count against the largest tension of the line, or against this part of
 # the tension scale of the scene where that is larger (a line can be free of tension).
 LOW_TENSION = 1e-3
@@ -131,6 +135,13 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
     before = math.inf
     left = math.inf
     where = -1
+    # What round-off of a cell's length makes of the tension when inertia must account for it within a short step.
+    heavy = 0.0
+    longest = 0.0
+    for i in range(e.shape[0]):
+        heavy += line.mass[i]
+        longest = max(longest, line.h[i])
+    noise = min(ROUND_OFF_LENGTH * longest * heavy * ca, MOST_NOISE * scale)
     for it in range(1, most + 1):
         bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
@@ -146,7 +157,7 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
         update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
-        size = max(turn, pull / max(big, LOW_TENSION * scale))
+        size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
         left = size * min(1.0, ratio * ratio)
         if part == 1.0:
@@ -159,19 +170,40 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
 
 
 @kernel
-def sharpest(line, e):
-    """Largest angle (rad) between two cells that a rod element joins, and its node; 0 and -1 without any."""
-    angle, where = 0.0, -1
-    before = (0.0, 0.0, 0.0)
-    for i in range(e.shape[0]):
-        d, _, _ = chord((e[i, 0], e[i, 1], e[i, 2]))
-        if i > 0 and line.element[i]:
-            c = cross(d, before)
-            a = math.atan2(math.sqrt(dot(c, c)), dot(d, before))
-            if not a <= angle:
-                angle, where = a, i
-        before = d
-    return angle, where
+def sharpest(line, ends, e, T, a1):
+    """How far the mesh is from resolving a rod: largest bend and twist of an element, rad, and their nodes (-1: none).
+
+    The element at a clamp or guide stands for half a cell; it counts twice, and more where
+    the cell is longer than sqrt(EI/T), the length over which a cable leaves its clamp.
+    """
+    bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
+    n = e.shape[0]
+    for i in range(n + 1):
+        if not line.element[i]:
+            continue
+        c = min(i, n - 1)
+        d, l, _ = chord((e[c, 0], e[c, 1], e[c, 2]))
+        Rb = frame((a1[c, 0], a1[c, 1], a1[c, 2]), d)
+        weight = 1.0
+        if 0 < i < n:
+            d, _, _ = chord((e[i - 1, 0], e[i - 1, 1], e[i - 1, 2]))
+            Ra = frame((a1[i - 1, 0], a1[i - 1, 1], a1[i - 1, 2]), d)
+        else:
+            Ra = get9(ends.frame, 0 if i == 0 else 1)
+            if i == n:
+                Ra, Rb = Rb, Ra
+            stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+            weight = 2.0
+            if T[c] > 0.0:
+                weight = max(weight, l * math.sqrt(T[c] / stiffness))
+        k = log_rotation(relative_rotation(Ra, Rb))
+        x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
+        y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
+        if not x <= bend:
+            bend, bend_at = x, i
+        if not y <= twist:
+            twist, twist_at = y, i
+    return bend, bend_at, twist, twist_at
 
 
 @inner

@@ -21,12 +21,6 @@ REACH = 0.1
 # dvd'/dr' of the solve for consistent accelerations, 1/s2: so large that no stiffness of a real cable
 # (EI/(m h^4) is 1e20 at the very worst) shows beside inertia, and far from overflow.
 HEAVY = 1e36
-# A rod that bends by more than this (rad) from one cell to the next is not resolved by its mesh.
-UNRESOLVED_BEND = 1.0
-# A catenary cell counts as slack when its tension is not above this part of the tension
-# scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
-SLACK_FLOOR = -1e-6
-
 # report of the march -> powers: start, end (reactions and given moments), applied forces and
 # moments, drag, mass-proportional damping, stiffness-proportional damping, added mass
 POWERS = ("start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass")
@@ -47,10 +41,10 @@ class Taken:
 class Stepper:
     """Takes steps of one line; owns the work arrays, not the state."""
 
-    def __init__(self, line: Line, length: float, tension_scale: float, stop_when_slack: bool) -> None:
+    def __init__(self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf) -> None:
         self.line = line
         self.reach, self.scale = REACH * length, tension_scale
-        self.floor = SLACK_FLOOR * tension_scale if stop_when_slack else -np.inf
+        self.floor = slack_floor  # N; a catenary cell not above it refuses the step
         n = line.h.size
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.u = np.zeros((n + 1, 3))

@@ -42,7 +42,7 @@ def moving(zones):
     """A stepper and a state in motion, for timing steps without a driver."""
     model = build(scene(zones, start="equilibrium"))
     found = solve_statics(model.line, model.ends.at(np.inf), model.start, model.length, model.tension_scale)
-    stepper = Stepper(model.line, model.length, model.tension_scale, False)
+    stepper = Stepper(model.line, model.length, model.tension_scale)
     state = found.state.copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
     stepper.ignite(model.ends.at(np.inf), np.zeros((2, 3)), state)

@@ -36,6 +36,8 @@ def made(
     status: str = "complete",
     message: str = "",
     title: str = "Made-up mooring",
+    curvature: float = 0.0,
+    events: Sequence[tuple[float, str, str]] = (),
 ) -> Result:
     """A result on 0 <= s <= 100 m and 0 <= t <= 10 s with a given shape and plausible forces."""
     s = np.linspace(0.0, 100.0, 41)
@@ -50,13 +52,15 @@ def made(
         values = {
             "position": np.stack([np.broadcast_to(x, s.shape) for x in position(s, t)], axis=1),
             "tension": tension * (1.0 + 0.1 * np.sin(t)) * (1.0 + s / 200.0),
-            "curvature": 2e-3 * np.exp(-((s - 80.0) ** 2) / 100.0),
+            "curvature": 2e-3 * np.exp(-((s - 80.0) ** 2) / 100.0) + curvature * (t < 1.0) * (s > 97.0),
             "theta": s / 200.0,
             "torque": torque + 0.0 * s,
         }
         if moment:
             values["bending_moment"] = np.where(s > 75.0, 3.0 + np.sin(t), 0.0)
         recorder.save(float(t), values, zones(float(t)))
+    for t, kind, text in events:
+        recorder.event(t, 0.0, 100.0, kind, text)
     recorder.close(status, message)
     return open_result(memory)
 
@@ -86,15 +90,16 @@ def texts(figure: Figure) -> str:
 def test_a_summary_shows_shape_profiles_and_histories(tmp_path: Path) -> None:
     result = made(sag, zones=lambda t: [("rod", 0.0, 100.0)] if t < 5 else MIXED)
     figure = plot.plot_summary(result, tmp_path / "page.png")
-    shape, tension, h_tension, moment, h_position = _panels(figure)
-    assert [a.get_xlabel() for a in (shape, tension, h_tension)] == ["x (m)", "s (m)", "t (s)"]
-    assert (shape.get_ylabel(), tension.get_ylabel(), moment.get_ylabel()) == ("z (m)", "tension (kN)", "moment (N m)")
+    shape, tension, moment, h_tension, h_position = _panels(figure)
+    assert [a.get_xlabel() for a in (shape, moment, h_tension)] == ["x (m)", "s (m)", "t (s)"]
+    assert (shape.get_ylabel(), tension.get_ylabel()) == ("z (m)", "tension (kN)")
+    assert (moment.get_ylabel(), moment.get_title("left")) == ("|moment| (N m)", "|bending moment| at t = 10 s")
     assert h_position.get_ylabel() == "Δz (m)" and h_tension.get_ylabel() == "tension (kN)"
     assert shape.get_aspect() == 1.0
     kinds = [line for line in shape.lines if line.get_label() in ("rod", "catenary")]
     assert [line.get_label() for line in kinds] == ["catenary", "rod"] and kinds[0].get_color() != kinds[1].get_color()
     assert kinds[0].get_xdata()[-1] == kinds[1].get_xdata()[0] == pytest.approx(67.5)  # at the joint itself
-    assert len([line for line in shape.lines if line.get_linewidth() == 0.7]) == 9  # earlier shapes
+    assert len(_earlier(shape)) == 9
     assert tension.lines[0].get_ydata() == pytest.approx(result.tension[-1] / 1e3)
     assert len(tension.collections) == 1 and len(tension.patches) == 2  # the range over time; two shaded zones
     curves = [line for line in h_tension.lines if line.get_label().startswith("s = ")]
@@ -108,8 +113,10 @@ def test_a_summary_shows_shape_profiles_and_histories(tmp_path: Path) -> None:
         "joint",
         "start",
         "end",
-        "earlier shapes",
+        "earlier shapes at t = 0, ",
         "range over time",
+        "zones changed",
+        "catenary 0 … 75 m, rod 75 … 100 m",
         "s = 50 m",
     ):
         assert part in text
@@ -123,13 +130,17 @@ def test_a_summary_shows_shape_profiles_and_histories(tmp_path: Path) -> None:
 
 def _panels(figure: Figure) -> list[Any]:
     by_name = {ax.get_label(): ax for ax in figure.axes}
-    return [by_name[k] for k in ("shape0", "p0", "h0", "p1", "h1")]
+    return [by_name[k] for k in "spPhH"]
+
+
+def _earlier(shape: Any) -> list[Any]:
+    return [line for line in shape.lines if line.get_linewidth() == 0.7]
 
 
 def test_torque_is_drawn_when_there_is_some() -> None:
-    moment = _panels(plot.plot_summary(made(sag, torque=-0.5)))[3]
-    assert [line.get_label() for line in moment.lines] == ["bending moment", "torque"]
-    assert moment.get_title("left") == "bending moment and torque at t = 10 s"
+    moment = _panels(plot.plot_summary(made(sag, torque=-0.5)))[2]
+    assert [line.get_label() for line in moment.lines[:2]] == ["|bending moment|", "torque"]
+    assert moment.get_title("left") == "|moment|, torque at t = 10 s"
 
 
 def test_statics_show_curvature_and_tangent_in_place_of_histories() -> None:
@@ -138,15 +149,137 @@ def test_statics_show_curvature_and_tangent_in_place_of_histories() -> None:
     for part in ("static", "curvature (1/km)", "angle to z (°)", "tension (mN)"):
         assert part in text
     assert "t (s)" not in text and "range over time" not in text and "t = " not in text
-    image(figure)
+    assert_tidy(figure)
 
 
-def test_a_catenary_says_that_it_has_no_moment() -> None:
-    figure = plot.plot_summary(made(sag, zones=lambda t: [("catenary", 0.0, 100.0)]))
-    assert "no rod zone" in texts(figure) and "joint" not in texts(figure)
-    figure = plot.plot_summary(made(sag, zones=lambda t: [("catenary", 0.0, 100.0)], moment=False))
-    assert "no rod zone" in texts(figure)
-    assert "bending moment was not recorded" in texts(plot.plot_summary(made(sag, moment=False)))
+def test_a_catenary_shows_its_curvature_in_place_of_a_moment() -> None:
+    all_catenary = [("catenary", 0.0, 100.0)]
+    for moment in (True, False):
+        figure = plot.plot_summary(made(sag, zones=lambda t: all_catenary, moment=moment))
+        panel = _panels(figure)[2]
+        assert panel.get_title("left") == "curvature at t = 10 s" and panel.get_ylabel() == "curvature (1/km)"
+        assert "moment" not in texts(figure) and "joint" not in texts(figure)
+    statics = plot.plot_summary(made(sag, nt=1, zones=lambda t: all_catenary))
+    titles = [ax.get_title("left") for ax in _panels(statics)]
+    assert titles == ["shape", "tension", "curvature", "angle to z", "position z"]  # no panel empty or twice
+    assert "curvature" in texts(plot.plot_summary(made(sag, moment=False)))  # a rod whose moment was not recorded
+
+
+def test_a_passing_spike_does_not_press_the_rest_to_the_ground() -> None:
+    ax = Figure().subplots()
+    plot.plot_profiles(ax, made(sag, curvature=5.0), "curvature")
+    assert 2e-3 < ax.get_ylim()[1] < 0.01 and ax.get_ylim()[0] > -0.01
+    assert [t.get_text() for t in ax.texts] == ["peak 5 1/m at s = 97.5 m"]
+
+
+def relaxing(s: np.ndarray, t: float) -> Sequence[Any]:
+    return s, 0.0, 30.0 * np.sin(np.pi * s / 100.0) * np.exp(-3.0 * t)
+
+
+def swinging(s: np.ndarray, t: float) -> Sequence[Any]:
+    """Its period is 10 s / 9: the nine shapes that are even in time, or in distance, are all the same."""
+    angle = 0.5 * np.sin(2.0 * np.pi * 0.9 * t)
+    return s * np.sin(angle), 0.0, -s * np.cos(angle)
+
+
+def test_earlier_shapes_show_the_motion() -> None:
+    times = plot._telling_times(made(relaxing, nt=401))
+    assert len(times) == 9 and times[0] == 0.0 and times.max() < 1.5
+    left = np.sort(np.exp(-3.0 * times))
+    assert np.diff(left).max() < 0.26  # nothing much is left out; even times miss 98 % of it
+    times = plot._telling_times(made(swinging, nt=181))
+    phase = np.sort(np.sin(2.0 * np.pi * 0.9 * times))
+    assert phase[0] < -0.98 and phase[-1] > 0.98 and np.diff(phase).max() < 0.51
+    still = plot.plot_summary(made(lambda s, t: (s, 0.0, 0.0)))
+    assert "earlier shapes" not in texts(still) and _earlier(_panels(still)[0]) == []
+
+
+def test_the_area_that_was_swept_is_shaded() -> None:
+    ax = Figure().subplots()
+    plot.plot_shape(ax, made(swinging, nt=181), times=[])
+    (area,) = ax.collections
+    tips = np.array([path.vertices[40] for path in area.get_paths()])
+    assert np.ptp(tips[:, 0]) == pytest.approx(2 * 100.0 * np.sin(0.5), rel=0.02)
+
+
+def test_the_table_of_pages_tells_what_room_they_leave(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name, position in (("_ONE_VIEW", sag), ("_TWO_VIEWS", CASES["bowed"][0])):
+        result = made(position, nt=3)
+        for page in getattr(plot, name)[::3]:  # every kind of page, not every width
+            monkeypatch.setattr(plot, name, [page])
+            figure = plot.plot_summary(result)
+            figure.get_layout_engine().execute(figure)
+            for ax in figure.axes:
+                width, height = ax.bbox.size / figure.dpi
+                if ax.get_label() in "sS":
+                    # 4 %: the numbers have two digits, and tick labels differ in width
+                    assert width / height == pytest.approx(page[3], rel=0.04), page
+                assert width > 1.2 and height > 0.75  # inches; smaller is not legible
+            monkeypatch.undo()
+
+
+@pytest.mark.parametrize("ratio", [0.02, 0.8, 2.7, 30.0])
+def test_the_shape_fills_its_panel(ratio: float) -> None:
+    """Whatever its proportions, to scale or magnified; to 1 %, since the limits, when set, move the tick labels."""
+    up = 100.0 / max(ratio, 1.0)
+    result = made(lambda s, t: (0.5 * ratio * up * np.cos(s / 16), 0.0, 0.5 * up * np.sin(s / 16)), nt=2)
+    figure = plot.plot_summary(result)
+    figure.draw_without_rendering()
+    ax = _panels(figure)[0]
+    area = np.prod(
+        [np.ptp(result.position[..., k]) / np.ptp(lim) for k, lim in ((0, ax.get_xlim()), (2, ax.get_ylim()))]
+    )
+    assert area > 0.5  # 0.8 is what the margins leave of a perfect fit
+    scale = ax.transData.transform([[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]])
+    across, tall = scale[1, 0] - scale[0, 0], scale[2, 1] - scale[0, 1]
+    title = ax.get_title("left")
+    said = float(title.split(" × ")[1]) if " × " in title else 1.0
+    assert max(across, tall) / min(across, tall) == pytest.approx(said, rel=0.01)
+    assert (said > 1.0) == (ratio < 0.08 or ratio > 1 / 0.08)
+
+
+def test_a_small_sway_across_a_sagging_line_is_shown() -> None:
+    """1 m in 90 m, out of the plane of a sag of 30 m: below 2 % of the extent, but all that moves."""
+    figure = plot.plot_summary(made(lambda s, t: (0.9 * s, 0.5 * np.sin(s / 32) * np.sin(t), sag(s, 1.57)[2]), nt=40))
+    by_name = {ax.get_label(): ax for ax in figure.axes}
+    assert by_name["s"].get_title("left") == "shape at t = 10 s"
+    above = by_name["S"]
+    assert above.get_title("left") == "shape from above at t = 10 s, y × 20"
+    figure.canvas.draw()
+    assert 1.0 / np.ptp(above.get_ylim()) > 0.5
+
+
+EVENTS = [
+    (0.0, "turned in", "the tangent is missed by $30$ deg"),
+    (3.0, "slack", "tension -1 N: " + "what follows is grid noise " * 9),
+    (2.0, "slack", "tension -0.1 N\n in a catenary zone " + "and so on " * 30),
+    (1.0, "rod", "of no concern"),
+]
+
+
+def test_warnings_are_mentioned_in_one_line_the_worst_first() -> None:
+    figure = plot.plot_summary(made(sag, events=EVENTS, title="Costs $1 or $2 " * 20))
+    (line,) = [t for t in figure.texts if t.get_text().startswith("Note")]
+    assert line.get_text().startswith("Note: slack (× 2), turned in; at t = 2 s: tension -0.1 N in a catenary zone and")
+    assert line.get_text().endswith(" …")
+    assert_tidy(figure)
+    figure = plot.plot_summary(made(sag, nt=0, events=EVENTS[:1]))
+    assert "Note: turned in; at t = 0 s: the tangent is missed by $30$ deg" in texts(figure)
+    assert "Note" not in texts(plot.plot_summary(made(sag, nt=0, events=EVENTS[3:])))
+
+
+def assert_tidy(figure: Figure) -> None:
+    """Nothing leaves the page, and no panel, legend or line of text lies on another."""
+    figure.draw_without_rendering()
+    boxes = {f"panel {ax.get_label()}": ax.get_tightbbox() for ax in figure.axes}
+    boxes |= {f"legend {k}": legend.get_window_extent() for k, legend in enumerate(figure.legends)}
+    boxes |= {t.get_text()[:20]: t.get_window_extent() for t in figure.texts}
+    for name, box in boxes.items():
+        assert box.x0 > 0 and box.y0 > 0 and box.x1 < 1200 and box.y1 < 900, (name, box)
+        for other, there in boxes.items():
+            # 3 pixels: the empty rims of letters and legends
+            apart = max(box.x0 - there.x1, there.x0 - box.x1, box.y0 - there.y1, there.y0 - box.y1)
+            assert name == other or apart > -3, (name, other, apart)
 
 
 @pytest.mark.parametrize(
@@ -168,11 +301,11 @@ def test_nothing_saved_still_gives_a_page() -> None:
 CASES: dict[str, tuple[Callable[[np.ndarray, float], Sequence[Any]], list[tuple[str, str]], str]] = {
     "in x-z": (sag, [("x (m)", "z (m)")], ""),
     "in y-z": (lambda s, t: (0.0, *sag(s, t)[::2]), [("y (m)", "z (m)")], ""),
-    "level": (lambda s, t: (*sag(s, t)[::2], -5.0), [("x (m)", "y (m)")], "from above"),
+    "level": (lambda s, t: (*sag(s, t)[::2], -5.0), [("x (m)", "y (m)")], "shape from above at"),
     "oblique": (
         lambda s, t: (0.8 * sag(s, t)[0], 0.6 * sag(s, t)[0], sag(s, t)[2]),
         [("horizontal, 36.9° from x (m)", "z (m)")],
-        "vertical plane",
+        "shape at",
     ),
     "helix": (
         lambda s, t: (3 * np.cos(s / 5), 3 * np.sin(s / 5), -0.8 * s),
@@ -182,10 +315,10 @@ CASES: dict[str, tuple[Callable[[np.ndarray, float], Sequence[Any]], list[tuple[
     "bowed": (
         lambda s, t: (0.9 * s, 20 * np.sin(s / 32 + t), sag(s, t)[2]),
         [("x (m)", "z (m)"), ("x (m)", "y (m)")],
-        "from above",
+        "shape from above at",
     ),
     "nearly straight": (lambda s, t: (0.3 * np.sin(s / 32) * np.cos(t), 0.0, -s), [("x (m)", "z (m)")], "x × 50"),
-    "sideways": (lambda s, t: (0.01 * np.sin(s / 32), 0.9 * np.sin(s / 32), -s), [("y (m)", "z (m)")], "y × 20"),
+    "sideways": (lambda s, t: (0.01 * np.sin(s / 32), 0.9 * np.sin(s / 32), -s), [("y (m)", "z (m)")], "y × 30"),
     "straight": (lambda s, t: (s, 0.0, 0.0), [("x (m)", "z (m)")], ""),
 }
 
@@ -193,11 +326,20 @@ CASES: dict[str, tuple[Callable[[np.ndarray, float], Sequence[Any]], list[tuple[
 @pytest.mark.parametrize("case", CASES)
 def test_the_plane_suits_the_shape(case: str) -> None:
     position, labels, title = CASES[case]
-    figure = plot.plot_summary(made(position, nt=3))
-    shapes = [ax for ax in figure.axes if ax.get_label().startswith("shape")]
+    many = [
+        ("rod", 0.0, 5.0),
+        ("catenary", 5.0, 60.0),
+        ("rod", 60.0, 70.0),
+        ("catenary", 70.0, 90.0),
+        ("rod", 90.0, 100.0),
+    ]
+    figure = plot.plot_summary(
+        made(position, nt=3, torque=-0.5, zones=lambda t: many if t > 0 else MIXED, events=EVENTS)
+    )
+    shapes = [ax for ax in figure.axes if ax.get_label() in "sS"]
     assert [(ax.get_xlabel(), ax.get_ylabel()) for ax in shapes] == labels
     assert title in texts(figure)
-    image(figure)
+    assert_tidy(figure)
 
 
 def test_parts_draw_on_axes_of_the_user() -> None:
@@ -208,7 +350,7 @@ def test_parts_draw_on_axes_of_the_user() -> None:
     plot.plot_profiles(b, result, "curvature", output=0)
     plot.plot_history(c, result, "position", [0.0, 33.0])
     plot.plot_history(d, result, "position", [33.0], component=2)
-    assert a.get_xlabel() == "y (m)" and len([x for x in a.lines if x.get_linewidth() == 0.7]) == 2
+    assert a.get_xlabel() == "y (m)" and len(_earlier(a)) == 2
     assert b.get_ylabel() == "curvature (1/km)"
     assert c.lines[1].get_ydata() == pytest.approx(np.linalg.norm(result.at(s=33.0)["position"], axis=-1))
     assert d.lines[0].get_ydata()[0] == 0.0 and d.get_ylabel() == "Δz (m)"

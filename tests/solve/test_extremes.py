@@ -66,7 +66,7 @@ def banded(rows, tension):
 
 def disagreement(model, state, cv, ca):
     """March against LAPACK for one Newton system, relative to the largest correction of each kind of unknown."""
-    stepper = Stepper(model.line, model.length, model.tension_scale, False)
+    stepper = Stepper(model.line, model.length, model.tension_scale)
     rows = np.zeros((model.line.s.size, SIZE * WIDTH))
     u = np.zeros_like(state.r)
     march(
@@ -104,7 +104,7 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
     assert static < bound
     assert moving < (1e-9 if cells <= 1000 else 1e-8)
 
-    stepper = Stepper(line, model.length, model.tension_scale, True)
+    stepper = Stepper(line, model.length, model.tension_scale, model.slack_floor)
     state = found.state.copy()
     state.v[:, 1] = np.sin(np.pi * line.s / LENGTH)
     stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), state)
@@ -131,7 +131,7 @@ def test_long_line_at_low_tension(stiffness, tension):
         }
     )  # fmt: skip
     model = build(scene)
-    stepper = Stepper(model.line, model.length, model.tension_scale, True)
+    stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     state = model.start.copy()
     x = model.line.s / 1000.0
     state.v[:, 1], state.v[:, 2] = np.sin(3 * np.pi * x) * x, 0.3 * np.sin(5 * np.pi * x) * x

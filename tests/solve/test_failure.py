@@ -66,7 +66,7 @@ def test_energy_from_nowhere_is_noted_and_stops():
     with pytest.raises(hybrid.ComputationError) as stop:
         hybrid.run(scene("rod"))
     assert stop.value.outcome is hybrid.Outcome.GAINS_ENERGY
-    assert "were put in" in str(stop.value)
+    assert "fastest point" in str(stop.value)
 
 
 def test_a_cable_pulled_beyond_its_length():
@@ -79,7 +79,7 @@ def test_a_cable_pulled_beyond_its_length():
 @pytest.mark.parametrize("field", ["e", "v", "T", "a1"])
 def test_a_number_that_is_not_finite_is_found_at_once(field):
     model = build(scene("rod"))
-    stepper = Stepper(model.line, model.length, model.tension_scale, True)
+    stepper = Stepper(model.line, model.length, model.tension_scale, model.slack_floor)
     old = model.start.copy()
     getattr(old, field)[17] = np.nan
     taken = stepper.step(model.ends.at(0.0), old, old.copy(), 0.01, 0.5)
@@ -98,19 +98,12 @@ def test_a_force_beyond_all_numbers_is_said():
 
 
 def test_nothing_holds_the_line():
-    """Statics of a line that can move without resistance: singular, not a number."""
-    weightless = scene(
-        environment={"gravity": 0.0},
-        ends={"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [1.0, 0, 0]}},
-    )
+    """A slack, weightless catenary between two points has no equilibrium; nothing gives it a shape."""
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [1.0, 0, 0]}}
     with pytest.raises(hybrid.ComputationError) as stop:
-        hybrid.static(weightless)
-    assert stop.value.outcome in (
-        hybrid.Outcome.SINGULAR,
-        hybrid.Outcome.SLACK,
-        hybrid.Outcome.NOT_CONVERGED,
-        hybrid.Outcome.NOT_FINITE,
-    )
+        hybrid.static(scene(environment={"gravity": 0.0}, ends=ends))
+    assert stop.value.t is None
+    assert stop.value.outcome is not hybrid.Outcome.OK
 
 
 def test_a_coarse_bend_is_noted():
@@ -120,9 +113,8 @@ def test_a_coarse_bend_is_noted():
         "end": {"kind": "free", "moment": [0.0, 0.01 * 2 * np.pi, 0.0]},
     }
     result = hybrid.static(scene("rod", environment={"gravity": 0.0}, ends=ends, mesh={"cells": 5}, time=None))
-    (event,) = result.events
-    assert event.kind == "unresolved bend"
-    assert "would resolve it" in event.text
+    assert {e.kind for e in result.events} == {"unresolved bend", "not judged"}
+    assert any("would resolve it" in e.text for e in result.events)
 
 
 def test_undamped_inextensible_is_noted():

@@ -1,0 +1,132 @@
+"""What is watched while a cable is computed: everything that would make an answer wrong in silence.
+
+Each watch writes an event when something shows first and again when it has become much
+worse; what makes going on pointless is returned as an Outcome, with its node or cell.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.model.build import Model
+from hybrid.model.state import Ends, Floats, State
+from hybrid.results.record import Recorder
+from hybrid.solve.statics import Equilibrium, is_stable
+from hybrid.solve.step import sharpest, slackest
+
+# A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
+UNRESOLVED = 1.0
+# Twist of an element (rad) that could just as well be its opposite: the log strain ends at pi.
+LARGEST_TWIST = 2.8
+# Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
+# noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
+GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
+# Energy that the scheme swallows, as a part of the same: beyond this a motion was too fast for its step.
+LOSS_NOTED = 0.5
+# A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
+AT_REST = 1e-4
+
+Stop = tuple[Outcome, int] | None
+
+
+class Watch:
+    """The watches of one run or one static solve."""
+
+    def __init__(self, recorder: Recorder, model: Model) -> None:
+        self._recorder, self._model = recorder, model
+        self._bend = self._twist = UNRESOLVED
+        self._slack = model.slack_floor
+        self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
+        self._rested = False
+        self._put_in = self._potential = self._alive = 0.0  # J
+        for entry in model.ledger:
+            if entry.ignored:
+                s = 0.0 if "start" in entry.what else model.length
+                recorder.event(0.0, s, s, "ignored", f"{entry.what}: {entry.why}")
+
+    def note(self, t: float, node: int, kind: str, text: str) -> None:
+        s = float(self._model.line.s[node])
+        self._recorder.event(t, s, s, kind, text)
+
+    def equilibrium(self, found: Equilibrium) -> None:
+        """What a static solution leaves open."""
+        if found.slack >= 0:
+            s, tension = float(self._model.line.s[found.slack]), float(found.state.T[found.slack])
+            text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
+            self.note(0.0, found.slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        if not found.judged:
+            text = "the stability of this equilibrium is not judged, because an end moment is not conservative"
+            self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
+
+    def shape(self, t: float, ends: Ends, state: State) -> Stop:
+        """Bends and twists that the mesh does not resolve."""
+        line = self._model.line
+        bend, node, twist, twisted = sharpest(line, ends, state.e, state.T, state.a1)
+        if bend > self._bend:
+            finer = 0.3 * float(line.hn[node]) / bend
+            s = float(line.s[node])
+            at_end = node in (0, line.s.size - 1)
+            text = f"the bend at s = {s:g} m is sharper than the mesh ({np.degrees(bend):.0f} deg to the next cell)"
+            if at_end:
+                text = f"the bend at the end s = {s:g} m is sharper than the mesh"
+            text += f": curvature and moment are wrong there; cells of {finer:.2g} m would resolve it"
+            self.note(t, node, "unresolved bend", text)
+            self._bend = 1.5 * bend
+        if twist > self._twist:
+            text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
+            self.note(t, twisted, "unresolved twist", text)
+            self._twist = 1.5 * twist
+        return (Outcome.TWISTED_TOO_FAR, twisted) if twist > LARGEST_TWIST else None
+
+    def tension(self, t: float, state: State) -> None:
+        """Catenary cells without tension, where the scene asks to go on with them."""
+        cell = slackest(self._model.line, state.T, self._slack)
+        if cell >= 0:
+            tension = float(state.T[cell])
+            s = float(self._model.line.s[cell])
+            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
+            self.note(t, cell, "slack", text)
+            self._slack = min(10.0 * tension, 10.0 * self._slack)
+
+    def energy(self, t: float, values: Mapping[str, Any], work: Floats, state: State) -> Stop:
+        """No scheme may create energy, nor swallow most of it."""
+        gained, potential = float(values["work/scheme"]), float(values["energy/potential"])
+        alive = sum(float(values[x]) for x in values if x.startswith("energy/")) - potential
+        if t == 0.0:
+            self._potential, self._alive = potential, alive
+            return None
+        self._put_in = max(self._put_in, float(np.abs(work).sum()) + abs(potential - self._potential) + self._alive)
+        floor = 1e-9 * self._model.tension_scale * self._model.length
+        fastest = int(np.argmax(np.abs(state.v).sum(axis=1)))
+        part = 100.0 * abs(gained) / (self._put_in or 1.0)
+        if gained > GAIN_STOPS * self._put_in + floor:
+            return Outcome.GAINS_ENERGY, fastest
+        if gained > self._gain * self._put_in + floor:
+            text = (
+                f"the computation has created {gained:.3g} J, {part:.0f} % of all put in: {Outcome.GAINS_ENERGY.remedy}"
+            )
+            self.note(t, fastest, "gains energy", text)
+            self._gain *= 3.0
+        if -gained > self._loss * self._put_in + floor:
+            text = f"the time scheme has swallowed {-gained:.3g} J, {part:.0f} % of all put in"
+            self.note(t, fastest, "loses energy", f"{text}: motion is faster than the step; make time.step smaller")
+            self._loss *= 1.3
+        return None
+
+    def rest(self, t: float, ends: Ends, values: Mapping[str, Any], state: State) -> None:
+        """A rod at rest, or nearly, on an equilibrium that it would buckle out of if anything touched it."""
+        line = self._model.line
+        rod = line.spin == 1
+        if self._rested or not rod.any():
+            return
+        elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
+        pressed = float(state.T[rod].min()) < 0.0 or float(values["energy/torsion"]) > 0.0
+        calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
+        if pressed and calm and not is_stable(line, ends, state, self._model.length, self._model.tension_scale):
+            text = "the rod rests where it would buckle: only its perfect symmetry keeps it there; give it a small bow"
+            self.note(t, int(np.argmin(state.T)), "unstable", text)
+            self._rested = True

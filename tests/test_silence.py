@@ -1,0 +1,220 @@
+"""Never a wrong answer in silence: ways to get one that were found by attack, each now answered, noted or refused."""
+
+import math
+
+import numpy as np
+import pytest
+
+import hybrid
+
+NO_GRAVITY = {"environment": {"gravity": 0.0}}
+TAUT = {"length": 1.0, "mass": 0.1, "bending_stiffness": 0.01, "torsional_stiffness": 0.01, "axial_stiffness": 1e4}
+
+
+def section(**values):
+    return {"cable": {"sections": [values]}}
+
+
+def pinned(*position, **more):
+    return {"kind": "pinned", "position": list(position), **more}
+
+
+def clamped(position, tangent, **more):
+    return {"kind": "clamped", "position": position, "tangent": tangent, **more}
+
+
+def static(*tables):
+    data = {}
+    for table in tables:
+        data |= table
+    return hybrid.static(hybrid.validate_scene({"initial": "equilibrium"} | data))
+
+
+def run(*tables):
+    data = {}
+    for table in tables:
+        data |= table
+    return hybrid.run(hybrid.validate_scene({"initial": "equilibrium"} | data))
+
+
+def kinds(result):
+    return {event.kind for event in result.events}
+
+
+def test_a_bend_at_a_clamp_that_the_mesh_does_not_see():
+    """10 km with cells of 100 m leave their clamp within sqrt(EI/T), half a metre: the moment is a thousandth."""
+    riser = section(length=1e4, mass=20.0, bending_stiffness=1e3, axial_stiffness=1e9)
+    ends = {"start": clamped([0, 0, -6000], [1, 0, 0]), "end": pinned(5000, 0, 0)}
+    assert "unresolved bend" in kinds(static(riser, {"ends": ends, "model": "rod"}))
+    fine = static(riser, {"ends": ends, "model": "rod", "mesh": {"cells": 4000, "ratio": 1000}})
+    assert "unresolved bend" not in kinds(fine)
+
+
+def test_a_twist_beyond_half_a_turn_a_cell_stops():
+    roll = {"roll": {"amplitude": 1500, "period": 4}, "ramp": 1}
+    ends = {"start": clamped([0, 0, 0], [1, 0, 0]), "end": clamped([1, 0, 0], [1, 0, 0], motion=roll)}
+    shaft = section(**TAUT | {"bending_stiffness": 1.0})
+    start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 1, "step": 0.001}}
+    with pytest.raises(hybrid.ComputationError) as stop:
+        run(NO_GRAVITY, shaft, {"ends": ends, "model": "rod", "mesh": {"cells": 4}}, start)
+    assert stop.value.outcome is hybrid.Outcome.TWISTED_TOO_FAR
+    result = run(NO_GRAVITY, shaft, {"ends": ends, "model": "rod"}, start)
+    assert result.torque[-1, 50] == pytest.approx(0.01 * math.radians(1500), rel=1e-3)
+
+
+def test_a_tiny_moment_does_not_switch_off_the_judgement_of_stability():
+    ends = {"start": clamped([0, 0, 0], [0, 0, 1]), "end": {"kind": "free", "moment": [0, 0, 1e-30]}}
+    column = section(length=1.0, mass=0.1, bending_stiffness=1e-3)
+    assert static(column, {"ends": ends, "model": "rod"}).position[0, -1, 2] < 0.0
+    ends["end"]["moment"] = [0, 1e-2, 0]
+    assert "not judged" in kinds(static(column, {"ends": ends, "model": "rod"}))
+
+
+def test_warn_finds_the_taut_solution_first():
+    ends = {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0)}
+    found = static(
+        section(length=2.0, mass=1.0, axial_stiffness=1e5),
+        {"ends": ends, "model": {"kind": "catenary", "slack": "warn"}},
+    )
+    assert found.tension.min() > 0.0
+    assert not kinds(found)
+
+
+def test_a_motion_faster_than_the_step_is_refused():
+    heave = {"heave": {"amplitude": 0.3, "period": 0.1}, "ramp": 1}
+    ends = {"start": pinned(0, 0, 0), "end": pinned(10, 0, 0, motion=heave)}
+    line = section(length=11.0, mass=1.0, axial_stiffness=1e6)
+    with pytest.raises(hybrid.SceneError, match=r"at least 6 time steps"):
+        run(line, {"ends": ends, "model": "catenary", "time": {"duration": 5, "step": 0.1}})
+    short = {"surge": {"amplitude": 0.1, "period": 2, "phase": 90}, "ramp": 1e-3}
+    ends["end"] = pinned(10, 0, 0, motion=short)
+    with pytest.raises(hybrid.SceneError, match="it is a jump"):
+        run(line, {"ends": ends, "model": "catenary", "time": {"duration": 1, "step": 0.1}})
+
+
+@pytest.mark.parametrize("normal", [[0, 0, 1], [0, 1, 0], [0, -1, 0], [0, 1, 1]])
+@pytest.mark.parametrize("start", [{}, {"swivel": True}])
+def test_a_normal_at_one_end_twists_nothing(normal, start):
+    ends = {"start": clamped([0, 0, 0], [1, 0, 0], **start), "end": clamped([1, 0, 0], [1, 0, 0], normal=normal)}
+    found = static(NO_GRAVITY, section(**TAUT), {"ends": ends, "model": "rod"})
+    assert np.abs(found.torque).max() < 1e-12
+
+
+def test_joints_let_two_normals_be():
+    zones = {"kind": "zones", "zones": [{"rod": 0.3}, {"catenary": 0.4}, {"rod": 0.3}]}
+    end = {"kind": "guided", "tangent": [1, 0, 0], "normal": [0, 0, 1], "force": [5, 0, 0]}
+    ends = {"start": clamped([0, 0, 0], [1, 0, 0], normal=[0, 1, 0]), "end": end}
+    start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 0.05, "step": 0.01}}
+    result = run(NO_GRAVITY, section(**TAUT), {"ends": ends, "model": zones}, start)
+    assert np.abs(result.torque).max() < 1e-12
+
+
+def test_a_strut_that_stands_by_symmetry_is_noted():
+    push = {"surge": {"amplitude": -0.02, "period": 4}, "ramp": 4}
+    ends = {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0, motion=push)}
+    line = section(length=1.0, mass=0.1, bending_stiffness=0.01, axial_stiffness=1e5)
+    result = run(NO_GRAVITY, line, {"ends": ends, "model": "rod", "time": {"duration": 5, "step": 0.01}})
+    assert "unstable" in kinds(result)
+
+
+def test_round_off_of_points_is_no_blow():
+    points = {"kind": "points", "points": [[0, 0, 0], [0, 0, -1000 * (1 + 1e-9)]]}
+    more = {"initial": points, "time": {"duration": 0.02, "step": 1e-3}, "output": {"every": 1e-3}, "model": "catenary"}
+    result = run(section(length=1000.0, mass=1.0), {"ends": {"start": pinned(0, 0, 0), "end": "free"}}, more)
+    assert np.abs(result.tension[:, 0] / 9810 - 1).max() < 1e-6
+
+
+def test_a_record_that_starts_with_an_acceleration(tmp_path):
+    t = np.linspace(0, 2, 201)
+    rows = np.column_stack([t, 0 * t, 0 * t, 1.5 * t**2])
+    np.savetxt(tmp_path / "lift.csv", rows, delimiter=",", header="t,x,y,z", comments="", fmt="%.14g")
+    start = pinned(0, 0, 0, motion={"file": str(tmp_path / "lift.csv")})
+    more = {"model": "catenary", "time": {"duration": 2, "step": 0.02}, "output": {"every": 0.02}}
+    result = run(section(length=2.0, mass=1.0), {"ends": {"start": start, "end": "free"}}, more)
+    assert np.abs(result.tension[:-2, 0] / (2 * (9.81 + 3)) - 1).max() < 1e-3
+
+
+def test_bending_stiffness_that_a_catenary_does_not_use_hides_no_slack():
+    upright = {"initial": {"kind": "equilibrium", "direction": [0, 0, 1]}, "model": "catenary"}
+    with pytest.raises(hybrid.ComputationError) as stop:
+        static(
+            section(length=1.0, mass=0.1, bending_stiffness=1e6),
+            {"ends": {"start": pinned(0, 0, 0), "end": "free"}},
+            upright,
+        )
+    assert stop.value.outcome is hybrid.Outcome.SLACK
+    heavy = section(length=2.0, mass=1.0, bending_stiffness=1e9, axial_stiffness=1e6)
+    sag = static(heavy, {"ends": {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0)}, "model": "catenary"})
+    assert sag.tension.min() > 0.0
+
+
+def test_what_a_catenary_end_cannot_feel_is_noted():
+    ends = {"start": pinned(0, 0, 0), "end": {"kind": "free", "moment": [0, 5, 0]}}
+    assert "ignored" in kinds(static(section(length=1.0, mass=0.1), {"ends": ends, "model": "catenary"}))
+
+
+@pytest.mark.parametrize("stiffness", [1e-3, 2e-2, 1e-1])
+@pytest.mark.parametrize("angle", [-60, 60, 90])
+@pytest.mark.parametrize("span", [0.5, 1.5])
+@pytest.mark.parametrize("zones", [[{"rod": 2}], [{"rod": 1}, {"catenary": 1}]])
+def test_ordinary_sags_are_found(stiffness, angle, span, zones):
+    a = math.radians(angle)
+    ends = {"start": clamped([0, 0, 0], [math.cos(a), 0, math.sin(a)]), "end": pinned(span, 0, 0)}
+    line = section(length=2.0, mass=0.1, bending_stiffness=stiffness)
+    found = static(line, {"ends": ends, "model": {"kind": "zones", "zones": zones}})
+    weight = 2.0 * 0.1 * 9.81
+    lifted = found.reaction_start[0] + found.reaction_end[0]
+    assert lifted == pytest.approx([0, 0, weight], abs=1e-6 * weight)
+
+
+def test_ends_that_coincide_and_lines_that_float():
+    loop = section(length=2.0, mass=0.1, axial_stiffness=1e5)
+    hung = static(loop, {"ends": {"start": pinned(0, 0, 0), "end": pinned(0, 0, 0)}, "model": "catenary"})
+    assert hung.position[0, :, 2].min() == pytest.approx(-1.0, abs=1e-3)
+    water = {"environment": {"fluid": {"density": 1000}}}
+    up = static(
+        water,
+        section(length=2.0, mass=0.1, diameter=0.05),
+        {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "catenary"},
+    )
+    assert up.position[0, -1] == pytest.approx([0, 0, 2])
+
+
+def test_folds():
+    """A catenary folded back onto itself hangs in two strands; a rod cannot start like that."""
+    fold = {
+        "initial": {"kind": "points", "points": [[0, 0, 0], [0, 0, -1], [0, 0, 0]]},
+        "time": {"duration": 0.01, "step": 0.001},
+    }
+    ends = {"ends": {"start": pinned(0, 0, 0), "end": "free"}}
+    line = section(length=2.0, mass=0.1, bending_stiffness=0.01)
+    with pytest.raises(hybrid.ComputationError):  # the loose strand falls freely: no tension in it
+        run(line, ends, fold, {"model": "catenary"})
+    with pytest.raises(hybrid.SceneError, match="corner of 180 deg"):
+        run(line, ends, fold, {"model": "rod"})
+
+
+@pytest.mark.parametrize(
+    ("table", "key"),
+    [
+        ({"time": {"duration": 1, "step": 1e-300}}, "time.step"),
+        ({"time": {"duration": 1, "step": 0.1}, "output": {"every": 1e-9}}, "output.every"),
+        ({"time": {"duration": 1, "step": 0.1}, "mesh": {"cells": 30_000_000}}, "mesh.cells"),
+    ],
+)
+def test_absurd_counts_are_refused(table, key):
+    with pytest.raises(hybrid.SceneError, match=key):
+        run(
+            section(length=2.0, mass=0.1),
+            {"ends": {"start": pinned(0, 0, 0), "end": "free"}, "model": "catenary"},
+            table,
+        )
+
+
+@pytest.mark.parametrize("step", [1e-5, 1e-7])
+def test_tiny_steps(step):
+    """A released rod falls freely but for its clamp, however small the step: round-off of length is no tension."""
+    rod = section(length=1.0, mass=0.1, diameter=0.02, bending_stiffness=0.1)
+    start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 100 * step, "step": step}}
+    result = run(rod, {"ends": {"start": clamped([0, 0, 0], [1, 0, 0]), "end": "free"}, "model": "rod"}, start)
+    assert result.position[-1, -1, 2] == pytest.approx(-0.5 * 9.81 * (100 * step) ** 2, rel=1e-6)
