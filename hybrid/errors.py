@@ -80,6 +80,20 @@ class Outcome(IntEnum):
         return _REMEDY[self]
 
 
+# Kinds of events that call an answer into question, the worst first; other kinds are news.
+EVENTS_BY_WEIGHT = (
+    "gains energy",
+    "slack",
+    "unstable",
+    "unresolved twist",
+    "unresolved bend",
+    "loses energy",
+    "ignored",
+    "undamped",
+    "not judged",
+    "turned in",
+)
+
 _CAUSE = {
     Outcome.OK: "done",
     Outcome.NOT_CONVERGED: "Newton's method did not converge",

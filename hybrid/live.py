@@ -39,7 +39,6 @@ BAR = (4, 36)  # columns, least and most: less shows nothing, more pushes the nu
 MARGIN = 3  # columns left free: the terminal writes ^C there, and wraps what does not fit
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 KINDS_SHOWN = 3  # kinds of events named at the end of a run; more is a matter for a report
-URGENT = ("slack", "unresolved bend", "turned in")  # events that call the answer into question; these come first
 
 
 def span(seconds: float) -> str:
@@ -236,7 +235,13 @@ class Voice:
     def events(self, events: list[Event]) -> None:
         """The first event of each kind, those that matter most first."""
         kinds: dict[str, list[Event]] = {}
-        for event in sorted(events, key=lambda e: (URGENT.index(e.kind) if e.kind in URGENT else len(URGENT), e.t)):
+        for event in sorted(
+            events,
+            key=lambda e: (
+                EVENTS_BY_WEIGHT.index(e.kind) if e.kind in EVENTS_BY_WEIGHT else len(EVENTS_BY_WEIGHT),
+                e.t,
+            ),
+        ):
             kinds.setdefault(event.kind, []).append(event)
         for shown, found in enumerate(kinds.values()):
             self.json("note", **found[0]._asdict(), count=len(found))

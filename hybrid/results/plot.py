@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
 from hybrid.results.read import Result, Zone
 
 if TYPE_CHECKING:
@@ -34,7 +34,6 @@ _STILL = 1e-6  # of the cable's extent: motion and deflection below this are rou
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
 _AXES = ("x", "y", "z")
 _NAMES |= {x: f"position {x}" for x in _AXES}
-_WARNINGS = ("gains energy", "slack", "unresolved bend", "undamped", "turned in")  # not to be hidden; the worst first
 
 
 class _View(NamedTuple):
@@ -402,7 +401,9 @@ def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
     _line(figure, 0.985, result.title or "(no title)", fontsize=10, fontweight="bold", color=_INK)
     _line(figure, 0.95, "; ".join(facts), fontsize=_NORMAL, color=_GREY if complete else _ALARM)
-    events = sorted((e for e in result.events if e.kind in _WARNINGS), key=lambda e: (_WARNINGS.index(e.kind), e.t))
+    events = sorted(
+        (e for e in result.events if e.kind in EVENTS_BY_WEIGHT), key=lambda e: (EVENTS_BY_WEIGHT.index(e.kind), e.t)
+    )
     if not events:
         return 0.0
     kinds = [e.kind for e in events]
