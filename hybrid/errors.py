@@ -94,6 +94,12 @@ EVENTS_BY_WEIGHT = (
     "turned in",
 )
 
+
+def weight_of_event(kind: str) -> int:
+    """Rank of a kind of event: 0 is the worst, news come last."""
+    return EVENTS_BY_WEIGHT.index(kind) if kind in EVENTS_BY_WEIGHT else len(EVENTS_BY_WEIGHT)
+
+
 _CAUSE = {
     Outcome.OK: "done",
     Outcome.NOT_CONVERGED: "Newton's method did not converge",

@@ -25,6 +25,7 @@ from rich.segment import ControlType
 from rich.text import Text
 
 import hybrid
+from hybrid.errors import weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
@@ -235,13 +236,7 @@ class Voice:
     def events(self, events: list[Event]) -> None:
         """The first event of each kind, those that matter most first."""
         kinds: dict[str, list[Event]] = {}
-        for event in sorted(
-            events,
-            key=lambda e: (
-                EVENTS_BY_WEIGHT.index(e.kind) if e.kind in EVENTS_BY_WEIGHT else len(EVENTS_BY_WEIGHT),
-                e.t,
-            ),
-        ):
+        for event in sorted(events, key=lambda e: (weight_of_event(e.kind), e.t)):
             kinds.setdefault(event.kind, []).append(event)
         for shown, found in enumerate(kinds.values()):
             self.json("note", **found[0]._asdict(), count=len(found))

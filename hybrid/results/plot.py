@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
+from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, weight_of_event
 from hybrid.results.read import Result, Zone
 
 if TYPE_CHECKING:
@@ -401,9 +401,8 @@ def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
     _line(figure, 0.985, result.title or "(no title)", fontsize=10, fontweight="bold", color=_INK)
     _line(figure, 0.95, "; ".join(facts), fontsize=_NORMAL, color=_GREY if complete else _ALARM)
-    events = sorted(
-        (e for e in result.events if e.kind in EVENTS_BY_WEIGHT), key=lambda e: (EVENTS_BY_WEIGHT.index(e.kind), e.t)
-    )
+    events = [e for e in result.events if e.kind in EVENTS_BY_WEIGHT]
+    events.sort(key=lambda e: (weight_of_event(e.kind), e.t))
     if not events:
         return 0.0
     kinds = [e.kind for e in events]
