@@ -285,6 +285,8 @@ def _plan_table(scene: Scene, plan: Plan) -> Any:
         zones.add_row(zone.kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", str(cells))
     work = "no time in the scene, so statics only"
     if scene.time is not None:
-        work = f"{plan.steps} steps of {scene.time.step:.6g} s, about {span(plan.seconds)} of computing"
+        asked = scene.time.step
+        shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
+        work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, about {span(plan.seconds)} of computing"
     head = [scene.title, ""] if scene.title else []
     return Group(*head, ledger, zones, "", f"{sum(plan.cells)} cells, {plan.unknowns} unknowns; {work}")

@@ -70,6 +70,7 @@ class Outcome(IntEnum):
     UNSTABLE = 6
     GAINS_ENERGY = 7
     TWISTED_TOO_FAR = 8
+    DROWNED = 9
 
     @property
     def cause(self) -> str:
@@ -87,6 +88,8 @@ EVENTS_BY_WEIGHT = (
     "unstable",
     "unresolved twist",
     "unresolved bend",
+    "stretched",
+    "implausible",
     "loses energy",
     "ignored",
     "undamped",
@@ -108,6 +111,7 @@ _CAUSE = {
     Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
     Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
     Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
+    Outcome.DROWNED: "the line is too long for literal shooting: growth along it has drowned the answer",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
 }
@@ -120,6 +124,7 @@ _REMEDY = {
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
+    Outcome.DROWNED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.UNSTABLE: "start from another shape (initial.direction), or run the motion with damping",
 }

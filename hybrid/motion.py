@@ -84,6 +84,7 @@ class Motion:
         ends = self.model.ends.at(self.t)
         values = self.observer.values(ends, self.state, self.stepper.report, self.work)
         self.recorder.save(self.t, values, self.observer.zone_rows)
+        self.watch.strain(self.t, self.state)
         self.watch.rest(self.t, ends, values, self.state)
         self._look(self.watch.energy(self.t, values, self.work, self.state))
 

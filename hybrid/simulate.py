@@ -155,11 +155,12 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         ends = model.ends.at(np.inf)
         watch = Watch(recorder, model)
         watch.equilibrium(found)
+        watch.strain(0.0, found.state)
         stop = watch.shape(0.0, ends, found.state)
         if stop is not None:
             raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
         recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
-        recorder.close("complete", f"equilibrium: {found.path[-1]}; out of balance {found.residual:.2g} N")
+        recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
     return open_result(target)
 
 
@@ -188,7 +189,7 @@ def _recorder(
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
     }  # fmt: skip
     if found is not None:
-        attributes |= {"static_path": "; ".join(found.path), "static_residual": found.residual}
+        attributes |= {"static_path": found.summary, "static_residual": found.residual}
     fixed = []
     if scene.output.history:
         points = np.array(scene.output.history)

@@ -27,6 +27,8 @@ LARGEST_TWIST = 2.8
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
 # Energy that the scheme swallows, as a part of the same: beyond this a motion was too fast for its step.
 LOSS_NOTED = 0.5
+# Strain beyond which a cable is hardly one; ropes of polymer reach a few per cent in service.
+STRETCHED = 0.05
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
 AT_REST = 1e-4
 
@@ -39,14 +41,14 @@ class Watch:
     def __init__(self, recorder: Recorder, model: Model) -> None:
         self._recorder, self._model = recorder, model
         self._bend = self._twist = UNRESOLVED
+        self._strain = STRETCHED
         self._slack = model.slack_floor
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = False
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
-            if entry.ignored:
-                s = 0.0 if "start" in entry.what else model.length
-                recorder.event(0.0, s, s, "ignored", f"{entry.what}: {entry.why}")
+            if entry.event:
+                recorder.event(0.0, 0.0, model.length, entry.event, f"{entry.what}: {entry.why}")
 
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
@@ -67,20 +69,39 @@ class Watch:
         line = self._model.line
         bend, node, twist, twisted = sharpest(line, ends, state.e, state.T, state.a1)
         if bend > self._bend:
-            finer = 0.3 * float(line.hn[node]) / bend
-            s = float(line.s[node])
-            at_end = node in (0, line.s.size - 1)
-            text = f"the bend at s = {s:g} m is sharper than the mesh ({np.degrees(bend):.0f} deg to the next cell)"
-            if at_end:
-                text = f"the bend at the end s = {s:g} m is sharper than the mesh"
-            text += f": curvature and moment are wrong there; cells of {finer:.2g} m would resolve it"
-            self.note(t, node, "unresolved bend", text)
+            self.note(t, node, "unresolved bend", self._bend_text(node, bend, state))
             self._bend = 1.5 * bend
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
             self.note(t, twisted, "unresolved twist", text)
             self._twist = 1.5 * twist
         return (Outcome.TWISTED_TOO_FAR, twisted) if twist > LARGEST_TWIST else None
+
+    def _bend_text(self, node: int, bend: float, state: State) -> str:
+        line, s = self._model.line, float(self._model.line.s[node])
+        if 0 < node < line.s.size - 1:
+            finer = 0.3 * float(line.hn[node]) / bend
+            how = f"the bend at s = {s:g} m is sharper than the mesh ({np.degrees(bend):.0f} deg to the next cell)"
+        else:
+            cell = min(node, line.h.size - 1)
+            first, tension = float(line.h[cell]), float(state.T[cell])
+            stiffness = float(line.kb[node, :2].max() * line.hn[node])
+            leaving = np.sqrt(stiffness / tension) if tension > 0.0 else np.inf
+            finer = min(0.25 * float(leaving), 0.3 * first / bend)
+            how = f"the cable leaves its end at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
+            if leaving > first:
+                how = f"the bend at the end s = {s:g} m is sharper than the mesh"
+        return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do (`ratio` grades them)"
+
+    def strain(self, t: float, state: State) -> None:
+        """A cable that is stretched more than cables are."""
+        strain = self._model.line.ck * state.T
+        cell = int(np.argmax(strain))
+        if strain[cell] > self._strain:
+            part = 100.0 * float(strain[cell])
+            text = f"the cable is stretched by {part:.3g} %: is it long enough, and axial_stiffness in N?"
+            self.note(t, cell, "stretched", text)
+            self._strain = 2.0 * float(strain[cell])
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""

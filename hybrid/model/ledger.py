@@ -5,11 +5,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
+from math import pi
 
 from hybrid.model.mesh import Zone
 from hybrid.model.state import Line
 from hybrid.physics.loads import FORCES
 from hybrid.scene.schema import Scene
+
+# Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
+PLAUSIBLE = (50.0, 25_000.0)
 
 
 @dataclass(frozen=True)
@@ -19,7 +23,7 @@ class Entry:
     what: str
     on: bool
     why: str
-    ignored: bool = False  # the scene asks for it, and the model it chose cannot have it
+    event: str = ""  # kind of event that a result gets for it: "ignored", "implausible"
 
 
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
@@ -60,6 +64,13 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                     f"assumed (solid round section): {which} gives none",
                 )
             )
+    for i, section in enumerate(scene.cable.sections):
+        if section.diameter:
+            density = section.mass / (0.25 * pi * section.diameter**2)
+            if not PLAUSIBLE[0] <= density <= PLAUSIBLE[1]:
+                what = f"sections[{i}] has a mean density of {density:.3g} kg/m^3"
+                why = f"mass {section.mass:g} kg/m, diameter {section.diameter:g} m: are both in these units?"
+                entries.append(Entry(what, True, why, event="implausible"))
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]
@@ -72,7 +83,7 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                     f"moment and tangent at ends.{name}",
                     False,
                     "the cable ends in a catenary zone, which transmits no moment",
-                    ignored=True,
+                    event="ignored",
                 )
             )
     return tuple(entries)

@@ -22,6 +22,7 @@ class Plan:
     cells: tuple[int, ...]  # per zone
     unknowns: int
     steps: int
+    step: float  # s, of most steps: the scene's, shortened to fit between outputs
     seconds: float  # of processor time, from the measured cost per cell and iteration
 
 
@@ -81,6 +82,11 @@ def plan(scene: Scene) -> Plan:
     model = build(scene)
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
-    steps = count_steps(scene) if scene.time else 0
+    steps, step = 0, 0.0
+    if scene.time:
+        every = output_interval(scene)
+        steps, step = count_steps(scene), every / parts(every, scene.time.step)
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
-    return Plan(model.ledger, model.zones, cells, model.unknowns, steps, steps * (USUAL_ITERATIONS * each + COST_STEP))
+    return Plan(
+        model.ledger, model.zones, cells, model.unknowns, steps, step, steps * (USUAL_ITERATIONS * each + COST_STEP)
+    )

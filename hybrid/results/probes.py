@@ -131,6 +131,8 @@ class View:
         ends = []
         for k, first, second in ((0, 0, 1), (1, -1, -2)):
             t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
+            if self.line.element[first]:  # a clamp or guide knows the tangent
+                t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
             ends.append(float(force @ t) / float(np.linalg.norm(t)))
         return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))

@@ -44,6 +44,13 @@ class Equilibrium:
     slack: int  # a catenary cell without tension, or -1
     judged: bool  # False when its stability could not be judged (an end moment)
 
+    @property
+    def summary(self) -> str:
+        """How it was found, in one line."""
+        failed = len(self.path) - 1
+        others = f" (after {failed} other way{'s' * (failed > 1)})" if failed else ""
+        return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
+
 
 def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray) -> bool:
     """True when the stiffness in `rows` (N+1, 5 x 24) of the march, made symmetric, is positive definite.
@@ -282,7 +289,7 @@ def solve_statics(
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
     for how, outcome, where, state in _roads(solver, ends, start):
-        path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations so far)")
+        path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
         failed.append((outcome, where, state))
@@ -292,7 +299,7 @@ def solve_statics(
                 return _found(solver, ends, state, path)
             if outcome == worst:
                 s = float(line.s[min(max(where, 0), line.s.size - 1)])
-                raise ComputationError(outcome, None, s, "; ".join(path))
+                raise ComputationError(outcome, None, s, "\n              ".join(path))
     raise AssertionError("one of the roads has failed with the first road's outcome")
 
 

@@ -28,6 +28,9 @@ ROUND_OFF = 1e-6
 # Round-off of a length, as a part of it, and the most (as a part of the tension scale) that it may
 # make of a tension: a step so small that it is more does not converge, and says so.
 ROUND_OFF_LENGTH, MOST_NOISE = 1e-15, 1e-3
+# At a clamp whose first cell is longer than sqrt(EI/T) the moment is wrong by a third and more,
+# whatever the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
+CLAMP = 20.0
 # Changes of tension count against the largest tension of the line, or against this part of
 # the tension scale of the scene where that is larger (a line can be free of tension).
 LOW_TENSION = 1e-3
@@ -173,8 +176,8 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
 def sharpest(line, ends, e, T, a1):
     """How far the mesh is from resolving a rod: largest bend and twist of an element, rad, and their nodes (-1: none).
 
-    The element at a clamp or guide stands for half a cell; it counts twice, and more where
-    the cell is longer than sqrt(EI/T), the length over which a cable leaves its clamp.
+    The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
+    h/lambda where the cell is longer than lambda = sqrt(EI/T), over which a cable leaves its clamp.
     """
     bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
     n = e.shape[0]
@@ -194,8 +197,8 @@ def sharpest(line, ends, e, T, a1):
                 Ra, Rb = Rb, Ra
             stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
             weight = 2.0
-            if T[c] > 0.0:
-                weight = max(weight, l * math.sqrt(T[c] / stiffness))
+            if T[c] > 0.0 and l * l * T[c] > stiffness:
+                weight = CLAMP * l * math.sqrt(T[c] / stiffness)
         k = log_rotation(relative_rotation(Ra, Rb))
         x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
         y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0

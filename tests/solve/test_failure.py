@@ -42,10 +42,10 @@ def test_a_slack_catenary_stops_the_run(tmp_path):
     assert kept.times[-1] == pytest.approx(error.t)
     assert kept.tension[:-1].min() > 0.0
     assert [e.kind for e in kept.events] == ["slack"]
-    snapshot = np.load(error.snapshot)
-    assert float(snapshot["t"]) == error.t
-    assert snapshot["r"].shape == (41, 3)
-    assert hybrid.parse_scene(str(snapshot["scene"])) == scene()
+    with np.load(error.snapshot) as snapshot:
+        assert float(snapshot["t"]) == error.t
+        assert snapshot["r"].shape == (41, 3)
+        assert hybrid.parse_scene(str(snapshot["scene"])) == scene()
 
 
 def test_slack_can_be_asked_to_warn():
@@ -114,7 +114,7 @@ def test_a_coarse_bend_is_noted():
     }
     result = hybrid.static(scene("rod", environment={"gravity": 0.0}, ends=ends, mesh={"cells": 5}, time=None))
     assert {e.kind for e in result.events} == {"unresolved bend", "not judged"}
-    assert any("would resolve it" in e.text for e in result.events)
+    assert any("would do" in e.text for e in result.events)
 
 
 def test_undamped_inextensible_is_noted():
