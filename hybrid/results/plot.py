@@ -32,6 +32,7 @@ _SHAPES = 9  # earlier shapes on a page; more become a blur
 _ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
 _STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
+_NEWS = ("not judged", "turned in")  # events that warn of nothing
 _AXES = ("x", "y", "z")
 _NAMES |= {x: f"position {x}" for x in _AXES}
 
@@ -67,8 +68,8 @@ def plot_summary(
     """One page: shape, tension and moment along the cable, and histories at some points.
 
     path: where to save it (png, pdf, svg ...).  times: which earlier shapes (s).  history:
-    which arc lengths to follow (m); else those recorded as `history`, else start, middle
-    and end.  A static result shows curvature and tangent in place of histories.
+    which arc lengths to follow (m); else those recorded as `history`, else the middle and
+    the ends that move.  A static result shows curvature and tangent in place of histories.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -92,8 +93,9 @@ def plot_summary(
             plot_shape(axes[name], result, times=earlier, view=view, points=points)
         bent = "bending_moment" in result and not set(result["zones/kind"]) <= {"catenary"}
         profiles: list[Any] = ["tension", ("bending_moment", "torque")] if bent else ["tension"]
-        angle = "theta" if views[0].up_label == "z" else "phi"
-        profiles += [n for n in ("curvature", angle) if n in result] + [views[0].up_label, "x", "y"]
+        angles = ("theta", "phi") if len(views) > 1 else ("theta" if views[0].up_label == "z" else "phi",)
+        profiles += [n for n in ("curvature", *angles) if n in result]
+        profiles += [views[-1].up_label.replace("across", "z"), "x", "y"]
         for name, quantity in zip("pP" if len(points) else "pPhH", profiles, strict=False):
             plot_profiles(axes[name], result, quantity)
         if len(points):
@@ -105,8 +107,7 @@ def plot_summary(
                 axes[upper].set_xlabel("")
                 axes[upper].tick_params(labelbottom=False)
         for name, y in (("s", foot + 0.0275), ("h", foot + 0.0025))[: 1 + (len(points) > 0)]:
-            handles, labels = axes[name].get_legend_handles_labels()
-            entries = dict(zip(labels, handles, strict=True))
+            entries = dict(zip(*axes[name].get_legend_handles_labels()[::-1], strict=True))
             look: dict[str, Any] = {"fontsize": _SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
             look |= {"loc": "lower center", "bbox_to_anchor": (0.5, y), "ncols": 8, "frameon": False, "borderpad": 0.1}
             figure.legend(list(entries.values())[:8], list(entries)[:8], labelcolor=_INK, **look)
@@ -135,7 +136,7 @@ def plot_shape(
     outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
     strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
     # Edges close the seams between strips; as pixels in a PDF, where each strip would weigh as much as a curve.
-    name = "range over time" * (len(position) > 1)
+    name = "range over time" * bool(np.ptp(position, axis=0).max() > _STILL * np.ptp(position, axis=(0, 1)).max())
     ax.add_collection(PolyCollection(list(strips), color=_RANGE, lw=0.4, zorder=0.4, rasterized=True, label=name))
     for k, shape in enumerate(result.at(t=earlier, names=["position"])["position"]):
         grey = 0.7 - 0.3 * k / max(len(earlier) - 1, 1)
@@ -145,14 +146,12 @@ def plot_shape(
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
         piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
-        colour = _KIND_COLOURS.get(zone.kind, _INK)
-        ax.plot(*view.project(piece), color=colour, linewidth=2.0, zorder=3, label=zone.kind)
+        ax.plot(*view.project(piece), color=_KIND_COLOURS.get(zone.kind, _INK), lw=2.0, zorder=3, label=zone.kind)
     joints = np.array([z.s_b for z in zones[:-1]])
     if len(joints):
         ax.plot(*view.project(_along(joints, s, last)), zorder=5, **_mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
-        x, y = view.project(last[k])
-        ax.plot([x], [y], zorder=4, **_mark(marker), label="end" if k else "start")
+        ax.plot(*view.project(last[[k]]), zorder=4, **_mark(marker), label="end" if k else "start")
     for k, point in enumerate(points):
         ax.plot(*view.project(_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
     wider, taller = _magnified(view, position)
@@ -191,8 +190,8 @@ def plot_profiles(ax: Axes, result: Result, names: str | Sequence[str], *, outpu
         line: dict[str, Any] = {"color": _INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
         ax.plot(result.s, values[output] * factor, zorder=3, label=_title(name), **line)
     short = _title(names[0]).replace("bending ", "")
-    title = _title(names[0]) if len(drawn) == 1 else f"{short}, {', '.join(_title(n) for n, _ in drawn[1:])}"
-    _style(ax, title + _at(result, output), "s (m)", f"{short} ({unit})")
+    up = ",\n".join([short, *(_title(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
+    _style(ax, (short if drawn[1:] else _title(names[0])) + _at(result, output), "s (m)", f"{up} ({unit})")
     if len(drawn) > 1:
         ax.legend(fontsize=_SMALL, frameon=False, handlelength=2.2)
     _open_up(ax, peak * factor)
@@ -218,15 +217,13 @@ def plot_history(
     peak = float(np.abs(values).max())
     factor, unit = _prefix(result.units[name], peak)
     for k, point in enumerate(s):
-        # The dot at the end is the one in the last shape.
         ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
     changes = np.unique(result["zones/t"])[1:]
     for k, t in enumerate(changes if len(changes) <= 40 else ()):  # more would hide the curves
-        name = "_" * (k > 0) + "zones changed"  # once in a legend
-        ax.axvline(t, color=_GREY, linewidth=0.9, linestyle=":", zorder=1, label=name)
+        ax.axvline(t, color=_GREY, lw=0.9, ls=":", zorder=1, label="_" * (k > 0) + "zones changed")  # one entry
     title = f"{label} over time" if component is None else f"{label} since t = {result.times[0]:.4g} s"
     _style(ax, title, "t (s)", f"{label} ({unit})")
-    ax.set_xlim(result.times[0], result.times[-1] + 0.01 * np.ptp(result.times))  # so that the dots are whole
+    ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # room for the dots of the last shape
     _open_up(ax, peak * factor)
     if legend:
         ax.legend(fontsize=_SMALL, framealpha=0.75, edgecolor="none", handlelength=1.2, borderpad=0.2)
@@ -236,31 +233,33 @@ def plot_history(
 
 
 def _views(result: Result) -> list[_View]:
-    """One plane if the cable stays in one, else two projections.
-
-    It does if what leaves the plane is below 2 % of the cable's extent, much less than what is
-    across the cable in the plane, and no motion to speak of: a taut line sways by little.
-    """
-    position = result.position.reshape(-1, 3)
-    x, y, z = extents = np.ptp(position, axis=0)
-    _, middle, largest = np.sort(extents)
-    flat = max(min(0.02 * largest, 0.2 * middle), _STILL * largest)
-    moves = np.ptp(result.position, axis=0)
-    still = max(0.2 * float(np.max(moves)), _STILL * largest)
+    """One plane if the cable stays in one, else two projections: of a line across x and y, along it and across."""
+    x, y, z = extents = np.ptp(result.position, axis=(0, 1))
     normal = min((1, 0, 2), key=lambda k: extents[k])
-    if extents[normal] <= flat and moves[:, normal].max() <= still:
+    if _is_flat(result.position, np.eye(3)[normal]):
         return [_letters("xyz".replace("xyz"[normal], ""))]
-    centred = position[:, :2] - position[:, :2].mean(axis=0)
-    # The direction of the largest horizontal extent: first right singular vector, from the 2 x 2 Gram matrix.
-    direction = np.linalg.eigh(centred.T @ centred)[1][:, 1]
-    direction *= math.copysign(1.0, direction[np.argmax(np.abs(direction))])
-    sideways = result.position[..., :2] @ np.array([-direction[1], direction[0]])
-    if np.ptp(sideways) <= flat and np.ptp(sideways, axis=0).max() <= still:
-        angle = math.degrees(math.atan2(direction[1], direction[0]))
-        return [_View(np.array([*direction, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")]
+    level = result.position[..., :2].reshape(-1, 2)
+    ahead = np.linalg.eigh(np.cov(level.T))[1][:, 1]  # the direction of the largest horizontal extent
+    ahead *= math.copysign(1.0, ahead[np.argmax(np.abs(ahead))])
+    sideways, angle = np.array([-ahead[1], ahead[0], 0.0]), math.degrees(math.atan2(ahead[1], ahead[0]))
+    along = _View(np.array([*ahead, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")
+    if _is_flat(result.position, sideways):
+        return [along]
     if z >= max(x, y):
         return [_letters("xz"), _letters("yz")]
+    if np.ptp(level @ sideways[:2]) < 0.08 * min(x, y):  # in x-y it would be a mere line
+        return [along, along._replace(up=sideways, up_label="across")]
     return [_letters("xz"), _letters("xy")] if x >= y else [_letters("yz"), _letters("yx")]
+
+
+def _is_flat(position: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether what leaves the plane is below 2 % of the extent, and little beside the sag and the motion in it."""
+    out = position @ normal
+    inside = (position - out[..., None] * normal).reshape(-1, 3)
+    across = np.ptp(inside @ np.linalg.eigh(np.cov(inside.T))[1][:, 1])  # of three axes: normal, across, along
+    largest, moves = np.ptp(inside, axis=0).max(), np.ptp(position, axis=0).max()
+    flat, still = (max(x, _STILL * largest) for x in (min(0.02 * largest, 0.1 * across), 0.2 * moves))
+    return bool(np.ptp(out) <= flat and np.ptp(out, axis=0).max() <= still)
 
 
 def _letters(plane: str) -> _View:
@@ -307,8 +306,12 @@ def _telling_times(result: Result) -> np.ndarray:
 
 
 def _history_points(result: Result, history: _Numbers | None) -> np.ndarray:
-    default = result["history"] if "history" in result else np.linspace(result.s[0], result.s[-1], 3)
-    points = np.asarray(default if history is None else history, dtype=float)
+    """By default the middle and the ends, or where an end is held the quarter point beside it."""
+    moves = np.ptp(result.position, axis=0).max(axis=1)
+    start, end = (bool(m <= 1e-3 * moves.max()) for m in moves[[0, -1]])  # held
+    quarters = np.linspace(result.s[0], result.s[-1], 5)[[start, 2, 4 - end]]
+    given = result["history"] if history is None and "history" in result else history
+    points = np.asarray(quarters if given is None else given, dtype=float)
     if points.ndim != 1 or len(points) == 0:
         raise ResultError(f"history = {history!r} is no list of arc lengths\n    try:      history=[0.0]")
     return points
@@ -381,8 +384,7 @@ def _open_up(ax: Axes, peak: float) -> None:
     low, high = ax.get_ylim()
     least = 1e-3 * peak if peak > _ZERO else 2.0
     if high - low < least:
-        middle = 0.5 * (low + high)
-        ax.set_ylim(middle - 0.5 * least, middle + 0.5 * least)
+        ax.set_ylim(0.5 * (low + high - least), 0.5 * (low + high + least))
     low, high = ax.get_ylim()
     if low < -0.1 * (high - low) < 0.1 * (high - low) < high:
         ax.axhline(0.0, color=_GREY, linewidth=0.6, zorder=1)
@@ -405,16 +407,24 @@ def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float
     events.sort(key=lambda e: (weight_of_event(e.kind), e.t))
     if not events:
         return 0.0
-    kinds = [e.kind for e in events]
+    kinds = [e.kind for e in events if e.kind not in _NEWS]
     names = ", ".join(k + f" (× {kinds.count(k)})" * (kinds.count(k) > 1) for k in dict.fromkeys(kinds))
-    _line(figure, 0.024, f"Note: {names}; at t = {events[0].t:.4g} s: {events[0].text}", fontsize=_SMALL, color=_ALARM)
-    return 0.025
+    note = "; ".join(dict.fromkeys(e.text for e in (events[:1] if kinds else events)))
+    note = (f"Warning: {names}; at t = {events[0].t:.4g} s: " if kinds else "Note: ") + note
+    return 0.018 + 0.02 * _line(figure, 0.008, note, 2, "bottom", fontsize=_SMALL, color=_ALARM if kinds else _GREY)
 
 
-def _line(figure: Figure, y: float, text: str, **look: Any) -> None:
-    """One line from the left edge, cut to the width of the page.  A $ in it is a $."""
-    text = " ".join(text.split())
-    line = figure.text(0.0125, y, text, va="top", parse_math=False, **look)
-    while (share := 0.975 * figure.bbox.width / max(1.0, line.get_window_extent().width)) < 1.0:
-        text = text[: min(int(share * len(text)), len(text) - 1)]
-        line.set_text(f"{text.rstrip()} …")
+def _line(figure: Figure, y: float, text: str, most: int = 1, va: str = "top", **look: Any) -> int:
+    """At most so many lines from the left edge, cut to the width of the page; how many.  A $ in them is a $."""
+    rest, rows = " ".join(text.split()), list[str]()
+    line = figure.text(0.0125, y, "", va=va, parse_math=False, **look)
+    while rest and len(rows) < most:
+        end, cut = len(rest), " …" * (len(rows) == most - 1)
+        line.set_text(rest)
+        while (share := 0.975 * figure.bbox.width / max(1.0, line.get_window_extent().width)) < 1.0:
+            end = min(int(share * end), end - 1)
+            end = end if cut else max(rest.rfind(" ", 0, end + 1), 0) or end  # lines end between words
+            line.set_text(rest[:end].rstrip() + cut)
+        rows, rest = [*rows, line.get_text()], rest[end:].lstrip()
+    line.set_text("\n".join(rows))
+    return len(rows)

@@ -103,7 +103,7 @@ def test_a_summary_shows_shape_profiles_and_histories(tmp_path: Path) -> None:
     assert tension.lines[0].get_ydata() == pytest.approx(result.tension[-1] / 1e3)
     assert len(tension.collections) == 1 and len(tension.patches) == 2  # the range over time; two shaded zones
     curves = [line for line in h_tension.lines if line.get_label().startswith("s = ")]
-    assert [line.get_label() for line in curves] == ["s = 0 m", "s = 50 m", "s = 100 m"]
+    assert [line.get_label() for line in curves] == ["s = 25 m", "s = 50 m", "s = 75 m"]  # the ends are held
     assert curves[1].get_ydata() == pytest.approx(result.tension[:, 20] / 1e3)
     assert len(h_tension.lines) == 4  # and where the zones changed
     text = texts(figure)
@@ -140,7 +140,7 @@ def _earlier(shape: Any) -> list[Any]:
 def test_torque_is_drawn_when_there_is_some() -> None:
     moment = _panels(plot.plot_summary(made(sag, torque=-0.5)))[2]
     assert [line.get_label() for line in moment.lines[:2]] == ["|bending moment|", "torque"]
-    assert moment.get_title("left") == "|moment|, torque at t = 10 s"
+    assert (moment.get_title("left"), moment.get_ylabel()) == ("|moment| at t = 10 s", "|moment|,\ntorque (N m)")
 
 
 def test_statics_show_curvature_and_tangent_in_place_of_histories() -> None:
@@ -240,12 +240,12 @@ def test_the_shape_fills_its_panel(ratio: float) -> None:
 
 def test_a_small_sway_across_a_sagging_line_is_shown() -> None:
     """1 m in 90 m, out of the plane of a sag of 30 m: below 2 % of the extent, but all that moves."""
-    figure = plot.plot_summary(made(lambda s, t: (0.9 * s, 0.5 * np.sin(s / 32) * np.sin(t), sag(s, 1.57)[2]), nt=40))
+    figure = plot.plot_summary(made(lambda s, t: (0.9 * s, 0.5 * np.sin(s / 32) * np.sin(t), sag(s, 1.57)[2]), nt=21))
     by_name = {ax.get_label(): ax for ax in figure.axes}
     assert by_name["s"].get_title("left") == "shape at t = 10 s"
     above = by_name["S"]
     assert above.get_title("left") == "shape from above at t = 10 s, y × 20"
-    figure.canvas.draw()
+    figure.draw_without_rendering()
     assert 1.0 / np.ptp(above.get_ylim()) > 0.5
 
 
@@ -257,15 +257,60 @@ EVENTS = [
 ]
 
 
-def test_warnings_are_mentioned_in_one_line_the_worst_first() -> None:
+def test_warnings_are_mentioned_in_two_lines_the_worst_first() -> None:
     figure = plot.plot_summary(made(sag, events=EVENTS, title="Costs $1 or $2 " * 20))
-    (line,) = [t for t in figure.texts if t.get_text().startswith("Note")]
-    assert line.get_text().startswith("Note: slack (× 2), turned in; at t = 2 s: tension -0.1 N in a catenary zone and")
-    assert line.get_text().endswith(" …")
+    (lines,) = [t for t in figure.texts if t.get_text().startswith("Warning")]
+    assert lines.get_text().startswith("Warning: slack (× 2); at t = 2 s: tension -0.1 N in a catenary zone and so")
+    assert lines.get_text().count("\n") == 1 and lines.get_text().endswith(" …") and lines.get_color() == "#C00000"
     assert_tidy(figure)
-    figure = plot.plot_summary(made(sag, nt=0, events=EVENTS[:1]))
-    assert "Note: turned in; at t = 0 s: the tangent is missed by $30$ deg" in texts(figure)
+    assert min(k.get_window_extent().y0 for k in figure.legends) - lines.get_window_extent().y1 > 6  # pixels
     assert "Note" not in texts(plot.plot_summary(made(sag, nt=0, events=EVENTS[3:])))
+
+
+def test_news_are_no_alarm() -> None:
+    why = "the tangent is missed by $30$ deg"
+    for more in ("", " and is turned in over the first second or so; start from an equilibrium to avoid this" * 2):
+        figure = plot.plot_summary(made(sag, nt=0, events=[(0.0, "turned in", why + more), *EVENTS[3:]]))
+        (note,) = [t for t in figure.texts if t.get_text().startswith("Note")]
+        assert note.get_text().replace("\n", " ") == f"Note: {why}{more}" and note.get_color() == "#6E6E6E"
+        assert note.get_text().count("\n") == bool(more)
+        box = note.get_window_extent()
+        assert box.x1 < 1200 and box.y0 > 0
+
+
+def blown(s: np.ndarray, t: float) -> Sequence[Any]:
+    """A span of 90 m that rises by 10 m, sags by 2 m and is blown out by 1 m."""
+    bow = np.sin(np.pi * s / 100.0)
+    return 0.9 * s, 1.0 * bow, 0.1 * s - 2.0 * bow
+
+
+def test_what_is_across_a_span_is_compared_with_its_sag_not_with_its_length() -> None:
+    figure = plot.plot_summary(made(blown, nt=1, zones=lambda t: [("catenary", 0.0, 100.0)]))
+    above = {ax.get_label(): ax for ax in figure.axes}["S"]
+    assert (above.get_ylabel(), above.get_title("left")) == ("y (m)", "shape from above, y × 20")
+    assert "position y" in texts(figure) and "position z" not in texts(figure)
+    still = Figure().subplots()
+    plot.plot_shape(still, made(blown))
+    assert still.get_legend_handles_labels()[1] == ["catenary", "rod", "joint", "start", "end"]  # no range over time
+    slight = made(lambda s, t: (blown(s, t)[0], 0.05 * blown(s, t)[1], blown(s, t)[2]))
+    assert len(plot._views(slight)) == 1
+    turned = made(lambda s, t: (0.6 * s - blown(s, t)[1], 0.6 * s + blown(s, t)[1], blown(s, t)[2]))
+    assert [v.up_label for v in plot._views(turned)] == ["z", "across"]  # from above it is a line at 45 degrees
+    assert plot._views(turned)[0].across_label == "horizontal, 45° from x"
+
+
+@pytest.mark.parametrize(
+    "position, followed",
+    [
+        (lambda s, t: (s, 0.0, s * (100.0 - s) * t), [25.0, 50.0, 75.0]),
+        (lambda s, t: (s, 0.0, s * t), [25.0, 50.0, 100.0]),
+        (lambda s, t: (s, 0.0, (100.0 - s) * t), [0.0, 50.0, 75.0]),
+        (lambda s, t: (s, 0.0, t), [0.0, 50.0, 100.0]),
+        (lambda s, t: (s, 0.0, 0.0), [25.0, 50.0, 75.0]),
+    ],
+)
+def test_a_held_end_is_not_followed(position: Callable[[np.ndarray, float], Sequence[Any]], followed: Any) -> None:
+    assert plot._history_points(made(position), None).tolist() == followed
 
 
 def assert_tidy(figure: Figure) -> None:
