@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
-from hybrid.physics.loads import MASS_DAMPING
+from hybrid.physics.loads import MASS_DAMPING, ROTARY
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
 from hybrid.solve.step import newton, slackest
@@ -29,6 +29,7 @@ NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judge
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
+GYRATION = 0.02  # of the length: radius of gyration lent to the spin of a line that settles
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
 
@@ -211,7 +212,14 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     line, length = solver.line, solver.length
     time_scale = np.sqrt(float(line.mass.sum()) * length / solver.scale)
     damp = 2.0 * line.mass / time_scale
-    damped = line._replace(damp=np.nan_to_num(line.damp) + damp, bits=line.bits | MASS_DAMPING)
+    # a spin without inertia would follow Newton to any equilibrium, stable or not: give it some to fall with
+    gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * length) ** 2
+    damped = line._replace(
+        damp=np.nan_to_num(line.damp) + damp,
+        polar=np.nan_to_num(line.polar) + gyration,
+        rotary=np.nan_to_num(line.rotary),
+        bits=line.bits | MASS_DAMPING | ROTARY,
+    )
     stepper = Stepper(damped, length, solver.scale)
     old = state.copy()
     new = old.copy()
