@@ -43,7 +43,7 @@ ends:
   start: {kind: clamped, position: [0, 0, -60], tangent: [1, 0, 1]}
   end: {kind: pinned, position: [70, 0, 0], motion: {heave: {amplitude: 0.5, period: 8.0}, ramp: 16.0}}
 initial: equilibrium
-model: {kind: zones, zones: [{rod: 20, cells: 40, ratio: 2.0}, {catenary: 80}]}
+model: {kind: zones, zones: [{rod: 20, cells: 60, ratio: 20}, {catenary: 80}]}
 time: {duration: 60.0, step: 0.02}
 output: {every: 0.2, history: [0, 20, 100]}
 ```
@@ -58,6 +58,56 @@ cable is long; zones that do not add up to the length; a rod zone over a section
 added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
 an initial shape that misses a held end; a normal along its tangent.
 
+## Air and wind
+
+A line in air is a line in a fluid of density 1.225 whose current is the wind, here 12 m/s along y:
+
+```yaml
+environment:
+  fluid: {density: 1.225, current: [0, 12, 0]}
+cable:
+  sections:
+    - {length: 305, mass: 1.63, diameter: 0.028, axial_stiffness: 3.0e+7, drag: {normal: 1.0}}
+ends:
+  start: {kind: pinned, position: [0, 0, 40]}
+  end: {kind: pinned, position: [300, 0, 40]}
+initial: equilibrium
+model: catenary
+```
+
+Without a fluid there is neither drag nor wind; a cable that swings in still air has `density: 1.225` and no current.
+
+## A weight at an end
+
+A force on a `free` end pulls but has no inertia: however the cable moves, the tension at that end is the force.
+That is right for a winch that holds a tension, and for a weight in statics.
+A weight that swings or is heaved has inertia; give it as a short, heavy last section, here 50 kg within half a metre,
+with a bending stiffness if it is to be a rod:
+
+```yaml
+cable:
+  sections:
+    - {length: 99.5, mass: 0.8, axial_stiffness: 2.0e+6}
+    - {length: 0.5, mass: 100, axial_stiffness: 2.0e+6}
+ends:
+  start: {kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1.0, period: 8.0}, ramp: 16.0}}
+  end: free
+initial: equilibrium
+model: catenary
+mesh: {cells: 200}
+time: {duration: 40.0, step: 0.02}
+```
+
+## Steps and outputs
+
+`output.every` says when something is kept, `time.step` how finely it is computed: the interval from one output to the
+next is cut into the fewest equal steps that are no longer than `time.step`.
+With `every: 0.5` and `step: 0.2` there are three steps of 0.1667 s between outputs; with `every: 0.01` and
+`step: 0.02` the step is 0.01 s, since outputs are always ends of steps.
+The last output is at `duration`, also when `every` does not divide it.
+Keep 20 outputs or more of the shortest period you want to see; the steps must be as short as the motion needs, at
+least 6 and better 20 in the shortest period of a moving end.
+
 ## Motion files
 
 A CSV file whose first line names its columns, `t,x,y,z` or `t,rx,ry,rz` or all seven: time in s, position in m
@@ -65,6 +115,33 @@ A CSV file whose first line names its columns, `t,x,y,z` or `t,rx,ry,rz` or all 
 skipped.  It must begin at or before t = 0, cover the duration, have 12 samples a period or more, start from rest
 where the end is held, and be smooth: a jump of velocity is refused with the time at which it happens.
 Between samples the motion is a cubic spline with continuous acceleration.
+
+A ramp that is then held: over 8 s the end of the first scene above, held at [70, 0, 0], rises by 2 m, and a clamped
+end turns by 30 degrees about y.
+The polynomial starts and stops with neither velocity nor acceleration; a straight ramp would be refused.
+
+```python
+import numpy as np
+
+t = np.arange(0.0, 60.01, 0.25)  # as long as time.duration, and evenly: a spline rings over a wide gap
+x = np.minimum(t / 8.0, 1.0)
+grow = x**3 * (10.0 - 15.0 * x + 6.0 * x**2)  # from 0 to 1, then held
+lift = np.column_stack([t, 70.0 + 0.0 * t, 0.0 * t, 2.0 * grow])
+turn = np.column_stack([t, 0.0 * t, 30.0 * grow, 0.0 * t])
+np.savetxt("lift.csv", lift, delimiter=",", header="t,x,y,z", comments="", fmt="%.8g")
+np.savetxt("turn.csv", turn, delimiter=",", header="t,rx,ry,rz", comments="", fmt="%.8g")
+```
+
+`lift.csv` then begins with
+
+```csv
+t,x,y,z
+0,70,0,0
+0.25,70,0,0.00058209896
+0.5,70,0,0.0044364929
+```
+
+and `end: {kind: pinned, position: [70, 0, 0], motion: {file: lift.csv}}` follows it.
 """
 
 

@@ -1,9 +1,8 @@
 """Read what a run has written: `open_result("run.h5")` gives a `Result`.
 
-The file is HDF5 and every dataset says its own unit, frame and dimensions, so the
-reader is generic: whatever was recorded is there under its name, as an attribute
-(``result.tension``) or an item (``result["energy/kinetic"]``).  Arrays are read when
-they are asked for, once.
+The file is HDF5 and every dataset says its own unit, frame and dimensions, so the reader is generic: whatever
+was recorded is there under its name, as an attribute (``result.tension``) or an item
+(``result["energy/kinetic"]``).  Arrays are read when they are asked for, once.
 
 Layout, format 1 (`record` writes it)::
 
@@ -26,8 +25,8 @@ import difflib
 import io
 import time
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
-from types import TracebackType
 from typing import Any, NamedTuple
 
 import h5py
@@ -39,8 +38,7 @@ FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
 ALIASES = {"times": "t", "moment": "bending_moment"}
 
-# The writer holds the file alone for a few milliseconds while it starts; a reader that comes
-# just then waits this long (s) before it believes the lock.
+# The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
 _PATIENCE = 1.0
 
 
@@ -50,6 +48,9 @@ class Zone(NamedTuple):
     kind: str
     s_a: float
     s_b: float
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.s_a:.6g}-{self.s_b:.6g} m"
 
 
 class Event(NamedTuple):
@@ -91,7 +92,7 @@ class Columns(Mapping[str, np.ndarray]):
         return [*super().__dir__(), *self._keys]
 
     def __repr__(self) -> str:
-        return f"<{self._group}: {', '.join(self._keys)}>"
+        return f"<{self._result.describe(self._group)}>"
 
 
 class ZoneHistory(Sequence[list[Zone]]):
@@ -113,13 +114,16 @@ class ZoneHistory(Sequence[list[Zone]]):
         k = int(np.searchsorted(self._first, i % self._count, side="right")) - 1
         return list(self._sets[k]) if k >= 0 else []
 
+    def __repr__(self) -> str:
+        sets = [f"from output {i}: {_joined(list(map(str, z)))}" for i, z in zip(self._first, self._sets, strict=True)]
+        return f"<zones at {self._count} outputs; {_joined(sets, '; ')}>"
+
 
 class Result:
     """The recorded answer of one run.
 
-    Arrays have the output times first: `position` is (nt, ns, 3).  `units`, `describe`
-    and `dims` say what each is.  Use `refresh` to see what a running computation has
-    added since.
+    Arrays have the output times first: `position` is (nt, ns, 3).  `units`, `describe` and `dims` say what each
+    is.  Use `refresh` to see what a running computation has added since.
     """
 
     def __init__(self, source: Path | io.BytesIO) -> None:
@@ -150,9 +154,7 @@ class Result:
 
         self._file.visititems(visit)
         self.names = tuple(self._dims)
-        for alias, name in ALIASES.items():
-            if name in self.units:
-                self.units[alias] = self.units[name]
+        self.units |= {alias: self.units[name] for alias, name in ALIASES.items() if name in self.units}
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
         scales = sorted((n for n, dims in self._dims.items() if dims == (n,)), key=lambda n: n != "t")
@@ -183,7 +185,7 @@ class Result:
     def __enter__(self) -> Result:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+    def __exit__(self, *error: object) -> None:
         self.close()
 
     # ---- arrays -------------------------------------------------------------------------------
@@ -192,10 +194,12 @@ class Result:
         name = ALIASES.get(name, name)
         if name in self._dims:
             return name
+        if name in self._groups:
+            raise UnknownName(f"'{name}' is a group; ask for {' or '.join(f'{name}/{key}' for key in self[name])}")
         known = [*(n for n in self.names if "/" not in n), *self._groups, "scene_text"]
         known += [a for a, n in ALIASES.items() if n in self._dims]
         near = [n for n in self.names if "/" in n and n.split("/")[1] == name.split("/")[-1]]
-        near = near or difflib.get_close_matches(name, [*known, *self.names], 3)
+        near = near or difflib.get_close_matches(name, dict.fromkeys([*known, *self.names]), 3)
         hint = f"did you mean {' or '.join(near)}?" if near else "it has " + ", ".join(known)
         raise UnknownName(f"the result has no '{name}'; {hint}")
 
@@ -231,7 +235,12 @@ class Result:
         return self._dims[self._known(name)]
 
     def describe(self, name: str) -> str:
-        """What an array is: dimensions, unit, frame, in a sentence."""
+        """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
+        if name in self._groups:
+            units: dict[str, list[str]] = {}
+            for key in self._groups[name]:
+                units.setdefault(self.units[f"{name}/{key}"], []).append(key)
+            return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
         name = self._known(name)
         attrs = self._file[name].attrs
         unit, frame = _text(attrs.get("units", "")), _text(attrs.get("frame", ""))
@@ -290,8 +299,7 @@ class Result:
     @property
     def versions(self) -> dict[str, str]:
         """Versions of the programs that computed and wrote the result."""
-        head = "version_"
-        return {k.removeprefix(head): v for k, v in self.attributes.items() if k.startswith(head)}
+        return {k.removeprefix("version_"): v for k, v in self.attributes.items() if k.startswith("version_")}
 
     def __repr__(self) -> str:
         t, s = self.times, self.s
@@ -300,9 +308,7 @@ class Result:
         text = f"Result of '{self.title}' ({name}): {len(t)} output{'s' * (len(t) != 1)}, {span}; "
         text += f"{len(s)} points on s = {s[0]:.6g} ... {s[-1]:.6g} m; "
         if len(t) and self.zones[-1]:
-            zones = [f"{z.kind} {z.s_a:.6g}-{z.s_b:.6g} m" for z in self.zones[-1]]
-            more = f" and {len(zones) - 6} more" if len(zones) > 6 else ""
-            text += f"last zones {', '.join(zones[:6])}{more}; "
+            text += f"last zones {_joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
 
 
@@ -312,20 +318,15 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     A file that another process is writing, or that was left by a killed one, opens too,
     with the outputs that were complete.  ResultError when it is not a result.
     """
-    if isinstance(source, bytes):
-        return Result(io.BytesIO(source))
-    if isinstance(source, io.BytesIO):
-        return Result(source)
-    return Result(Path(source).expanduser().resolve())
+    source = io.BytesIO(source) if isinstance(source, bytes) else source
+    return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
 
 
 def is_result(path: Path) -> bool:
     """Whether the file is one of ours, of whatever format version and status."""
-    try:
-        with _open_file(path) as file:
-            return _text(file.attrs.get("format", "")) == FORMAT
-    except ResultError:
-        return False
+    with suppress(ResultError), _open_file(path) as file:
+        return _text(file.attrs.get("format", "")) == FORMAT
+    return False
 
 
 def _open_file(source: Path | io.BytesIO) -> h5py.File:
@@ -360,11 +361,9 @@ def _check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
     if kind != FORMAT:
         raise ResultError(f"{name} is an HDF5 file, but not a result of hybrid\n    given:    format '{kind}'")
     if version != FORMAT_VERSION:
-        raise ResultError(
-            f"{name} has result format {version}; this program reads format {FORMAT_VERSION}\n"
-            f"    try:      read it with hybrid-cable {_text(file.attrs.get('version_hybrid-cable', '?'))}, "
-            "which wrote it, or run its scene again"
-        )
+        wrote = _text(file.attrs.get("version_hybrid-cable", "?"))
+        said = f"{name} has result format {version}; this program reads format {FORMAT_VERSION}"
+        raise ResultError(f"{said}\n    try:      read it with hybrid-cable {wrote}, or run its scene again")
 
 
 def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:
@@ -389,11 +388,13 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
     return np.take(array, left, axis) * (1.0 - weight) + np.take(array, right, axis) * weight
 
 
+def _joined(texts: list[str], by: str = ", ") -> str:
+    return by.join(texts if len(texts) <= 6 else [*texts[:6], f"and {len(texts) - 6} more"])
+
+
 def _text(value: Any) -> str:
     return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
 
 
 def _plain(value: Any) -> Any:
-    if isinstance(value, bytes):
-        return _text(value)
-    return value.item() if isinstance(value, np.generic) else value
+    return _text(value) if isinstance(value, bytes) else value.item() if isinstance(value, np.generic) else value

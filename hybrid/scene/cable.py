@@ -32,7 +32,10 @@ class Environment(Table):
     """What acts on the cable from outside."""
 
     gravity: NonNegative = Field(default=9.81, description="acceleration of gravity, along -z [m/s^2]")
-    fluid: Fluid | None = Field(default=None, description="the fluid around the cable; absent: vacuum")
+    fluid: Fluid | None = Field(
+        default=None,
+        description="the fluid around the cable: water, or air (density 1.225, the wind as current); absent: vacuum",
+    )
 
 
 class Drag(Table):

@@ -171,7 +171,7 @@ End = Annotated[
     | Annotated[Guided, Tag("<guided>")]
     | Annotated[Free, Tag("<free>")],
     Discriminator(by_kind),
-    Kinds(("pinned", "clamped", "guided", "free")),
+    Kinds(("pinned", "clamped", "guided", "free"), usual=("pinned",)),
 ]
 
 

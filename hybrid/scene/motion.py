@@ -190,15 +190,12 @@ def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
 def resolution_findings(ends: Ends, step: float) -> list[Finding]:
     """Motions that a time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp."""
     found: list[Finding] = []
+    periods: dict[str, float] = {}
     for name, end in (("start", ends.start), ("end", ends.end)):
         if isinstance(end, Free) or end.motion is None:
             continue
         here, motion = ("ends", name, "motion"), end.motion
-        for what, h in motion.harmonics().items():
-            if h.amplitude and h.period < SAMPLES * step * (1 - 1e-9):
-                expected = f"a period of at least {SAMPLES} time steps of {step:g} s"
-                fix = f"time.step: {h.period / 20:.3g}, or less"
-                found.append(Finding((*here, what, "period"), expected, fix, f"{h.period:g}"))
+        periods |= {dotted((*here, what)): h.period for what, h in motion.harmonics().items() if h.amplitude}
         if motion.ramp is not None and motion.harmonics() and motion.ramp < RAMP_STEPS * step * (1 - 1e-9):
             expected = f"a ramp of at least {RAMP_STEPS} time steps of {step:g} s, or it is a jump"
             fix = f"ramp: {2 * max(h.period for h in motion.harmonics().values()):.3g}, two periods"
@@ -206,10 +203,22 @@ def resolution_findings(ends: Ends, step: float) -> list[Finding]:
         if motion.file is not None:
             missed = _missed_between(read_record(motion.file), step)
             if missed is not None:
-                fix = "make time.step smaller, or smooth the record"
-                expected = f"a motion that is nearly straight within a time step of {step:g} s"
-                found.append(Finding((*here, "file"), expected, fix, f"it turns within a step at t = {missed:g} s"))
+                where = dotted((*here, "file"))
+                expected = f"steps so short that {where} is nearly straight within each; it turns at t = {missed:g} s"
+                found.append(Finding(("time", "step"), expected, "a smaller step, or a smoother record", f"{step:g}"))
+    if periods:
+        fastest = min(periods, key=lambda name: periods[name])
+        period = periods[fastest]
+        if period < SAMPLES * step * (1 - 1e-9):
+            expected = f"at most a sixth of the shortest period, {_rounded_down(period / SAMPLES)} s, of {fastest}"
+            found.append(Finding(("time", "step"), expected, f"time.step: {period / 20:.3g}, or less", f"{step:g}"))
     return found
+
+
+def _rounded_down(x: float) -> str:
+    """Three digits of a positive number that do not exceed it, for bounds that are to be copied."""
+    unit = 10.0 ** (math.floor(math.log10(x)) - 2)
+    return f"{math.floor(x / unit * (1 + 1e-9)) * unit:.3g}"
 
 
 def _missed_between(record: Record, step: float) -> float | None:

@@ -142,8 +142,8 @@ def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
             node = inside[part]
             place = node.place
         else:
-            # `model: adaptive` has no key `kind`: the word itself is the kind.
-            missing = isinstance(inside, dict | list) or inside is None
+            # `model: adaptive` has no key `kind`, the word itself is the kind; what else a bare word lacks is missing.
+            missing = isinstance(inside, dict | list) or inside is None or (isinstance(inside, str) and part != "kind")
             break
     given = finding.given or ("nothing" if missing else node.show())
     if at_key and not missing:

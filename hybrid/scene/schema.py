@@ -96,5 +96,6 @@ def missing_time(scene: Scene) -> Complaint:
         where="time",
         value="nothing",
         expected="a table with duration and step, in s, to compute motion",
-        fix="add `time: {duration: ..., step: ...}`, or ask for the static shape only",
+        fix="add `time: {duration: ..., step: ...}`; for the equilibrium alone: hybrid static FILE, or "
+        "hybrid.static(scene) in Python",
     )

@@ -16,7 +16,8 @@ from ruamel.yaml.error import MarkedYAMLError, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 
 from hybrid.errors import Complaint
-from hybrid.scene.table import Place, Table, did_you_mean, dotted
+from hybrid.scene.hints import decimal_comma, did_you_mean
+from hybrid.scene.table import Place, Table, dotted
 from hybrid.scene.words import keys_at, shorthand_key
 
 Spot = tuple[int, int]
@@ -129,12 +130,20 @@ def _build_table(
 ) -> Node:
     table = Node({}, place)
     merged: dict[str, Node] = {}
-    for key_node, value_node in node.value:
+    for i, (key_node, value_node) in enumerate(node.value):
         spot = (key_node.start_mark.line + 1, key_node.start_mark.column + 1)
         if not isinstance(key_node, ScalarNode):
             complaints.append(Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", "", *spot))
             continue
         key = str(key_node.value)
+        before = str(node.value[i - 1][0].value) if i else ""
+        if before in table.value and _is_behind_comma(node.value[i - 1][1], key_node, value_node):
+            written = f"{node.value[i - 1][1].value},{key}"
+            number = Node(float(written.replace(",", ".")), table.value[before].place, written)
+            fix, there = decimal_comma(written), number.place or spot
+            complaints.append(Complaint(dotted((*path, before)), written, "a number", fix, *there))
+            table.value[before] = number
+            continue
         if key_node.tag == "tag:yaml.org,2002:merge":
             built = _build(value_node, path, complaints, inside)
             for source in built.value if isinstance(built.value, list) else [built]:
@@ -156,6 +165,18 @@ def _build_table(
     for key, value in merged.items():
         table.value.setdefault(key, value)
     return table
+
+
+def _is_behind_comma(before: Any, key: ScalarNode, value: Any) -> bool:
+    """Whether a key is what stands behind a decimal comma: YAML reads {mass: 2,5} as mass: 2 and a key 5."""
+    return (
+        isinstance(before, ScalarNode)
+        and not isinstance(value.value, list)
+        and value.value == ""
+        and before.end_mark.index + 1 == key.start_mark.index
+        and re.fullmatch(r"[-+]?\d+", str(before.value)) is not None
+        and re.fullmatch(r"\d+([eE][-+]?\d+)?", str(key.value)) is not None
+    )
 
 
 def _scalar(node: ScalarNode) -> Any:

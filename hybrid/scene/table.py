@@ -11,7 +11,6 @@ JSON schema and the docs all take them from there.
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
@@ -20,6 +19,8 @@ from typing import Annotated, Any, NoReturn
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
 from pydantic.functional_validators import AfterValidator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from hybrid.scene.hints import nearest
 
 Place = tuple[str | int, ...]
 
@@ -70,13 +71,6 @@ def dotted(path: Iterable[str | int]) -> str:
     for part in path:
         text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
     return text
-
-
-def did_you_mean(word: str, known: Iterable[str]) -> str:
-    """The fix for a misspelt word: the nearest known one, or all of them."""
-    words = list(known)
-    near = difflib.get_close_matches(word.lower(), words, n=1, cutoff=0.6)
-    return f"did you mean {near[0]}?" if near else f"known here: {', '.join(words)}"
 
 
 # --- numbers, words, vectors -------------------------------------------------------------------
@@ -195,10 +189,12 @@ def by_kind(value: Any) -> str | None:
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
 
-    `later` holds kinds that people may ask for but this version does not have, with what to say.
+    `usual` names what to advise someone who says nothing.  `later` holds kinds that people may ask for
+    but this version does not have, with what to do instead.
     """
 
     names: tuple[str, ...]
+    usual: tuple[str, ...]
     later: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
@@ -219,10 +215,13 @@ class Kinds:
         kind = value.get("kind")
         expected = f"one of: {', '.join(self.names)}"
         if kind is None:
-            refuse([Finding(("kind",), expected, f"add kind: {' | '.join(self.names)}")])
-        elif kind not in self.names:
-            fix = dict(self.later).get(str(kind)) or did_you_mean(str(kind), self.names)
+            fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
+        elif str(kind) in dict(self.later):
+            given = f"{kind}, which is not available in this version (0.1)"
+            refuse([Finding(("kind",), expected, dict(self.later)[str(kind)], given)])
+        elif kind not in self.names:
+            refuse([Finding(("kind",), expected, nearest(str(kind), self.names))])
         return value
 
     def _refuse_table(self, given: str | None) -> NoReturn:

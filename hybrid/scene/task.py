@@ -83,7 +83,7 @@ Initial = Annotated[
     | Annotated[Points, Tag("<points>")]
     | Annotated[Equilibrium, Tag("<equilibrium>")],
     Discriminator(by_kind),
-    Kinds(("straight", "points", "equilibrium")),
+    Kinds(("straight", "points", "equilibrium"), usual=("equilibrium",)),
 ]
 
 
@@ -162,7 +162,8 @@ Model = Annotated[
     Discriminator(by_kind),
     Kinds(
         ("rod", "catenary", "zones"),
-        later=(("adaptive", "not available in this version (0.1); use rod, catenary or zones"),),
+        usual=("catenary", "rod"),
+        later=(("adaptive", "choose the zones yourself: kind: zones, with rods where the cable bends"),),
     ),
 ]
 
@@ -195,7 +196,7 @@ class Time(Table):
     """How long to compute, in which steps."""
 
     duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
-    step: Positive = Field(description="time step [s]")
+    step: Positive = Field(description="largest time step; shortened so that a whole number fits between outputs [s]")
     rho_inf: Number = Field(
         default=0.5, ge=0, le=1, description="spectral radius of generalized-alpha at high frequency; 1: no damping [-]"
     )

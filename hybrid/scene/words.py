@@ -15,7 +15,8 @@ import annotated_types
 from pydantic import Tag
 from pydantic.fields import FieldInfo
 
-from hybrid.scene.table import Finding, Kinds, Place, PlainNumber, Table, Words, did_you_mean, dotted
+from hybrid.scene.hints import decimal_comma, did_you_mean, nearest
+from hybrid.scene.table import Finding, Kinds, Place, PlainNumber, Table, Words, dotted
 
 # What pydantic calls "extra" is often a condition that another kind of end takes.
 OTHER_KIND = {
@@ -36,6 +37,17 @@ OTHER_KIND = {
     ("rod", "slack"): "a rod may go slack; leave slack out",
     ("rod", "zones"): "use kind: zones",
     ("catenary", "zones"): "use kind: zones",
+}
+
+# A larger number would not help, as an example of how to write it.
+LARGEST = 1e12
+
+# How to write what "[x, y, z]" or "..." would not tell.
+SHAPES = {
+    "direction": "[1, 0, 0]",
+    "zones": "[{rod: ...}, {catenary: ...}]",
+    "points": "[[x, y, z], [x, y, z]]",
+    "sections": "[{length: ..., mass: ...}]",
 }
 
 
@@ -192,8 +204,10 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
         return [(_unknown_key(path, spot), True)]
     words = expected(spot.annotation, spot.metadata, spot.field)
     if kind == "missing":
-        return [(Finding(path, words, _missing_fix(str(path[-1]), spot)), False)]
-    return [(Finding(path, words, _fix(kind, value, spot)), False)]
+        bare = isinstance(value, Mapping) and list(value) == ["kind"]
+        return [(Finding(path, words, _missing_fix(str(path[-1]), spot, bare)), False)]
+    key = path[-1] if path and isinstance(path[-1], str) else ""
+    return [(Finding(path, words, _fix(kind, key, value, spot)), False)]
 
 
 def _unknown_key(path: Place, spot: Spot) -> Finding:
@@ -204,21 +218,55 @@ def _unknown_key(path: Place, spot: Spot) -> Finding:
     return Finding(path, f"a key of {table}", fix)
 
 
-def _missing_fix(key: str, spot: Spot) -> str:
+def _missing_fix(key: str, spot: Spot, bare: bool) -> str:
+    """What to add; `bare`: the table says nothing but its kind, and may be that word alone."""
     unit = unit_of(spot.field)
     if (spot.kind, key) == ("guided", "tangent"):
         return "add `tangent: [x, y, z]`, the direction of increasing s at this end; kind: free holds none"
+    if bare and spot.owner is not None:
+        return f"write `{_example(spot.kind, spot.owner)}`"
+    found = list(arms(spot.annotation, spot.metadata))
+    kinds = next((mark for _, marks in found for mark in marks if isinstance(mark, Kinds)), None)
+    if kinds is None:
+        return f"add `{key}: {_shape(key, spot.annotation, spot.metadata)}`" + (f" ({unit})" if unit else "")
+    tables = {kind: a for kind in kinds.usual for a, marks in found if Tag(f"<{kind}>") in marks}
+    return "add " + " or ".join(f"`{key}: {_example(kind, table)}`" for kind, table in tables.items())
+
+
+def _example(kind: str, table: type[Table]) -> str:
+    """The shortest table of a kind, or its bare word."""
+    needs = {name: field for name, field in table.model_fields.items() if field.is_required()}
+    shapes = [f", {name}: {_shape(name, field.annotation, tuple(field.metadata))}" for name, field in needs.items()]
+    return f"{{kind: {kind}{''.join(shapes)}}}" if shapes else kind
+
+
+def _shape(key: str, annotation: Any, metadata: tuple[Any, ...]) -> str:
+    marks = [mark for _, found in arms(annotation, metadata) for mark in found]
+    vector = any(isinstance(mark, Words) and "[x, y, z]" in mark.text for mark in marks)
+    return SHAPES.get(key) or ("[x, y, z]" if vector else "...")
+
+
+def _number_for_more(key: str, value: float, spot: Spot) -> str:
+    """One number where a vector or a table is expected: how it would be written there."""
     marks = [mark for _, found in arms(spot.annotation, spot.metadata) for mark in found]
-    shape = "[x, y, z]" if any(isinstance(mark, Words) and "[x, y, z]" in mark.text for mark in marks) else "..."
-    shape = next((f"{{kind: {mark.names[0]}, ...}}" for mark in marks if isinstance(mark, Kinds)), shape)
-    return f"add `{key}: {shape}`" + (f" ({unit})" if unit else "")
+    if key and any(isinstance(mark, Words) and mark.text.startswith("three numbers") for mark in marks):
+        return f"write `{key}: [0, 0, {value}]`" if key in ("force", "value") else f"write `{key}: [{value}, 0, 0]`"
+    tables = _tables(spot.annotation)
+    if len(tables) != 1:
+        return ""
+    fields = tables[0].model_fields
+    first, *others = [name for name, field in fields.items() if field.is_required()] or list(fields)[:1]
+    if all(a is not float for a, _ in arms(fields[first].annotation)):
+        return ""
+    return f"write `{key}: {{{first}: {value}{''.join(f', {name}: ...' for name in others)}}}`"
 
 
-def _fix(kind: str, value: Any, spot: Spot) -> str:
+def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     unit = unit_of(spot.field)
-    if kind == "literal_error":
-        allowed = [str(x) for a, _ in arms(spot.annotation) for x in get_args(a)]
-        return did_you_mean(str(value), allowed)
+    if kind == "literal_error":  # what is expected lists them all
+        return nearest(str(value), [str(x) for a, _ in arms(spot.annotation) for x in get_args(a)])
+    if kind in ("vector", "model_type") and isinstance(value, int | float) and not isinstance(value, bool):
+        return _number_for_more(key, value, spot) if abs(value) < LARGEST else ""
     if value is None:
         return "give a value, or leave the key out"
     if kind in ("number", "whole_number") and isinstance(value, str):
@@ -232,7 +280,8 @@ def _fix(kind: str, value: Any, spot: Spot) -> str:
     if kind == "vector" and isinstance(value, str):
         return "write the numbers in brackets, with commas between them"
     if kind == "vector" and isinstance(value, list | tuple):
-        return f"count the numbers: there {'is' if len(value) == 1 else 'are'} {len(value)}"
+        commas = "; decimals take a point, not a comma" if len(value) > 3 else ""
+        return f"count the numbers: there {'is' if len(value) == 1 else 'are'} {len(value)}{commas}"
     if kind == "truth":
         return "write true or false"
     if kind == "string_type":
@@ -253,7 +302,7 @@ def _number_in_text(text: str, unit: str) -> str:
     if _is_number(text):
         return f"write {text.strip()} without quotes"
     if _is_number(text.replace(",", ".")):
-        return f"write a point, not a comma: {text.replace(',', '.').strip()}"
+        return decimal_comma(text)
     if len(words) == 2 and _is_number(words[0]):
         return f"write the number alone, {words[0]}" + (f"; the unit is {unit}" if unit else "")
     return ""

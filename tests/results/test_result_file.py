@@ -88,9 +88,8 @@ def test_round_trip(result: Result) -> None:
     assert result.steps["iterations"].tolist() == [0, 1, 2, 3] and result.steps["iterations"].dtype == np.int64
     assert result.events == [Event(1.0, 1.0, 1.5, "switch", "slack at s = 1.2 m: 5 µN < 10 µN")]
     assert result.scene_text == "title: Tëst\n" and result.title == "Tëst" and result.attributes["seed"] == 7
-    assert result.status == "complete" and result.message == ""
+    assert result.status == "complete" and not result.message and result.versions["numpy"] == np.__version__
     assert set(result.versions) == {"hybrid-cable", "numpy", "h5py", "numba", "python"}
-    assert result.versions["numpy"] == np.__version__
     text = repr(result)
     for part in ("Tëst", "run.h5", "4 outputs", "1.5 s", "5 points", "rod 1-2 m", "complete"):
         assert part in text
@@ -131,6 +130,7 @@ def test_every_dataset_has_unit_description_and_scales(tmp_path: Path) -> None:
     result = open_result(tmp_path / "run.h5")
     assert result.units["tension"] == "N" and result.units["moment"] == "N m" and result.units["energy/kinetic"] == "J"
     assert result.describe("position") == "position(t, s, xyz) in m: position of the centreline (inertial frame)"
+    assert result.describe("energy") == "energy: kinetic (J)" and result.describe("zones").endswith("; t (s)")
     assert result.speeds.tolist() == [1.0, 0.2] and result.dims("speeds") == ("z",)
 
 
@@ -140,6 +140,7 @@ def test_zones_are_looked_up_by_output_and_written_only_when_they_change(result:
     assert result.zones[2] == [Zone("catenary", 0.0, 1.0), Zone("rod", 1.0, 2.0)] == result.zones[-1]
     assert result.zones[1:3] == [result.zones[1], result.zones[2]]
     assert result["zones/t"].tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert repr(result.zones).endswith("; from output 2: catenary 0-1 m, rod 1-2 m>")
     with pytest.raises(IndexError):
         result.zones[4]
 
@@ -166,8 +167,11 @@ def test_outside_the_range_says_the_range(result: Result, where: dict[str, float
 
 
 def test_unknown_names_are_answered_with_near_ones(result: Result) -> None:
-    with pytest.raises(ResultError, match=r"no 'tensoin'; did you mean tension"):
-        result["tensoin"]
+    for wrong in ("tensoin", "tenson"):
+        with pytest.raises(ResultError, match=rf"no '{wrong}'; did you mean tension\?$"):
+            result[wrong]
+    with pytest.raises(ResultError, match="'energy' is a group; ask for energy/kinetic"):
+        result.dims("energy")
     with pytest.raises(AttributeError, match="energy/kinetic"):
         _ = result.kinetic
     with pytest.raises(ResultError, match=r"it has .*tension"):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from pathlib import Path
 
@@ -294,3 +295,15 @@ def test_at_is_cheap() -> None:
 
     motion = EndMotion(Motion(heave=Harmonic(amplitude=2.0, period=8.0), ramp=16.0), PLACE)
     assert min(timeit.repeat(lambda: motion.at(20.0), number=1000, repeat=5)) / 1000 < 16e-6
+
+
+def test_the_motion_files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    page = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+    scene, code, begin = (re.findall(rf"^```{x}\n(.*?)^```$", page, re.S | re.M)[0] for x in ("yaml", "python", "csv"))
+    monkeypatch.chdir(tmp_path)
+    exec(compile(code, "scene.md", "exec"), {})
+    assert Path("lift.csv").read_text().startswith(begin)
+    scene = scene.replace("motion: {heave: {amplitude: 0.5, period: 8.0}, ramp: 16.0}", "motion: {file: lift.csv}")
+    scene = scene.replace("tangent: [1, 0, 1]", "tangent: [1, 0, 1], motion: {file: turn.csv}")
+    ends = parse_scene(scene, "scene.yaml").ends
+    assert ends.start.motion.file.endswith("turn.csv") and ends.end.motion.file.endswith("lift.csv")

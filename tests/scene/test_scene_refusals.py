@@ -6,10 +6,14 @@ point, the key it must name, and words that the fix (or what was expected) must 
 
 from __future__ import annotations
 
+import json
 import re
 
 import pytest
 from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, change, complaints, marked
+
+from hybrid.scene.hints import ALIASES
+from hybrid.scene.schema import Scene
 
 PINNED = "{kind: pinned, position: [0, 0, 0]}"
 GUIDED = "{kind: guided, tangent: [0.8660254, 0, -0.5], force: [0.005, 0, 0.00866025]}"
@@ -28,7 +32,7 @@ CASES = {
     "unknown key of a section": (SUSPENSION, MASS, f"{MASS}\n      §mas: 1", "cable.sections[0].mas", "did you mean mass?"),
     "unknown key, nothing near": (SUSPENSION, "{every", "{§xyzzy: 3, every", "output.xyzzy", "every, points, history"),
     "missing key": (SUSPENSION, f"- length: 2.0                    # m, unstretched\n      diameter: 1.0e-3               # m\n      {MASS}", "- §length: 2.0\n      diameter: 1.0e-3", "cable.sections[0].mass", "add `mass: ...` (kg/m)"),
-    "missing table": (SUSPENSION, f"§initial: {STRAIGHT}".replace("§", ""), "", "initial", "add `initial: {kind: straight"),
+    "missing table": (SUSPENSION, f"§initial: {STRAIGHT}".replace("§", ""), "", "initial", "add `initial: equilibrium`"),
     "empty value": (SUSPENSION, "gravity: 9.8", "§gravity:", "environment.gravity", "leave the key out"),
     # --- values
     "negative": (SUSPENSION, MASS, "mass: §-1", "cable.sections[0].mass", "check the sign"),
@@ -60,8 +64,8 @@ CASES = {
     "no kind": (SUSPENSION, PINNED, "§{position: [0, 0, 0]}", "ends.start.kind", "pinned"),
     "kind misspelt": (SUSPENSION, PINNED, "{kind: §pined, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned?"),
     "kind is a list": (SUSPENSION, PINNED, "{kind: §[pinned], position: [0, 0, 0]}", "ends.start.kind", "pinned"),
-    "adaptive": (SUSPENSION, MODEL, "{kind: §adaptive, tolerance: 1}", "model.kind", "not available in this version (0.1); use rod, catenary or zones"),
-    "adaptive, a word": (SUSPENSION, MODEL, "§adaptive", "model.kind", "not available in this version (0.1)"),
+    "adaptive": (SUSPENSION, MODEL, "{kind: §adaptive, tolerance: 1}", "model.kind", "choose the zones yourself"),
+    "adaptive, a word": (SUSPENSION, MODEL, "§adaptive", "model.kind", "choose the zones yourself"),
     "end is a number": (SUSPENSION, PINNED, "§3", "ends.start", "kind: pinned"),
     "zone of no kind": (SUSPENSION, ZONES, "[{catenary: 1.5}, §{rood: 0.5}]", "model.zones[1]", "{rod: length}"),
     "zone of both kinds": (SUSPENSION, ZONES, "[§{catenary: 1.5, rod: 0.5}]", "model.zones[0]", "{rod: length}"),
@@ -121,6 +125,34 @@ CASES = {
     "polyline elsewhere": (EVERYTHING_ELSE, POINTS, "[§[1.0, 0.0, 0.0], [5.0, 0.0, 0.0], [5.0, 0.0, -6.0]]", "initial.points[0]", "held ends"),
     "polyline that stops": (EVERYTHING_ELSE, POINTS, "[[0.0, 0.0, 0.0], [10.0, 0.0, 0.0], §[10.0, 0.0, 0.0]]", "initial.points[2]", "leave it out"),
     "polyline of a point": (EVERYTHING_ELSE, POINTS, "§[[0.0, 0.0, 0.0]]", "initial.points", "at least 2"),
+    # --- what engineers write
+    "EI": (SUSPENSION, BENDING, f"{BENDING}\n      §EI: 1", "cable.sections[0].EI", "did you mean bending_stiffness?"),
+    "GJ": (SUSPENSION, BENDING, f"{BENDING}\n      §GJ: 1", "cable.sections[0].GJ", "did you mean torsional_stiffness?"),
+    "EA": (SUSPENSION, BENDING, f"{BENDING}\n      §EA: 1", "cable.sections[0].EA", "did you mean axial_stiffness?"),
+    "weight": (SUSPENSION, BENDING, f"{BENDING}\n      §weight: 1", "cable.sections[0].weight", "did you mean mass (kg/m)"),
+    "Cd": (SUSPENSION, BENDING, f"{BENDING}\n      §Cd: 1", "cable.sections[0].Cd", "did you mean drag: {normal: ...}?"),
+    "rho": (SUSPENSION, "{density: 1.0}", "{density: 1.0, §rho: 1.0}", "environment.fluid.rho", "did you mean density?"),
+    "wind": (SUSPENSION, "{density: 1.0}", "{density: 1.0, §wind: [1, 0, 0]}", "environment.fluid.wind", "did you mean current?"),
+    "velocity": (SUSPENSION, "{density: 1.0}", "{density: 1.0, §velocity: [1, 0, 0]}", "environment.fluid.velocity", "did you mean current?"),
+    "wind, one table up": (SUSPENSION, "{density: 1.0}", "{density: 1.0}\n  §wind: [1, 0, 0]", "environment.wind", "fluid: {density: ..., current: [x, y, z]}"),
+    "fixed": (SUSPENSION, PINNED, "{kind: §fixed, position: [0, 0, 0]}", "ends.start.kind", "clamped (position and direction held) or pinned"),
+    "hinged": (SUSPENSION, PINNED, "{kind: §hinged, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned?"),
+    "ball": (SUSPENSION, PINNED, "{kind: §ball, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned?"),
+    "type": (SUSPENSION, PINNED, "§{type: pinned, position: [0, 0, 0]}", "ends.start.kind", "write kind, not type"),
+    "number for drag": (SUSPENSION, "{normal: 1.5, tangential: 0.05}", "§1.0", "cable.sections[0].drag", "`drag: {normal: 1.0}`"),
+    "number for force": (SUSPENSION, "[0.005, 0, 0.00866025]", "§-300", "ends.end.force", "`force: [0, 0, -300]`"),
+    "number for current": (OCEAN, "[0.3, 0, 0]", "§0.3", "environment.fluid.current", "`current: [0.3, 0, 0]`"),
+    "number for time": (SUSPENSION, "{duration: 20.0, step: 0.01}", "§20", "time", "`time: {duration: 20, step: ...}`"),
+    "decimal comma": (SUSPENSION, MASS, "mass: §2,5e7", "cable.sections[0].mass", "a decimal comma? write 2.5e7"),
+    "decimal comma in quotes": (SUSPENSION, MASS, 'mass: §"2,5e7"', "cable.sections[0].mass", "a decimal comma? write 2.5e7"),
+    "decimal comma in braces": (OCEAN, "axial_stiffness: 2.0e8", "axial_stiffness: §2,5e7", "cable.sections[0].axial_stiffness", "a decimal comma? write 2.5e7"),
+    "negative decimal comma": (SUSPENSION, "step: 0.01", "step: 0.01, rho_inf: §-0,5", "time.rho_inf", "write -0.5"),
+    "decimal comma in a vector": (SUSPENSION, PINNED, "{kind: pinned, position: §[0,5, 0, 0]}", "ends.start.position", "not a comma"),
+    "straight, a word": (SUSPENSION, STRAIGHT, "§straight", "initial.direction", "`{kind: straight, direction: [1, 0, 0]}`"),
+    "zones, a word": (SUSPENSION, MODEL, "§zones", "model.zones", "`{kind: zones, zones: [{rod: ...}, {catenary: ...}]}`"),
+    "missing model": (SUSPENSION, f"model: {MODEL}", "", "model", "add `model: catenary` or `model: rod`"),
+    "missing end": (SUSPENSION, f"start: {PINNED}", "", "ends.start", "add `start: {kind: pinned, position: [x, y, z]}`"),
+    "too fast for the step": (OCEAN, "step: 0.02", "step: §2", "time.step", "a sixth of the shortest period, 1.33 s, of ends.end.motion.heave"),
     "no time at all": (EVERYTHING, "until: 3.0", "until: §0", "ends.end.force.until", "> 0"),
 }  # fmt: skip
 
@@ -146,7 +178,14 @@ def test_refusal(name: str) -> None:
     )
 
 
-SEVERAL = {"drag without fluid", "added mass without fluid", "motion twice", "zone of no kind", "polyline elsewhere"}
+SEVERAL = {
+    "negative decimal comma",
+    "drag without fluid",
+    "added mass without fluid",
+    "motion twice",
+    "zone of no kind",
+    "polyline elsewhere",
+}
 
 
 @pytest.mark.parametrize("name", sorted(set(CASES) - SEVERAL))
@@ -166,6 +205,21 @@ def test_a_complaint_reads_well() -> None:
         "    expected: a number > 0, in kg/m\n"
         "    try:      write the number alone, 2; the unit is kg/m"
     )
+
+
+def test_nothing_is_said_twice() -> None:
+    (kind,) = complaints(change(SUSPENSION, PINNED, "{kind: xyzzy, position: [0, 0, 0]}"))
+    assert kind.expected == "one of: pinned, clamped, guided, free" and not kind.fix
+    (later,) = complaints(change(SUSPENSION, MODEL, "adaptive"))
+    assert later.value == "adaptive, which is not available in this version (0.1)"
+    (bare,) = complaints(change(SUSPENSION, STRAIGHT, "straight"))
+    assert bare.value == "nothing"
+
+
+def test_every_alias_means_a_key_or_a_kind() -> None:
+    known = set(re.findall(r'"(\w+)"', json.dumps(Scene.model_json_schema())))
+    for word, meant in ALIASES.items():
+        assert word == word.lower() and all(re.split("[: ]", text)[0] in known for text in meant), word
 
 
 def test_numbers_are_given() -> None:
