@@ -141,16 +141,6 @@ def mat_hat(A, d):
 
 
 @inner
-def hat_mat(d, A):
-    """[d]x A: d crossed with each column."""
-    return (
-        d[1] * A[6] - d[2] * A[3], d[1] * A[7] - d[2] * A[4], d[1] * A[8] - d[2] * A[5],
-        d[2] * A[0] - d[0] * A[6], d[2] * A[1] - d[0] * A[7], d[2] * A[2] - d[0] * A[8],
-        d[0] * A[3] - d[1] * A[0], d[0] * A[4] - d[1] * A[1], d[0] * A[5] - d[1] * A[2],
-    )  # fmt: skip
-
-
-@inner
 def project(d):
     """I - d d^T."""
     xy, xz, yz = -d[0] * d[1], -d[0] * d[2], -d[1] * d[2]

@@ -51,7 +51,7 @@ def march(linear: Linear) -> Fit:
     X = _open(linear.start[0], linear.start[1], linear.scales[0])
     for i, (residual, left, right) in enumerate(linear.cells):
         if i:
-            X, tie = _pass(X, linear.meetings[i - 1], linear.spin[i], linear.scales[i - 1], linear.scales[i])
+            X, tie = _pass(X, linear.meetings[i - 1], linear.spin[i], linear.scales[i])
             ties.append(tie)
         step = -np.linalg.solve(right, np.concatenate([residual[..., None], left], 2))
         run = np.empty((len(step) + 1, *X.shape))
@@ -88,9 +88,7 @@ def _open(residual: Array, rows: Array, scale: Array) -> Array:
     return scale[:, None] * np.column_stack([first, basis])
 
 
-def _pass(
-    X: Array, meeting: tuple[Array, Array, Array], spin: bool, scale_a: Array, scale_b: Array
-) -> tuple[Array, tuple[Array, Array]]:
+def _pass(X: Array, meeting: tuple[Array, Array, Array], spin: bool, scale: Array) -> tuple[Array, tuple[Array, Array]]:
     """Columns on the right of a meeting, and how the constants on the left follow from those on the right."""
     residual, left, right = meeting
     m, count = right.shape[1], X.shape[1] - 1
@@ -107,7 +105,7 @@ def _pass(
         known, born = np.array([0, 1, 2, 3, 4, 5, 6, 7, 11]), np.array([9, 10, 8])
     width = X.shape[1]
     out = np.zeros((m, width + len(born)))
-    out[born, width + np.arange(len(born))] = scale_b[born]
+    out[born, width + np.arange(len(born))] = scale[born]
     feed = -left @ np.column_stack([X, np.zeros((len(X), len(born)))]) - right[:, born] @ out[born]
     feed[:, 0] -= residual
     out[known] = np.linalg.solve(right[:, known], feed)
