@@ -167,6 +167,21 @@ def test_ordinary_sags_are_found(stiffness, angle, span, zones):
     assert lifted == pytest.approx([0, 0, weight], abs=1e-6 * weight)
 
 
+@pytest.mark.parametrize("model", ["rod", "catenary"])
+@pytest.mark.parametrize("stretch", [{}, {"axial_stiffness": 1e4}])
+@pytest.mark.parametrize("end", [[1.5, 0, 0], [1.0, 0.5, -0.5], [0.3, 0, 1.2]])
+def test_poor_starting_shapes(model, stretch, end):
+    """From an arc, from straight between the ends (compressed), and from straight in some direction: one answer."""
+    line = section(length=2.0, mass=0.5, bending_stiffness=1e-3, **stretch)
+    ends = {"start": pinned(0, 0, 0), "end": pinned(*end)}
+    shapes = [
+        static(line, {"ends": ends, "model": model, "initial": {"kind": "equilibrium"} | guess}).position[0]
+        for guess in ({}, {"guess": "span"}, {"guess": "straight", "direction": [1, 0.2, -0.3]})
+    ]
+    assert np.abs(shapes[1] - shapes[0]).max() < 1e-8
+    assert np.abs(shapes[2] - shapes[0]).max() < 1e-8
+
+
 def test_a_flat_cable_turns_onto_its_soft_side():
     """The sag that bends it about its stiff axis is an equilibrium, but not one it would keep."""
     ends = {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0)}

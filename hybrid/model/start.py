@@ -27,7 +27,9 @@ def initial_nodes(scene: Scene, s: Floats) -> Floats:
         return first + s[:, None] * direction
     assert isinstance(initial, Equilibrium)
     down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
-    if start and end and initial.guess != "straight":
+    if start and end and initial.guess == "span":
+        return np.array(start) + (s / length)[:, None] * np.subtract(end, start)
+    if start and end and initial.guess == "auto":
         return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0)
     if initial.direction is not None:
         direction = np.array(initial.direction, float)

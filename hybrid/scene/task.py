@@ -71,7 +71,9 @@ class Equilibrium(Table):
 
     kind: Literal["equilibrium"] = Field(default="equilibrium", description="static equilibrium")
     guess: Literal["auto", "straight", "span"] = Field(
-        default="auto", description="shape to start the search from: straight, spanning the two ends, or whichever fits"
+        default="auto",
+        description="shape to start the search from: straight in a direction, span (straight between the ends), "
+        "or auto (an arc between two held ends, else straight)",
     )
     direction: Direction | None = Field(
         default=None, description="direction of increasing s of a straight guess, inertial frame; any length [-]"
