@@ -182,6 +182,18 @@ def test_poor_starting_shapes(model, stretch, end):
     assert np.abs(shapes[2] - shapes[0]).max() < 1e-8
 
 
+def test_a_flag_in_a_current_is_stable():
+    """Drag turns with the cable and is not conservative; that must not be taken for buckling."""
+    water = {"environment": {"fluid": {"density": 1025, "current": [0.03, 0.48, -0.52]}}}
+    thread = section(
+        length=0.4, mass=9e-5, diameter=5.2e-4, bending_stiffness=1e-5, drag={"normal": 1.2, "tangential": 0.02}
+    )
+    ends = {"start": pinned(0, 0, 0), "end": {"kind": "free", "force": [6e-4, 2.5e-4, 8e-5]}}
+    found = static(water, thread, {"ends": ends, "model": "rod"})
+    assert found.tension.min() > -1e-12
+    assert found.position[0, -1, 1] == pytest.approx(0.289, abs=2e-3)  # downstream, in balance with drag and force
+
+
 def test_a_flat_cable_turns_onto_its_soft_side():
     """The sag that bends it about its stiff axis is an equilibrium, but not one it would keep."""
     ends = {"start": pinned(0, 0, 0), "end": pinned(1, 0, 0)}

@@ -10,7 +10,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, State
-from hybrid.physics.loads import MASS_DAMPING, ROTARY
+from hybrid.physics.loads import DRAG, MASS_DAMPING, ROTARY
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
 from hybrid.solve.step import newton, slackest
@@ -122,7 +122,8 @@ class _Solver:
         Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
         and at its real size its round-off would hide the softest modes of a long line.
         """
-        line, n = self.line, self.line.h.size
+        # drag counts as a load that keeps its direction: how it turns with the cable is not conservative
+        line, n = self.line._replace(bits=self.line.bits & ~DRAG), self.line.h.size
         rows = np.zeros((n + 1, SIZE * WIDTH))
         march(
             line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
