@@ -106,15 +106,15 @@ class Motion:
         power = self._powers()
         self.work += 0.5 * dt * (self.power + power)
         self.power = power
-        self._look(self.watch.shape(end, self.model.ends.values, self.state))
-        if self.model.slack == "warn":
-            self.watch.tension(end, self.state)
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
                 "residual": taken.residual, "repeats": repeats, "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
+        self._look(self.watch.shape(end, self.model.ends.values, self.state))
+        if self.model.slack == "warn":
+            self.watch.tension(end, self.state)
 
     def _bring_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""

@@ -26,10 +26,10 @@ class Plan:
     seconds: float  # of processor time, from the measured cost per cell and iteration
 
 
-# Processor time per cell and Newton iteration (s) and per step, as tests/bench/bench_cost.py
+# Processor time per cell and Newton iteration (s) and per step, as tests/bench/test_bench_cost.py
 # prints them on one core; a plan promises an order of magnitude, not more.
-COST = {"rod": 0.3e-6, "catenary": 0.1e-6}
-COST_STEP = 50e-6
+COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
+COST_STEP = 25e-6
 USUAL_ITERATIONS = 2.5
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often

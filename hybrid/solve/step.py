@@ -28,8 +28,8 @@ ROUND_OFF = 1e-6
 # Round-off of a length, as a part of it, and the most (as a part of the tension scale) that it may
 # make of a tension: a step so small that it is more does not converge, and says so.
 ROUND_OFF_LENGTH, MOST_NOISE = 1e-15, 1e-3
-# At a clamp whose first cell is longer than sqrt(EI/T) the moment is wrong by a third and more,
-# whatever the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
+# At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
+# the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
 CLAMP = 20.0
 # Changes of tension count against the largest tension of the line, or against this part of
 # the tension scale of the scene where that is larger (a line can be free of tension).
