@@ -56,7 +56,10 @@ Everything below is said at once, with file, line, column, the value, what was e
 unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
 cable is long; zones that do not add up to the length; a rod zone over a section without bending stiffness; drag,
 added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
-an initial shape that misses a held end; a normal along its tangent.
+an initial shape that misses a held end; a normal along its tangent; waves without a surface, or so steep that they
+break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
+that sinks; an attachment beyond the end of the cable; a cable that nothing holds, unless it lies on a seabed or floats
+at a surface; a time step that cannot follow a period, a ramp or a move.
 
 ## Air and wind
 
@@ -77,25 +80,101 @@ model: catenary
 
 Without a fluid there is neither drag nor wind; a cable that swings in still air has `density: 1.225` and no current.
 
-## A weight at an end
+## Currents
 
-A force on a `free` end pulls but has no inertia: however the cable moves, the tension at that end is the force.
-That is right for a winch that holds a tension, and for a weight in statics.
-A weight that swings or is heaved has inertia; give it as a short, heavy last section, here 50 kg within half a metre,
-with a bending stiffness if it is to be a rod:
+The shortest form is a vector, `current: [0.3, 0, 0]`.
+A list gives velocities at heights, `current: [{z: 0, velocity: [0.6, 0, 0]}, {z: -100, velocity: [0, 0.1, 0]}]`: linear
+between them, constant above the highest and below the lowest.
+A table says its kind, and may have a `ramp`, the time over which the current grows from nothing:
 
 ```yaml
+environment:
+  fluid:
+    density: 1025
+    current: {kind: power_law, velocity: [0.8, 0, 0], top: 0, bottom: -100, exponent: 0.2, turn: 30}
 cable:
-  sections:
-    - {length: 99.5, mass: 0.8, axial_stiffness: 2.0e+6}
-    - {length: 0.5, mass: 100, axial_stiffness: 2.0e+6}
+  sections: [{length: 90, mass: 3.0, diameter: 0.03, axial_stiffness: 2.0e+7, drag: {normal: 1.2}}]
 ends:
-  start: {kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1.0, period: 8.0}, ramp: 16.0}}
+  start: {kind: pinned, position: [0, 0, 0]}
   end: free
 initial: equilibrium
 model: catenary
-mesh: {cells: 200}
-time: {duration: 40.0, step: 0.02}
+```
+
+## Waves, the seabed, what hangs on the cable
+
+A mooring line that lies on the bed for a part of its length, with a float, a clump and buoyancy modules, its upper end
+moved by a vessel in a swell of two periods.
+Waves need the `surface` of the fluid; their length follows from the depth over the seabed.
+The attachments may stand in any order.
+
+```yaml
+environment:
+  fluid:
+    density: 1025
+    surface: 0
+    current: [{z: 0, velocity: [0.6, 0, 0]}, {z: -100, velocity: [0.1, 0, 0]}]
+    waves: {kind: jonswap, height: 3.0, period: 10.0, direction: 180, ramp: 20}
+  seabed: {z: -100, stiffness: 2.0e+4, damping: 500, friction: {axial: 0.3, lateral: 0.5}}
+cable:
+  sections:
+    - {length: 400, mass: 30, diameter: 0.06, axial_stiffness: 2.0e+8, drag: {normal: 1.2}, added_mass: {normal: 1.0}}
+  attachments:
+    - {kind: float, at: 320, buoyancy: 2000, mass: 150, drag_area: 0.5, added_mass: 180}
+    - {kind: clump, at: 200, mass: 300, volume: 0.04, drag_area: 0.2, added_mass: 40}
+    - {kind: modules, over: [330, 360], buoyancy: 50, mass: 12, drag_area: 0.2, added_mass: 20}
+ends:
+  start: {kind: pinned, position: [0, 0, -100]}
+  end:
+    kind: pinned
+    position: [350, 0, -5]
+    motion: {heave: [{amplitude: 1.0, period: 10.0}, {amplitude: 0.3, period: 7.0, phase: 40}], ramp: 20}
+initial: equilibrium
+model: catenary
+time: {duration: 120.0, step: 0.1}
+```
+
+`buoyancy` is net: the weight of the displaced fluid minus that of the float or the modules.  Where the size is known
+rather than the lift, give `volume` instead.
+
+## Bodies, travel, ends that follow the waves
+
+A `body` is an end that carries a mass and is not held: a vehicle, a buoy, a weight.
+Give it a volume and it is buoyant; if it displaces more than its mass, it floats at the surface.
+`near` says where the search of the equilibrium puts it first.
+Here a vehicle of 1.5 t hangs from a ship that rises and falls with the waves, sets off at 0.5 m/s, and is then moved
+10 m aside:
+
+```yaml
+environment:
+  fluid: {density: 1025, surface: 0, waves: {kind: regular, height: 1.5, period: 8.0, ramp: 16}}
+cable:
+  sections: [{length: 200, mass: 1.5, diameter: 0.03, axial_stiffness: 1.0e+7, drag: {normal: 1.2}}]
+ends:
+  start:
+    kind: pinned
+    position: [0, 0, 2]
+    motion: {follow: waves, velocity: [0.5, 0, 0], ramp: 20, travel: {by: [0, 10, 0], over: 30, begin: 40}}
+  end: {kind: body, mass: 1500, volume: 1.2, height: 1.0, drag_area: 1.5, added_mass: 900}
+initial: equilibrium
+model: catenary
+time: {duration: 100.0, step: 0.1}
+```
+
+A force on a `free` end pulls but has no inertia: however the cable moves, the tension at that end is the force.
+That is right for a winch that holds a tension; a weight that swings or is heaved is a `body`.
+
+A cable that no end holds can be in equilibrium, too: a heavy one on a seabed, a light one at a surface, as long as
+nothing pushes it along.  It has to be said where it lies, with `points`:
+
+```yaml
+environment:
+  seabed: {z: -20, stiffness: 1.0e+4, friction: 0.4}
+cable:
+  sections: [{length: 10, mass: 2.0}]
+ends: {start: free, end: {kind: body, mass: 10}}
+initial: {kind: equilibrium, points: [[0, 0, -20], [6, 0, -20], [6, 4, -20]]}
+model: catenary
 ```
 
 ## Steps and outputs
@@ -106,7 +185,7 @@ With `every: 0.5` and `step: 0.2` there are three steps of 0.1667 s between outp
 `step: 0.02` the step is 0.01 s, since outputs are always ends of steps.
 The last output is at `duration`, also when `every` does not divide it.
 Keep 20 outputs or more of the shortest period you want to see; the steps must be as short as the motion needs, at
-least 6 and better 20 in the shortest period of a moving end.
+least 6 and better 20 in the shortest period of a moving end, and in the period of waves.
 
 ## Motion files
 
@@ -180,7 +259,10 @@ def default(name: str, schema: dict[str, Any], required: list[str]) -> str:
     value = schema.get("default")
     if "const" in schema or value is None or value == "" or isinstance(value, dict):
         return ""
-    return f"`{json.dumps(value)}`".replace('"', "")
+    if value == []:
+        return "none"
+    text = f"{value:.4g}" if isinstance(value, float) and value != round(value, 4) else json.dumps(value)
+    return f"`{text}`".replace('"', "")
 
 
 def unit(description: str) -> tuple[str, str]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tempfile
 import time as clock
+from math import sqrt
 from pathlib import Path
 from typing import Any
 
@@ -47,6 +48,8 @@ class Motion:
         if equilibrium is None:
             self.state = model.start.copy()
             self._bring_ends_in()
+            if not self.state.v.any():
+                self.stepper.hold_on(model.sea.at(0.0), model.ends.at(0.0), self.state)
         else:
             self.state = equilibrium.state.copy()
             self.watch.equilibrium(equilibrium)
@@ -67,7 +70,9 @@ class Motion:
         while self.t < until:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
             ends = self.model.ends.at(end)
-            taken = self.stepper.step(ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf)
+            taken = self.stepper.step(
+                self.model.sea.at(end), ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf
+            )
             if taken.outcome == Outcome.OK:
                 self._accept(taken, end, repeats, wasted)
                 wasted = 0
@@ -109,7 +114,8 @@ class Motion:
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
-                "residual": taken.residual, "repeats": repeats, "cpu": clock.process_time() - self.cpu,
+                "residual": taken.residual, "repeats": repeats, "pull_start": self._pull(0), "pull_end": self._pull(1),
+                "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
         self._look(self.watch.shape(end, self.model.ends.values, self.state))
@@ -132,6 +138,11 @@ class Motion:
             )
             self.recorder.event(0.0, s, s, "turned in", text)
 
+    def _pull(self, k: int) -> float:
+        ends = self.model.ends.values
+        x, y, z = (self.stepper.report[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k]).tolist()
+        return sqrt(x * x + y * y + z * z)
+
     def _powers(self) -> Floats:
         ends = self.model.ends
         return self.stepper.powers(ends.values, ends.velocity, self.state)
@@ -140,7 +151,7 @@ class Motion:
         assert self.scene.time is not None
         ends = self.model.ends
         acceleration = ends.acceleration(self.t, 1e-3 * self.scene.time.step)
-        taken = self.stepper.ignite(ends.at(self.t), acceleration, self.state)
+        taken = self.stepper.ignite(self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state)
         if taken.outcome != Outcome.OK:
             self._stop(taken, 0.0)
 

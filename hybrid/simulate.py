@@ -43,6 +43,8 @@ STEP_FIELDS = (
     ),
     Field("residual", "N", "largest force out of balance at a node before the last correction"),
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
+    Field("pull_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
+    Field("pull_end", "N", "the same at the end"),
     Field("cpu", "s", "processor time since the start of the run"),
 )
 
@@ -86,7 +88,9 @@ def run(
     equilibrium = _equilibrium(model, 0.0) if scene.initial.kind == "equilibrium" else None
     outputs = output_times(scene)
     stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
-    observer = Observer(model.line, model.zones, output_points(scene.output.points, model.length), True)
+    observer = Observer(
+        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), True
+    )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
     with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
@@ -149,7 +153,9 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
     found = _equilibrium(model, np.inf)
-    observer = Observer(model.line, model.zones, output_points(scene.output.points, model.length), False)
+    observer = Observer(
+        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), False
+    )
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
         ends = model.ends.at(np.inf)
@@ -167,8 +173,8 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 def _equilibrium(model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
     return solve_statics(
-        model.line, model.ends.at(t), model.start, model.length, model.tension_scale, model.slack_floor,
-        take_slack=model.slack == "warn",
+        model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
+        model.slack_floor, take_slack=model.slack == "warn",
     )  # fmt: skip
 
 

@@ -25,6 +25,8 @@ LARGEST_TWIST = 2.8
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
+# Energy below this part of tension scale times length is what Newton's tolerance leaves over many steps.
+NEWTON_LEAVES = 1e-7
 # Energy that the scheme swallows, as a part of the same: beyond this a motion was too fast for its step.
 LOSS_NOTED = 0.5
 # Strain beyond which a cable is hardly one; ropes of polymer reach a few per cent in service.
@@ -121,7 +123,7 @@ class Watch:
             self._potential, self._alive = potential, alive
             return None
         self._put_in = max(self._put_in, float(np.abs(work).sum()) + abs(potential - self._potential) + self._alive)
-        floor = 1e-9 * self._model.tension_scale * self._model.length
+        floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
         fastest = int(np.argmax(np.abs(state.v).sum(axis=1)))
         part = 100.0 * abs(gained) / (self._put_in or 1.0)
         if gained > GAIN_STOPS * self._put_in + floor:
@@ -147,7 +149,11 @@ class Watch:
         elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
         pressed = float(state.T[rod].min()) < 0.0 or float(values["energy/torsion"]) > 0.0
         calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
-        if pressed and calm and not is_stable(line, ends, state, self._model.length, self._model.tension_scale):
+        if (
+            pressed
+            and calm
+            and not is_stable(line, self._model.sea.values, ends, state, self._model.length, self._model.tension_scale)
+        ):
             text = "the rod rests where it would buckle: only its perfect symmetry keeps it there; give it a small bow"
             self.note(t, int(np.argmin(state.T)), "unstable", text)
             self._rested = True

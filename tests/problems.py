@@ -107,16 +107,18 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     )
     old = model.start.copy()
     if what.initial.kind == "equilibrium":
-        old = solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale).state
+        old = solve_statics(
+            model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
+        ).state
     if kick:
         kick(old, model)
-    stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), old)  # held ends start from rest
+    stepper.ignite(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), old)  # held ends start from rest
     new = old.copy()
     yield 0.0, old
     steps = round(time.duration / time.step)
     for k in range(1, steps + 1):
         t = k * time.duration / steps
-        taken = stepper.step(model.ends.at(t), old, new, time.duration / steps, time.rho_inf)
+        taken = stepper.step(model.sea.at(t), model.ends.at(t), old, new, time.duration / steps, time.rho_inf)
         assert taken.outcome == Outcome.OK, f"{taken} at t = {t}"
         old, new = new, old
         yield t, old
@@ -149,8 +151,8 @@ def stiffness(model: Model, ends: Ends, state: State) -> Floats:
     W, X_, _, report, _, gaps = workspace(n - 1)
     rows = np.zeros((n, SIZE * WIDTH))
     march(
-        line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
-        state.wd, 0.0, 0.0, gaps, W, X_, report, rows,
+        line, model.sea.at(0.0), ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T,
+        state.a1, state.w, state.wd, 0.0, 0.0, gaps, W, X_, report, rows,
     )  # fmt: skip
     J = np.zeros((SIZE * n, SIZE * (n + 5)))
     for i, row in enumerate(rows.reshape(n, SIZE, WIDTH)):

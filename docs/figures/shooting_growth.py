@@ -97,7 +97,9 @@ def one_march(scene: Scene) -> Slopes:
 def production(scene: Scene) -> Slopes:
     """The elimination along s; the clamp itself stands first."""
     model = build(scene)
-    found = solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale)
+    found = solve_statics(
+        model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
+    )
     chords = found.state.e
     middle, slope = 0.5 * (model.line.s[1:] + model.line.s[:-1]), chords[:, 2] / np.linalg.norm(chords, axis=1)
     return np.concatenate([[0.0], middle]), np.concatenate([[SLOPE], slope])

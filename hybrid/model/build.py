@@ -23,11 +23,12 @@ from hybrid.model.properties import (
     rotary_inertia,
     tension_scale,
     torsional_stiffness,
-    weight,
 )
-from hybrid.model.start import corners, ends_and_frames, initial_nodes
+from hybrid.model.sea import Surroundings, surroundings
+from hybrid.model.start import attachment_cuts, corners, ends_and_frames, hung, initial_nodes
 from hybrid.model.state import Floats, Line, State, blank_state
-from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
+from hybrid.model.water import water
+from hybrid.physics.loads import FRICTION, MASS_DAMPING, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.scene.schema import Clamped, Guided, Points, RodZone, Scene, Section, Straight, ZonesModel
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
@@ -44,6 +45,7 @@ class Model:
     line: Line
     zones: tuple[Zone, ...]
     ends: EndConditions
+    sea: Surroundings
     start: State
     ledger: tuple[Entry, ...]
     length: float  # m
@@ -89,7 +91,7 @@ def build(scene: Scene) -> Model:
     sections = merged_sections(scene.cable.sections)
     bounds = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
     plans = zone_plans(scene)
-    cuts = sorted({float(x) for x in bounds[1:-1]} | set(corners(scene)))
+    cuts = sorted({float(x) for x in bounds[1:-1]} | set(corners(scene)) | set(attachment_cuts(scene)))
     mesh = scene.mesh
     if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
@@ -113,30 +115,18 @@ def build(scene: Scene) -> Model:
         y[1:] += 0.5 * x
         return y
 
-    scale = tension_scale(scene, sections, bool(rod.any()))
+    sea = surroundings(scene, n)
+    fastest = float(np.linalg.norm(sea.values.current, axis=1).max())
+    scale = tension_scale(scene, sections, bool(rod.any()), fastest)
     # a stiff rod beside a light catenary must not hide that the catenary is slack
-    slack_scale = tension_scale(scene, sections, False)
-    fluid = scene.environment.fluid
-    bits = 0
-    nothing, nothing_node = np.full(n, np.nan), np.full(n + 1, np.nan)
-
-    area = per_cell(lambda x: np.pi / 4 * (x.diameter or 0.0) ** 2)
-    drag_n = drag_t = added_n = added_t = tau = rotary = polar = nothing
-    damp = nothing_node
-    if fluid and any(x.drag for x in sections):
-        bits |= DRAG
-        drag_n = 0.25 * fluid.density * h * per_cell(lambda x: x.drag.normal * (x.diameter or 0.0) if x.drag else 0.0)
-        drag_t = (
-            0.25
-            * np.pi
-            * fluid.density
-            * h
-            * per_cell(lambda x: x.drag.tangential * (x.diameter or 0.0) if x.drag else 0.0)
-        )
-    if fluid and any(x.added_mass for x in sections):
-        bits |= ADDED_MASS
-        added_n = 0.5 * fluid.density * area * h * per_cell(lambda x: x.added_mass.normal if x.added_mass else 0.0)
-        added_t = 0.5 * fluid.density * area * h * per_cell(lambda x: x.added_mass.tangential if x.added_mass else 0.0)
+    slack_scale = tension_scale(scene, sections, False, fastest)
+    wet = water(scene, s, of)
+    bits = wet.bits
+    tau = rotary = polar = np.full(n, np.nan)
+    damp = np.full(n + 1, np.nan)
+    bed = scene.environment.seabed
+    if bed is not None:
+        bits |= SEABED | (FRICTION if bed.friction and (bed.friction.axial or bed.friction.lateral) else 0)
     if any(damping(x).mass for x in sections):
         bits |= MASS_DAMPING
         damp = to_nodes(h * per_cell(lambda x: x.mass * damping(x).mass))
@@ -151,30 +141,32 @@ def build(scene: Scene) -> Model:
     compliance = per_cell(lambda x: 1.0 / x.axial_stiffness if x.axial_stiffness else 0.0)
     element, kb, k0, hn = _elements(scene, h, rod, of)
     force = np.zeros((n + 1, 3))
-    force[:, 2] = -to_nodes(h * per_cell(lambda x: weight(x, scene)))
+    force[:, 2] = wet.lift - to_nodes(h * per_cell(lambda x: x.mass * scene.environment.gravity))
     line = Line(
-        s=s, h=h, ck=compliance, mass=to_nodes(h * per_cell(lambda x: x.mass)),
+        s=s, h=h, ck=compliance, mass=to_nodes(h * per_cell(lambda x: x.mass)) + wet.mass,
         force=force, element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
-        drag_n=drag_n, drag_t=drag_t, added_n=added_n, added_t=added_t, damp=damp, tau=tau,
-        current=np.array(fluid.current if fluid and fluid.current else (0.0, 0.0, 0.0)), bits=bits,
+        damp=damp, tau=tau, bits=bits, **wet.arrays,
     )  # fmt: skip
 
     start = blank_state(n)
     start.r[:] = initial_nodes(scene, s)
+    start.T[:] = scale
+    shape = hung(scene, line, sea.values)
+    if shape is not None:
+        start.r[:], start.T[:] = shape
     start.e[:] = np.diff(start.r, axis=0)
     if isinstance(scene.initial, Points):
         _exact_lengths(start, h, compliance == 0.0, scene)
         _refuse_folds(start.e, s, rod)
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
-    start.T[:] = scale
     velocity = getattr(scene.initial, "velocity", None)
     if velocity:
         start.v[:] = velocity
-    ends, frames = ends_and_frames(scene, start.e, rod)
+    ends, frames = ends_and_frames(scene, start.e, rod, sea)
     start.a1[:] = frames
     return Model(
-        line=line, zones=zones, ends=ends, start=start,
+        line=line, zones=zones, ends=ends, sea=sea, start=start,
         ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),

@@ -105,7 +105,7 @@ class EndConditions:
         self.values.force[:] = 0.0
         self.values.moment[:] = 0.0
         for load in self._acting:
-            part, _ = _rise(t, load.ramp) if load.ramp else (1.0, 0.0)
+            part, _ = rise(t, load.ramp) if load.ramp else (1.0, 0.0)
             getattr(self.values, load.what)[load.end] += part * load.value
 
     def acceleration(self, t: float, dt: float) -> Floats:
@@ -146,7 +146,7 @@ class EndConditions:
         return [(k, angle) for k, (_, angle) in self._turns.items()]
 
     def _turn(self, t: float) -> None:
-        part, rate = _rise(t, self._bring_in)
+        part, rate = rise(t, self._bring_in)
         for k, (axis, angle) in self._turns.items():
             if k not in self._motions:
                 self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
@@ -156,7 +156,7 @@ class EndConditions:
                 self.values.spin[k] = back @ self.values.spin[k] + axis * angle * rate
 
 
-def _rise(t: float, duration: float) -> tuple[float, float]:
+def rise(t: float, duration: float) -> tuple[float, float]:
     """A rise from 0 to 1 with continuous first and second derivative, and its rate (1/s)."""
     x = min(max(t / duration, 0.0), 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2 / duration

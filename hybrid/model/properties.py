@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hybrid.scene.schema import Damping, Harmonic, Scene, Section
+from hybrid.scene.ends import SHIFTS
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
 
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
@@ -63,39 +64,72 @@ def weight(section: Section, scene: Scene) -> float:
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
+def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Body]]:
+    """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
+    for x in scene.cable.attachments:
+        if not isinstance(x, Modules):
+            yield x.at, x
+    for at, end in ((0.0, scene.ends.start), (scene.length, scene.ends.end)):
+        if isinstance(end, Body):
+            yield at, end
+
+
+def modules_of(scene: Scene) -> Iterator[Modules]:
+    """What is spread over stretches of the line."""
+    for x in scene.cable.attachments:
+        if isinstance(x, Modules):
+            yield x
+
+
+def attached_weights(scene: Scene) -> list[float]:
+    """Weight in water of every attachment and end body, N, positive downwards."""
+    fluid, gravity = scene.environment.fluid, scene.environment.gravity
+    density = fluid.density if fluid else 0.0
+
+    def sinks(x: Float | Clump | Modules | Body) -> float:
+        return gravity * (x.mass - (density * x.volume_in(density, gravity) if fluid else 0.0))
+
+    points = [sinks(x) for _, x in attachments_at(scene)]
+    return points + [sinks(m) * (m.over[1] - m.over[0]) for m in modules_of(scene)]
+
+
 def net_weight(scene: Scene) -> float:
-    """Weight of the whole line in its surroundings, N, positive downwards."""
-    return sum(weight(x, scene) * x.length for x in scene.cable.sections)
+    """Weight of the whole line with its attachments in its surroundings, N, positive downwards."""
+    return sum(weight(x, scene) * x.length for x in scene.cable.sections) + sum(attached_weights(scene))
 
 
-def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool) -> float:
+def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fastest: float = 0.0) -> float:
     """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for.
 
-    bending: whether bending counts, as it does where there is a rod.
+    bending: whether bending counts, as it does where there is a rod; fastest: the current's highest speed, m/s.
     """
     length = scene.length
     mass = sum(s.mass * s.length for s in sections)
-    candidates = [sum(abs(weight(s, scene)) * s.length for s in sections)]
+    candidates = [
+        sum(abs(weight(s, scene)) * s.length for s in sections) + sum(abs(x) for x in attached_weights(scene))
+    ]
     if bending:
         candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
     fluid = scene.environment.fluid
-    if fluid and fluid.current:
-        speed2 = float(np.dot(fluid.current, fluid.current))
+    if fluid and fastest:
         candidates += [
-            0.5 * fluid.density * s.diameter * s.drag.normal * speed2 * s.length
+            0.5 * fluid.density * s.diameter * s.drag.normal * fastest**2 * s.length
             for s in sections
             if s.drag and s.diameter
         ]
+        candidates += [0.5 * fluid.density * x.drag_area * fastest**2 for _, x in attachments_at(scene)]
     for end in (scene.ends.start, scene.ends.end):
-        for name, arm in (("force", 1.0), ("moment", length)):
+        for name, arm in (("force", 1.0), ("thrust", 1.0), ("moment", length)):
             load = getattr(end, name, None)
             if load is not None:
                 candidates.append(float(np.abs(getattr(load, "value", load)).max()) / arm)
         motion = getattr(end, "motion", None)
         if motion is not None:
-            parts = [getattr(motion, x) for x in ("surge", "sway", "heave")]
             candidates += [
-                mass * abs(p.amplitude) * (2 * np.pi / p.period) ** 2 for p in parts if isinstance(p, Harmonic)
+                mass * abs(x.amplitude) * (2 * np.pi / x.period) ** 2
+                for name, parts in motion.harmonics().items()
+                if name in SHIFTS
+                for x in parts
             ]
     first, last = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
     if first and last and all(s.axial_stiffness for s in sections):

@@ -2,34 +2,42 @@
 
 from __future__ import annotations
 
+from typing import Literal
+
 import numpy as np
 from scipy.optimize import brentq
 
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
-from hybrid.model.properties import net_weight
-from hybrid.model.state import Floats
+from hybrid.model.hanging import Hanging, hang, trail
+from hybrid.model.properties import attachments_at, modules_of, net_weight
+from hybrid.model.sea import Surroundings
+from hybrid.model.state import Floats, Line, Sea
+from hybrid.physics.loads import BODIES, DRAG, FLOW, SURFACE
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Clamped, Equilibrium, Guided, Points, Scene, Straight
 
+DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
+
 
 def initial_nodes(scene: Scene, s: Floats) -> Floats:
-    """First positions of the nodes (N+1, 3), m."""
+    """First positions of the nodes (N+1, 3), m; what hangs is refined by `hung` once its loads are known."""
     start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
     initial, length = scene.initial, scene.length
     if isinstance(initial, Points):
-        points = np.array(initial.points, float)
-        knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
-        return np.column_stack([np.interp(s * knots[-1] / s[-1], knots, points[:, k]) for k in range(3)])
+        return along_polyline(np.array(initial.points, float), s)
     if isinstance(initial, Straight):
         direction = np.array(initial.direction, float) / np.linalg.norm(initial.direction)
         origin = initial.origin or start
         first = np.array(origin, float) if origin else np.array(end, float) - length * direction
         return first + s[:, None] * direction
     assert isinstance(initial, Equilibrium)
+    if initial.points is not None:
+        return along_polyline(np.array(initial.points, float), s)
     down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
+    start, end = (x or getattr(e, "near", None) for x, e in ((start, scene.ends.start), (end, scene.ends.end)))
     if start and end and initial.guess == "span":
         return np.array(start) + (s / length)[:, None] * np.subtract(end, start)
-    if start and end and initial.guess == "auto":
+    if start and end and initial.guess != "straight":
         return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0)
     if initial.direction is not None:
         direction = np.array(initial.direction, float)
@@ -38,8 +46,79 @@ def initial_nodes(scene: Scene, s: Floats) -> Floats:
         hanging = -1.0 if down == bool(start) else 1.0
         direction = np.array(tangent if tangent else (0.0, 0.0, hanging), float)
     direction /= np.linalg.norm(direction)
+    if not start and not end:  # on the seabed, or at the surface: somewhere near the origin, level
+        bed, fluid = scene.environment.seabed, scene.environment.fluid
+        level = bed.z if bed and down else fluid.surface if fluid and fluid.surface is not None else 0.0
+        direction = direction if initial.direction is not None else np.array([1.0, 0.0, 0.0])
+        return np.array([0.0, 0.0, level]) + (s - 0.5 * length)[:, None] * direction
     first = np.array(start, float) if start else np.array(end, float) - length * direction
     return first + s[:, None] * direction
+
+
+def along_polyline(points: Floats, s: Floats) -> Floats:
+    """Nodes (N+1, 3) spread over a polyline (K, 3) in proportion to s."""
+    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.column_stack([np.interp(s * knots[-1] / s[-1], knots, points[:, k]) for k in range(3)])
+
+
+def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
+    """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
+
+    All loads but contact and bending: weight, full buoyancy, attachments, end forces, and the drag of the
+    current on the shape found so far.
+    """
+    initial = scene.initial
+    if not isinstance(initial, Equilibrium) or initial.points or initial.guess not in ("auto", "catenary"):
+        return None
+    if initial.direction is not None:
+        return None
+    places = [getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end)]
+    stiff = any(getattr(e, "tangent", None) for e in (scene.ends.start, scene.ends.end))
+    if not any(places) or (stiff and not all(places)):  # what is clamped at one end starts along its clamp
+        return None
+    loads = line.force.copy()
+    if line.bits & SURFACE:
+        loads[:-1, 2] += line.buoy
+        loads[1:, 2] += line.buoy
+        if line.bits & BODIES:
+            loads[:, 2] += line.point_buoy
+    for k, end in ((0, scene.ends.start), (-1, scene.ends.end)):
+        load = getattr(end, "force", None) or getattr(end, "thrust", None)
+        if load is not None:
+            loads[k] += np.array(getattr(load, "value", load), float)
+    drag = np.zeros_like(loads)
+    found = None
+    for _ in range(1 + DRAG_ROUNDS * bool(line.bits & FLOW)):
+        if found is not None:
+            drag = 0.5 * (drag + drag_on(line, sea, found.r))
+        if all(places):
+            first = np.array(places[0], float)
+            found = hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
+        else:
+            held = 0 if places[0] else 1
+            found = trail(loads + drag, line.h, line.ck, held, np.array(places[held], float))
+        if found is None:
+            break
+    return found
+
+
+def drag_on(line: Line, sea: Sea, r: Floats) -> Floats:
+    """Drag of the current (N+1, 3) N on a line at rest with nodes r."""
+    e = np.diff(r, axis=0)
+    d = e / np.linalg.norm(e, axis=1)[:, None]
+    f = np.zeros_like(r)
+    for first in (0, 1):
+        z = r[first : r.shape[0] - 1 + first, 2]
+        U = np.column_stack([np.interp(z, sea.z, sea.current[:, k]) for k in range(3)])
+        along = np.einsum("ij,ij->i", U, d)[:, None] * d
+        across = U - along
+        if line.bits & DRAG:
+            f[first : first + line.h.size] += line.drag_n[:, None] * np.linalg.norm(across, axis=1)[:, None] * across
+            f[first : first + line.h.size] += line.drag_t[:, None] * np.linalg.norm(along, axis=1)[:, None] * along
+    if line.bits & BODIES:
+        U = np.column_stack([np.interp(r[:, 2], sea.z, sea.current[:, k]) for k in range(3)])
+        f += line.point_drag[:, None] * np.linalg.norm(U, axis=1)[:, None] * U
+    return f
 
 
 def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
@@ -69,6 +148,13 @@ def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
     return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
 
 
+def attachment_cuts(scene: Scene) -> list[float]:
+    """Arc lengths at which an attachment needs a node."""
+    cuts = {at for at, _ in attachments_at(scene)} | {x for m in modules_of(scene) for x in m.over}
+    near = 1e-9 * scene.length
+    return [x for x in cuts if near < x < scene.length - near]
+
+
 def corners(scene: Scene) -> list[float]:
     """Arc lengths at which the initial polyline turns."""
     if not isinstance(scene.initial, Points):
@@ -77,7 +163,7 @@ def corners(scene: Scene) -> list[float]:
     return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
 
 
-def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray) -> tuple[EndConditions, Floats]:
+def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundings) -> tuple[EndConditions, Floats]:
     """End conditions, and first directors of all cells, carried without twist from the start.
 
     An end whose `normal` is given fixes the material frame there; a clamp without one
@@ -105,7 +191,7 @@ def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray) -> tuple[EndCondit
         t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
         cosine, sine = np.cos(part * twist)[:, None], np.sin(part * twist)[:, None]
         carried = carried * cosine + np.cross(t, carried) * sine
-    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1])), carried[1:-1]
+    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1]
 
 
 def _fixes_twist(end: object) -> bool:
@@ -113,7 +199,9 @@ def _fixes_twist(end: object) -> bool:
     return isinstance(end, Clamped | Guided) and end.normal is not None and not getattr(end, "swivel", False)
 
 
-def _end_conditions(scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats]) -> EndConditions:
+def _end_conditions(
+    scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats], around: Surroundings
+) -> EndConditions:
     position, frame = np.zeros((2, 3)), np.zeros((2, 9))
     loads: list[EndLoad] = []
     motions: dict[int, Moves] = {}
@@ -124,8 +212,10 @@ def _end_conditions(scene: Scene, directors: tuple[Floats, Floats], chords: tupl
         base = np.column_stack([directors[k], np.cross(t, directors[k]), t])
         frame[k] = base.ravel()
         position[k] = getattr(end, "position", (0.0, 0.0, 0.0))
-        for what in ("force", "moment"):
-            load = getattr(end, what, None)
+        kinds: tuple[tuple[Literal["force", "moment"], str], ...]
+        kinds = (("force", "force"), ("force", "thrust"), ("moment", "moment"))
+        for what, key in kinds:
+            load = getattr(end, key, None)
             if load is not None:
                 until = getattr(load, "until", None)
                 value = np.array(getattr(load, "value", load), float)
@@ -133,5 +223,5 @@ def _end_conditions(scene: Scene, directors: tuple[Floats, Floats], chords: tupl
                 loads.append(EndLoad(what, k, value, np.inf if until is None else until, ramp))
         motion = getattr(end, "motion", None)
         if motion is not None:
-            motions[k] = EndMotion(motion, getattr(end, "position", None), base)
+            motions[k] = EndMotion(motion, getattr(end, "position", None), base, around.elevation)
     return EndConditions([e.kind in ("pinned", "clamped") for e in pair], position, frame, loads, motions)

@@ -1,6 +1,6 @@
-"""The arrays a solver works on: the line (what does not move), its ends, and its state.
+"""The arrays a solver works on: the line (what does not move), its ends, the sea around it, and its state.
 
-All three are NamedTuples of contiguous arrays with fixed types, so that one compiled
+All four are NamedTuples of contiguous arrays with fixed types, so that one compiled
 signature serves every scene.  N cells, N+1 nodes; SI units; inertial frame unless said.
 """
 
@@ -38,7 +38,15 @@ class Line(NamedTuple):
     added_t: Floats  # (N,) kg
     damp: Floats  # (N+1,) kg/s, mass-proportional damping of the node
     tau: Floats  # (N,) s, stiffness-proportional damping time
-    current: Floats  # (3,) m/s
+    buoy: Floats  # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
+    displaced: Floats  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    diameter: Floats  # (N,) m, over which a cell passes through the surface
+    point_mass: Floats  # (N+1,) kg, of a body at the node (part of `mass`)
+    point_drag: Floats  # (N+1,) kg/m, rho CdA/2 of a body at the node
+    point_added: Floats  # (N+1,) kg, added mass of a body at the node
+    point_buoy: Floats  # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
+    point_displaced: Floats  # (N+1,) kg, water displaced by a body at the node
+    point_height: Floats  # (N+1,) m, over which a body passes through the surface
     bits: int  # which optional forces are on (physics.loads)
 
 
@@ -51,6 +59,32 @@ class Ends(NamedTuple):
     spin: Floats  # (2, 3) 1/s, angular velocity of that frame
     force: Floats  # (2, 3) N, applied to the cable
     moment: Floats  # (2, 3) N m, applied to the cable; read where a rod ends without an element
+
+
+class Sea(NamedTuple):
+    """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
+
+    The last three are work arrays: `flow` is filled by `physics.water.stir`, `axis` and `slip` at the start of a
+    step, `slid` by the march.
+    """
+
+    z: Floats  # (K,) m, increasing: heights of the current profile
+    current: Floats  # (K, 3) m/s, at these heights; linear between, constant beyond
+    waves: Floats  # (W, 6) m, 1/s, 1/m, 1/m, rad, 1/m: amplitude, frequency, kx, ky, phase, k
+    depth: float  # m, for waves; infinite in deep water
+    surface: float  # m, z of still water
+    now: Floats  # (4,) time, s; grown part of the current; of the waves, and its rate, 1/s
+    normal: Floats  # (3,) unit normal of the seabed, upwards
+    offset: float  # m, normal . x on the seabed
+    stiffness: float  # N/m per m
+    damping: float  # N s/m per m
+    onset: float  # m, penetration over which contact sets in
+    friction: Floats  # (2,) axial and lateral coefficient
+    slip_length: float  # m, elastic travel before a touching cable slides
+    flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
+    axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
+    slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
+    slid: Floats  # (N+1, 3) m, at its end
 
 
 class State(NamedTuple):
@@ -66,6 +100,7 @@ class State(NamedTuple):
     w: Floats  # (N,) 1/s, spin rate about the chord
     wa: Floats  # (N,) 1/s2, algorithmic spin acceleration
     wd: Floats  # (N,) 1/s2, true spin acceleration
+    slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -75,4 +110,15 @@ def blank_state(n_cells: int) -> State:
     """A state of zeros with room for `n_cells` cells."""
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
-    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), z(n_cells), z(n_cells), z(n_cells))
+    w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
+    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node))
+
+
+def no_sea(n_cells: int) -> Sea:
+    """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
+    node, nan = (n_cells + 1, 3), float("nan")
+    return Sea(
+        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]),
+        np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
+        np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node),
+    )  # fmt: skip

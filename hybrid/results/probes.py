@@ -15,8 +15,10 @@ import numpy as np
 from scipy.sparse import csr_array
 
 from hybrid.model.mesh import Zone
-from hybrid.model.state import Ends, Floats, Line, State
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.physics.loads import SEABED
 from hybrid.results.record import Field
+from hybrid.results.touchdown import Touchdown, contact_pressure, touchdown
 from hybrid.solve.observe import observe
 from hybrid.solve.timestep import POWERS
 
@@ -117,8 +119,19 @@ class Grid:
 class View:
     """One state looked at: everything the probes share is computed once, and only if a probe needs it."""
 
-    def __init__(self, line: Line, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats) -> None:
-        self.line, self.zones, self.ends, self.state, self.grid, self.report = line, zones, ends, state, grid, report
+    def __init__(
+        self, line: Line, sea: Sea, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats
+    ) -> None:
+        self.line, self.sea, self.zones, self.ends = line, sea, zones, ends
+        self.state, self.grid, self.report = state, grid, report
+
+    @cached_property
+    def touchdown(self) -> Touchdown:
+        return touchdown(self.line, self.sea, self.state)
+
+    @property
+    def contact(self) -> Floats:
+        return contact_pressure(self.line, self.sea, self.state, self.grid.s)
 
     @cached_property
     def d(self) -> Floats:
@@ -134,7 +147,13 @@ class View:
             if self.line.element[first]:  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
-            ends.append(float(force @ t) / float(np.linalg.norm(t)))
+            pull = float(force @ t) / float(np.linalg.norm(t))
+            if self.line.point_mass[first] > 0.0 and not self.ends.held[k]:  # a body holds the cable: extrapolate
+                T, h = self.state.T, self.line.h
+                pull = (
+                    float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second])) if len(h) > 1 else T[0]
+                )
+            ends.append(pull)
         return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
 
     @cached_property
@@ -250,7 +269,8 @@ class Probe:
     frame: str = ""
 
 
-_S, _SX, _X = ("s",), ("s", "xyz"), ("xyz",)
+_S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
+MAY_BE_NAN = ("touchdown", "touchdown_position")  # of a line that touches nothing
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.state.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.state.v, frame="inertial"),
@@ -274,6 +294,13 @@ PROBES: dict[str, Probe] = {
     "moment_end": Probe(
         "N m", "moment on the cable at its end", _X, lambda v: v.node_moment[-1].copy(), "rod", "inertial"
     ),
+    "contact": Probe("N/m", "force of the seabed per length, along its normal", _S, lambda v: v.contact, "seabed"),
+    "contact_force": Probe("N", "force of the seabed along its normal", (), lambda v: v.report[21], "seabed"),
+    "grounded_length": Probe("m", "length in contact with the seabed", (), lambda v: v.touchdown.grounded, "seabed"),
+    "touchdown": Probe(
+        "m", "arc lengths of the first and last point in contact; NaN: none", _E, lambda v: v.touchdown.edges, "seabed"
+    ),
+    "touchdown_position": Probe("m", "where they are", _EX, lambda v: v.touchdown.places, "seabed", frame="inertial"),
     "energy/kinetic": Probe("J", "kinetic energy, with rotary inertia", (), lambda v: v.energy[0]),
     "energy/potential": Probe(
         "J", "potential energy of weight and buoyancy, zero at z = 0", (), lambda v: -np.sum(v.line.force * v.state.r)
@@ -291,6 +318,9 @@ WORK = {
     "mass_damping": "work of mass-proportional damping",
     "stiffness_damping": "work of stiffness-proportional damping",
     "added_mass": "work of the added mass",
+    "waves": "work of the pressure of waves, and of buoyancy at the surface",
+    "contact": "work of the seabed along its normal",
+    "friction": "work of friction on the seabed",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
@@ -298,15 +328,15 @@ WORK = {
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
-    def __init__(self, line: Line, zones: Sequence[Zone], s: Floats, with_work: bool) -> None:
-        self.line, self.zones, self.grid = line, tuple(zones), Grid(line.s, zones, s)
-        has = {zone.kind for zone in zones}
+    def __init__(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats, with_work: bool) -> None:
+        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s)
+        has = {zone.kind for zone in zones} | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
         self._first_energy: float | None = None
         self._with_work = with_work
-        size = {"s": s.size, "xyz": 3}
+        size = {"s": s.size, "xyz": 3, "edge": 2}
         fields = [
-            Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame)
+            Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame, name in MAY_BE_NAN)
             for name, p in self._probes.items()
         ]
         if with_work:
@@ -319,7 +349,7 @@ class Observer:
 
     def values(self, ends: Ends, state: State, report: Floats, work: Floats) -> dict[str, object]:
         """All fields at one moment; `work` (7,) J in the order of POWERS since the start."""
-        view = View(self.line, self.zones, ends, state, self.grid, report)
+        view = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
         out = {name: p.value(view) for name, p in self._probes.items()}
         if self._with_work:
             energy = float(sum(out[name] for name in out if name.startswith("energy/")))  # type: ignore[misc]

@@ -6,10 +6,13 @@ from typing import Annotated
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from hybrid.scene.attachments import Attachment
+from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent, Waves
 from hybrid.scene.table import (
     Finding,
     NonNegative,
     NonNegativePair,
+    Number,
     PlainNumber,
     Positive,
     Table,
@@ -23,9 +26,35 @@ class Fluid(Table):
     """The water (or air) around the whole cable; without this table there is none."""
 
     density: Positive = Field(description="density of the fluid; gives buoyancy, drag and added mass [kg/m^3]")
-    current: Vector | None = Field(
-        default=None, description="velocity of the fluid, uniform and steady, inertial frame; absent: still water [m/s]"
+    current: Current | None = Field(
+        default=None,
+        description="velocity of the fluid, inertial frame: the same everywhere; or a list of {z, velocity}, linear "
+        "between its heights and constant beyond; or by kind; absent: still water [m/s]",
     )
+    surface: Number | None = Field(
+        default=None, description="height of the still water level; absent: everything is under water [m]"
+    )
+    waves: Waves | None = Field(default=None, description="waves on the surface; absent: none")
+
+    def flows(self) -> bool:
+        """Whether there is a current anywhere."""
+        current = self.current
+        if current is None or isinstance(current, UniformCurrent | PowerLawCurrent):
+            return current is not None and any(current.velocity)
+        points = current.table if isinstance(current, CurrentProfile) else current
+        return any(any(p.velocity) if isinstance(p, CurrentPoint) else p != 0.0 for p in points)
+
+    @model_validator(mode="after")
+    def _levels(self) -> Fluid:
+        if self.waves is not None and self.surface is None:
+            refuse([Finding(("surface",), "a number, in m, because waves need a surface", "add `surface: 0` (m)")])
+        current = self.current
+        if isinstance(current, PowerLawCurrent) and current.bottom >= current.top_under(self.surface):
+            top = "the surface" if self.surface is not None else "the top, 0 m without a surface"
+            expected = f"a height below {current.top_under(self.surface):.8g} m, {top}"
+            fix = "z points up; heights below the surface are negative"
+            refuse([Finding(("current", "bottom"), expected, fix)])
+        return self
 
 
 class Environment(Table):
@@ -36,6 +65,16 @@ class Environment(Table):
         default=None,
         description="the fluid around the cable: water, or air (density 1.225, the wind as current); absent: vacuum",
     )
+    seabed: Seabed | None = Field(default=None, description="the ground the cable can lie on; absent: none")
+
+    @property
+    def depth(self) -> float | None:
+        """Depth of the water [m] that waves feel, at x = y = 0; None: deep, or no surface."""
+        if self.fluid is None or self.fluid.surface is None:
+            return None
+        if self.seabed is not None:
+            return self.fluid.surface - self.seabed.z
+        return self.fluid.waves.depth if self.fluid.waves is not None else None
 
 
 class Drag(Table):
@@ -98,7 +137,7 @@ class Section(Table):
     added_mass: AddedMass | None = Field(
         default=None, description="added mass coefficients; need a fluid and a diameter"
     )
-    damping: Annotated[Damping, PlainNumber("mass")] | None = Field(
+    damping: Annotated[Damping, PlainNumber(("mass",))] | None = Field(
         default=None, description="internal damping; a plain number is the mass-proportional part"
     )
 
@@ -129,6 +168,9 @@ class Cable(Table):
     """The cable, from s = 0 at the start to s = length at the end."""
 
     sections: tuple[Section, ...] = Field(min_length=1, description="sections in order from s = 0 on")
+    attachments: tuple[Attachment, ...] = Field(
+        default=(), description="floats, clumps and modules on the cable, in any order"
+    )
 
     @property
     def length(self) -> float:

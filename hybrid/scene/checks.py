@@ -7,41 +7,14 @@ when another table of the scene cannot be read.
 from __future__ import annotations
 
 import inspect
-import math
 from collections.abc import Callable, Iterator, Mapping
-from itertools import pairwise
 from typing import Any
 
+from hybrid.scene import sea_checks, start_checks
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import Ends
-from hybrid.scene.table import Finding, Place, unit
-from hybrid.scene.task import (
-    Equilibrium,
-    Initial,
-    Mesh,
-    Model,
-    Output,
-    Points,
-    RodModel,
-    RodZone,
-    Straight,
-    ZonesModel,
-)
-
-Position = tuple[float, float, float]
-
-# Positions that differ by less than this part of the cable's length are the same place:
-# people write six to eight digits.
-SAME_PLACE = 1e-6
-
-# Lengths are sums of what people wrote; only round-off may separate them.
-SAME_LENGTH = 1e-9
-
-# Real cables break at a few per cent; beyond this a typing error is more likely than rubber.
-LARGEST_STRAIN = 0.5
-
-# An extensible cable may start along a polyline that is somewhat longer or shorter than itself.
-POLYLINE_STRETCH = 0.2
+from hybrid.scene.start_checks import SAME_LENGTH
+from hybrid.scene.table import Finding, Place
+from hybrid.scene.task import Mesh, Model, Output, RodModel, RodZone, ZonesModel
 
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
@@ -52,15 +25,6 @@ def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
         if all(name in tables for name in needs):
             found += check(**{name: tables[name] for name in needs})
     return found
-
-
-def _at(position: Position) -> str:
-    return f"[{position[0]:.8g}, {position[1]:.8g}, {position[2]:.8g}]"
-
-
-def _along(origin: Position, direction: Position, distance: float) -> Position:
-    u = unit(direction)
-    return (origin[0] + distance * u[0], origin[1] + distance * u[1], origin[2] + distance * u[2])
 
 
 def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Finding]:
@@ -77,85 +41,6 @@ def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Find
         if reasons and section.diameter is None:
             expected = f"a number > 0, in m, needed for {' and '.join(reasons)}"
             yield Finding((*here, "diameter"), expected, "add `diameter: ...` (m)")
-
-
-def _span(cable: Cable, ends: Ends) -> Iterator[Finding]:
-    held = ends.held()
-    if len(held) < 2:
-        return
-    distance, length = math.dist(held["start"], held["end"]), cable.length
-    place: Place = ("ends", "end", "position")
-    given = f"{_at(held['end'])}, which is {distance:.8g} m from the start"
-    if cable.inextensible:
-        if distance >= length * (1 - SAME_LENGTH):
-            expected = f"less than {length:.8g} m from the start, the length of this inextensible cable"
-            yield Finding(place, expected, "a longer cable, closer ends, or give axial_stiffness (N)", given)
-        return
-    elastic = sum(s.length for s in cable.sections if s.axial_stiffness is not None)
-    strain = (distance - length) / elastic
-    if strain > LARGEST_STRAIN:
-        expected = (
-            f"at most {length + LARGEST_STRAIN * elastic:.8g} m from the start; the cable is {length:.8g} m long "
-            f"and would stretch by {100 * strain:.3g} %"
-        )
-        yield Finding(place, expected, "a longer cable or closer ends", given)
-
-
-def _start_is_known(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
-    if isinstance(initial, Equilibrium):
-        if not ends.held():
-            expected = "at least one end with a position; a cable that nothing holds has no equilibrium"
-            yield Finding(
-                ("initial", "kind"), expected, "make an end pinned or clamped, or use initial: {kind: straight}"
-            )
-    elif isinstance(initial, Straight):
-        yield from _straight_start(cable, ends, initial)
-    else:
-        yield from _polyline_start(cable, ends, initial)
-
-
-def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Finding]:
-    held, length = ends.held(), cable.length
-    near = SAME_PLACE * length
-    if "start" in held:
-        origin: Position | None = held["start"]
-    elif "end" in held:
-        origin = _along(held["end"], initial.direction, -length)
-    else:
-        origin = initial.origin
-    if origin is None:
-        expected = "three numbers [x, y, z], in m, because no end is held and the cable could be anywhere"
-        yield Finding(("initial", "origin"), expected, "add `origin: [x, y, z]` (m), the position of s = 0")
-        return
-    if initial.origin is not None and math.dist(initial.origin, origin) > near:
-        expected = f"{_at(origin)}, which follows from the held end"
-        yield Finding(("initial", "origin"), expected, "leave origin out")
-    if len(held) == 2:
-        tip = _along(origin, initial.direction, length)
-        if math.dist(tip, held["end"]) > near:
-            expected = (
-                f"a straight cable that ends at ends.end.position {_at(held['end'])}; this one ends at {_at(tip)}"
-            )
-            yield Finding(("initial", "direction"), expected, "use `initial: {kind: equilibrium}`; it finds the shape")
-    if held and initial.velocity is not None and any(initial.velocity):
-        expected = f"rest, because the {next(iter(held))} is held and cannot jump to a velocity"
-        yield Finding(("initial", "velocity"), expected, "leave velocity out, or free both ends")
-
-
-def _polyline_start(cable: Cable, ends: Ends, initial: Points) -> Iterator[Finding]:
-    points, length = initial.points, cable.length
-    total = sum(math.dist(a, b) for a, b in pairwise(points))
-    allowed = SAME_PLACE if cable.inextensible else POLYLINE_STRETCH
-    if abs(total - length) > allowed * length:
-        why = "the length of the inextensible cable" if cable.inextensible else "the length of the cable, within 20 %"
-        expected = f"a polyline {length:.8g} m long, {why}"
-        fix = f"move the points, or make the cable {total:.8g} m long"
-        yield Finding(("initial", "points"), expected, fix, f"{len(points)} points, {total:.8g} m in all")
-    for name, index in (("start", 0), ("end", len(points) - 1)):
-        position = ends.held().get(name)
-        if position is not None and math.dist(points[index], position) > SAME_PLACE * length:
-            expected = f"{_at(position)}, where ends.{name}.position holds the cable"
-            yield Finding(("initial", "points", index), expected, "let the polyline begin and end at the held ends")
 
 
 def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:
@@ -226,8 +111,18 @@ def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
 
 CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _fluid_and_diameter,
-    _span,
-    _start_is_known,
+    start_checks.span,
+    start_checks.span_in_motion,
+    start_checks.start_is_known,
+    start_checks.equilibrium_exists,
+    sea_checks.attachments_on_cable,
+    sea_checks.attachments_in_fluid,
+    sea_checks.bodies_in_fluid,
+    sea_checks.waves,
+    sea_checks.followed,
+    sea_checks.surface_over_seabed,
+    sea_checks.nothing_in_the_ground,
+    sea_checks.arbiter_knows,
     _zones_fill,
     _rods_can_bend,
     _mesh_spans,

@@ -10,6 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
+from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, sphere_diameter
 from hybrid.scene.table import (
     Direction,
     Finding,
@@ -24,6 +25,7 @@ from hybrid.scene.table import (
     by_kind,
     parallel,
     refuse,
+    table_or_list,
     value_or_table,
 )
 
@@ -34,6 +36,26 @@ _TANGENT = "direction of increasing s at this end, inertial frame; any length [-
 _NORMAL = "direction of the material axis a1 at this end; only its part across the tangent counts; any length [-]"
 
 
+Triple = tuple[float, float, float]
+
+
+def smooth_step(x: float) -> tuple[float, float]:
+    """10 x^3 - 15 x^4 + 6 x^5 from 0 to 1 and its derivative, C2 at both ends; constant before and after."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) ** 2
+
+
+def way_of_smooth_step(x: float) -> float:
+    """The integral of `smooth_step` from 0 to x: 5/2 x^4 - 3 x^5 + x^6, beyond 1 growing like x - 1/2."""
+    inside = min(max(x, 0.0), 1.0)
+    return inside**4 * (2.5 + inside * (inside - 3.0)) + max(x - 1.0, 0.0)
+
+
+def _sum(parts: list[tuple[Triple, float]]) -> Triple:
+    """The sum of vectors times factors."""
+    return (sum(f * v[0] for v, f in parts), sum(f * v[1] for v, f in parts), sum(f * v[2] for v, f in parts))
+
+
 class Harmonic(Table):
     """amplitude x sin(2 pi t / period + phase)."""
 
@@ -42,17 +64,41 @@ class Harmonic(Table):
     phase: Number = Field(default=0.0, description="phase [deg]")
 
 
-class Motion(Table):
-    """Prescribed motion of an end, relative to where it is held; it must start from rest."""
+Harmonics = Annotated[
+    Annotated[Harmonic, Tag("<table>")] | Annotated[tuple[Harmonic, ...], Field(min_length=1), Tag("<list>")],
+    Discriminator(table_or_list),
+]
 
-    surge: Harmonic | None = Field(default=None, description="harmonic motion along x")
-    sway: Harmonic | None = Field(default=None, description="harmonic motion along y")
-    heave: Harmonic | None = Field(default=None, description="harmonic motion along z")
-    roll: Harmonic | None = Field(default=None, description="harmonic rotation about the inertial x axis")
-    pitch: Harmonic | None = Field(default=None, description="harmonic rotation about the inertial y axis")
-    yaw: Harmonic | None = Field(default=None, description="harmonic rotation about the inertial z axis")
+
+class Travel(Table):
+    """A smooth move to another place: by x (10 x^3 - 15 x^4 + 6 x^5), x = (t - begin) / over."""
+
+    by: Vector = Field(description="the way from the old place to the new one, inertial frame [m]")
+    over: Positive = Field(description="time that it takes [s]")
+    begin: NonNegative = Field(default=0.0, description="time at which it begins [s]")
+
+
+class Motion(Table):
+    """Prescribed motion of an end, relative to where it is held; it must start from rest.
+
+    What is given adds up; only a file stands alone.
+    """
+
+    surge: Harmonics | None = Field(default=None, description="harmonic motion along x, or a list whose sum is meant")
+    sway: Harmonics | None = Field(default=None, description="harmonic motion along y, or a list")
+    heave: Harmonics | None = Field(default=None, description="harmonic motion along z, or a list")
+    roll: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial x axis, or a list")
+    pitch: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial y axis, or a list")
+    yaw: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial z axis, or a list")
+    velocity: Vector | None = Field(
+        default=None, description="steady travel at this velocity, reached over `ramp`; inertial frame [m/s]"
+    )
+    travel: Travel | None = Field(default=None, description="a smooth move to another place")
+    follow: Literal["waves"] | None = Field(
+        default=None, description="waves: rises and falls with the surface where the end is; needs waves with a ramp"
+    )
     ramp: Positive | None = Field(
-        default=None, description="time over which harmonic motion grows from zero, smoothly [s]"
+        default=None, description="time over which harmonic motion and velocity grow from zero, smoothly [s]"
     )
     file: Text | None = Field(
         default=None,
@@ -60,14 +106,35 @@ class Motion(Table):
         description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (s, m, degrees); relative to the scene file",
     )
 
-    def harmonics(self) -> dict[str, Harmonic]:
-        """The harmonic motions that are given, by name."""
+    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
+        """The harmonic motions that are given, by name; one that is no list is a tuple of one."""
         named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
-        return {name: harmonic for name, harmonic in named.items() if harmonic is not None}
+        return {
+            name: (given,) if isinstance(given, Harmonic) else given
+            for name, given in named.items()
+            if given is not None
+        }
+
+    def shifts(self) -> list[str]:
+        """The keys given that move the end; those of TURNS turn it, and a file may do both."""
+        named = (*SHIFTS, "velocity", "travel", "follow")
+        return [name for name in named if getattr(self, name) is not None]
+
+    def carried(self, t: float) -> tuple[Triple, Triple]:
+        """How far velocity and travel have carried the end at t [s], and how fast they do: m and m/s, inertial."""
+        ways: list[tuple[Triple, float, float]] = []  # along which vector, how much of it, how fast
+        if self.velocity is not None and self.ramp is not None:
+            x = t / self.ramp
+            ways.append((self.velocity, self.ramp * way_of_smooth_step(x), smooth_step(x)[0]))
+        if self.travel is not None:
+            grown, rate = smooth_step((t - self.travel.begin) / self.travel.over)
+            ways.append((self.travel.by, grown, rate / self.travel.over))
+        return _sum([(v, far) for v, far, _ in ways]), _sum([(v, fast) for v, _, fast in ways])
 
     @model_validator(mode="after")
     def _one_source(self) -> Motion:
-        given = list(self.harmonics())
+        given = [*self.shifts(), *(name for name in TURNS if getattr(self, name) is not None)]
+        ramped = [name for name in given if name not in ("travel", "follow")]
         if self.file is not None:
             fix = "put the whole motion into the file, or leave file out"
             refuse(Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
@@ -75,8 +142,15 @@ class Motion(Table):
                 fix = "leave ramp out and let the motion in the file start from rest"
                 refuse([Finding(("ramp",), "nothing, because a file is followed as it is", fix)])
         elif not given:
-            expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, or file"
+            expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, or file"
             refuse([Finding((), expected, "say how the end moves, or leave motion out")])
+        elif self.ramp is not None and not ramped:
+            expected = "nothing, because a ramp is for velocity and for harmonic motion"
+            fix = "leave it out: travel has `over`, and what follows the waves grows with waves.ramp"
+            refuse([Finding(("ramp",), expected, fix)])
+        if self.velocity is not None and any(self.velocity) and self.ramp is None:
+            expected = "a number > 0, in s, because the cable starts at rest and velocity has to grow from zero"
+            refuse([Finding(("ramp",), expected, "add `ramp: ...` (s), such as 10")])
         return self
 
 
@@ -150,10 +224,9 @@ class Guided(Table):
     def _frame(self) -> Guided:
         _normal_is_across(self.tangent, self.normal)
         if self.motion is not None:
-            shifts = [name for name in self.motion.harmonics() if name in SHIFTS]
             expected = "rotation only, because the position of a guided end is free"
             fix = "use roll, pitch or yaw here; kind: clamped can be moved"
-            refuse(Finding(("motion", name), expected, fix) for name in shifts)
+            refuse(Finding(("motion", name), expected, fix) for name in self.motion.shifts())
         return self
 
 
@@ -165,13 +238,38 @@ class Free(Table):
     moment: Loading | None = Field(default=None, description="moment on the end, inertial frame [N m]")
 
 
+class Body(Table):
+    """Carries a body, such as a vehicle or a buoy, that moves with the cable and is not held."""
+
+    kind: Literal["body"] = Field(default="body", description="free, with a body on it")
+    near: Vector | None = Field(
+        default=None,
+        description="where the search of the equilibrium puts the body first, inertial frame; absent: chosen [m]",
+    )
+    mass: Positive = Field(description="mass, in air [kg]")
+    volume: NonNegative = Field(default=0.0, description="displaced volume [m^3]")
+    height: Positive | None = Field(default=None, description=HEIGHT)
+    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
+    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
+    thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")
+
+    def volume_in(self, density: float, gravity: float) -> float:
+        """Displaced volume [m^3], whatever the fluid."""
+        return self.volume
+
+    def height_in(self, density: float, gravity: float) -> float:
+        """Vertical extent [m]."""
+        return self.height if self.height is not None else sphere_diameter(self.volume)
+
+
 End = Annotated[
     Annotated[Pinned, Tag("<pinned>")]
     | Annotated[Clamped, Tag("<clamped>")]
     | Annotated[Guided, Tag("<guided>")]
-    | Annotated[Free, Tag("<free>")],
+    | Annotated[Free, Tag("<free>")]
+    | Annotated[Body, Tag("<body>")],
     Discriminator(by_kind),
-    Kinds(("pinned", "clamped", "guided", "free"), usual=("pinned",)),
+    Kinds(("pinned", "clamped", "guided", "free", "body"), usual=("pinned",)),
 ]
 
 
@@ -181,7 +279,17 @@ class Ends(Table):
     start: End = Field(description="the end at s = 0")
     end: End = Field(description="the end at s = length")
 
-    def held(self) -> dict[str, tuple[float, float, float]]:
+    def held(self) -> dict[str, Triple]:
         """Positions [m] of the ends that have one, by name (`start`, `end`)."""
         named = {"start": self.start, "end": self.end}
         return {name: end.position for name, end in named.items() if isinstance(end, Pinned | Clamped)}
+
+    def near(self) -> dict[str, Triple]:
+        """First positions [m] of the bodies that have one, by name (`start`, `end`)."""
+        named = {"start": self.start, "end": self.end}
+        return {name: end.near for name, end in named.items() if isinstance(end, Body) and end.near is not None}
+
+    def bodies(self) -> dict[str, Body]:
+        """The bodies at the ends, by name (`start`, `end`)."""
+        named = {"start": self.start, "end": self.end}
+        return {name: end for name, end in named.items() if isinstance(end, Body)}

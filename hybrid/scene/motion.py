@@ -4,20 +4,24 @@ A cable feels a jump of velocity as a blow, so motion has to start from rest and
 smooth: `check_motions` refuses what does not.
 
 Symbols: A amplitude, w = 2 pi / period, p phase; ramp r(t) = 10 x^3 - 15 x^4 + 6 x^5 with
-x = t / ramp (C2 at both ends); harmonic r(t) A sin(w t + p); rotation R = Rz Ry Rx applied to
-the base frame.  Everything in inertial axes, angles in radians inside, degrees in the scene.
+x = t / ramp (C2 at both ends); harmonic r(t) A sin(w t + p); steady travel V times the integral
+of r; rotation R = Rz Ry Rx applied to the base frame; eta(x, y, t) height of the surface above
+still water, followed where the end is.  Everything adds up, in inertial axes, angles in radians
+inside, degrees in the scene.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.ends import SHIFTS, TURNS, Ends, Free, Guided, Motion, Pinned
+from hybrid.scene.cable import Environment
+from hybrid.scene.ends import SHIFTS, TURNS, Ends, Guided, Harmonic, Motion, Pinned, smooth_step
 from hybrid.scene.record import Record, RecordRefused, judge_record, read_record
 from hybrid.scene.table import Finding, dotted
 
@@ -32,16 +36,30 @@ AT_REST = 1e-6
 # may bow within a step.  Six steps a period bow by 13 %, which is a poor answer but the same motion.
 SAMPLES, RAMP_STEPS, MISSED = 6, 3, 0.15
 
+# Height of the surface above still water [m] and its rate [m/s] at x, y [m], t [s].
+Elevation = Callable[[float, float, float], tuple[float, float]]
+
+# Distance over which the slope of the surface is taken by central differences of fourth order: for waves
+# of 3 m and longer the error (k h)^4 / 30 is below 1e-11 of the slope, and round-off is no larger.
+SLOPE_OVER = 2e-3
+
 
 class EndMotion:
     """The motion of one end as a function of time.
 
     motion: the scene's table, or None for an end at rest; position: (3,) m, inertial, where the end
-    is held (None for a guided end); frame: (3, 3), columns a1, a2, tangent in inertial axes, or None.
+    is held (None for a guided end); frame: (3, 3), columns a1, a2, tangent in inertial axes, or None;
+    elevation: the surface of the sea, which a motion with `follow: waves` needs.
     SceneError if the motion file cannot be read.
     """
 
-    def __init__(self, motion: Motion | None, position: ArrayLike | None, frame: ArrayLike | None = None) -> None:
+    def __init__(
+        self,
+        motion: Motion | None,
+        position: ArrayLike | None,
+        frame: ArrayLike | None = None,
+        elevation: Elevation | None = None,
+    ) -> None:
         self._base = _constant(np.zeros(3) if position is None else position)
         self._frame = None if frame is None else _constant(frame)
         self._still = _constant(np.zeros(3))
@@ -49,6 +67,13 @@ class EndMotion:
         harmonics = {} if motion is None else motion.harmonics()
         self._shifts = _components(harmonics, SHIFTS, 1.0)
         self._turns = _components(harmonics, TURNS, math.pi / 180)
+        self._carried = None
+        if motion is not None and ((motion.velocity and any(motion.velocity)) or motion.travel is not None):
+            self._carried = motion.carried
+        self._follows = motion is not None and motion.follow is not None
+        if self._follows and elevation is None:
+            raise ValueError("a motion that follows the waves needs their elevation")
+        self._elevation = elevation
         self._shift_spline: Any = None
         self._turn_spline: Any = None
         if motion is not None and motion.file is not None:
@@ -59,7 +84,8 @@ class EndMotion:
             self._shift_spline = _spline(record, record.shift)
             self._turn_spline = _spline(record, None if record.turn is None else np.radians(record.turn))
             self._last = float(record.times[-1])
-        self._translates = bool(self._shifts) or self._shift_spline is not None
+        by_table = bool(self._shifts) or self._carried is not None or self._follows
+        self._translates = by_table or self._shift_spline is not None
         self._rotates = bool(self._turns) or self._turn_spline is not None
         self.moving = self._translates or self._rotates
 
@@ -82,7 +108,30 @@ class EndMotion:
             sine, cosine = math.sin(w * t + phase), math.cos(w * t + phase)
             position[axis] += r * amplitude * sine
             velocity[axis] += amplitude * (dr * sine + r * w * cosine)
+        if self._carried is not None:
+            far, fast = self._carried(t)
+            for axis in range(3):
+                position[axis] += far[axis]
+                velocity[axis] += fast[axis]
+        if self._follows:
+            eta, rate = self._surface(position[0], position[1], velocity[0], velocity[1], t)
+            position[2] += eta
+            velocity[2] += rate
         return np.array(position), np.array(velocity)
+
+    def _surface(self, x: float, y: float, vx: float, vy: float, t: float) -> tuple[float, float]:
+        """Elevation and its rate for someone who travels over the surface: d eta/dt + v . grad eta."""
+        assert self._elevation is not None
+        eta, rate = self._elevation(x, y, t)
+        speed = math.hypot(vx, vy)
+        if speed > 0.0:
+            hx, hy = SLOPE_OVER * vx / speed, SLOPE_OVER * vy / speed
+            near, far = (
+                self._elevation(x + n * hx, y + n * hy, t)[0] - self._elevation(x - n * hx, y - n * hy, t)[0]
+                for n in (1, 2)
+            )
+            rate += speed * (8.0 * near - far) / (12.0 * SLOPE_OVER)
+        return eta, rate
 
     def _rotation(self, t: float) -> tuple[Array | None, Array]:
         if self._turn_spline is not None:
@@ -102,8 +151,8 @@ class EndMotion:
         """The ramp and its derivative [1/s]."""
         if self._ramp is None or t >= self._ramp:
             return 1.0, 0.0
-        x = max(t / self._ramp, 0.0)
-        return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) ** 2 / self._ramp
+        grown, rate = smooth_step(t / self._ramp)
+        return grown, rate / self._ramp
 
 
 def _constant(value: ArrayLike) -> Array:
@@ -113,12 +162,13 @@ def _constant(value: ArrayLike) -> Array:
 
 
 def _components(
-    harmonics: dict[str, Any], names: tuple[str, ...], scale: float
+    harmonics: dict[str, tuple[Harmonic, ...]], names: tuple[str, ...], scale: float
 ) -> list[tuple[int, float, float, float]]:
     """(axis, amplitude, angular frequency, phase) of the harmonics that move at all."""
     return [
         (axis, scale * h.amplitude, 2 * math.pi / h.period, math.radians(h.phase))
-        for axis, h in ((names.index(name), h) for name, h in harmonics.items() if name in names)
+        for axis, name in enumerate(names)
+        for h in harmonics.get(name, ())
         if h.amplitude != 0.0
     ]
 
@@ -170,36 +220,55 @@ def check_motions(scene: Scene) -> None:
     """SceneError if an end's motion cannot be read, does not start from rest, jumps, or ends too early."""
     found = motion_findings(scene.ends, scene.time.duration if scene.time is not None else None)
     if scene.time is not None and not found:
-        found = resolution_findings(scene.ends, scene.time.step)
+        found = resolution_findings(scene.ends, scene.environment, scene.time.step)
     if found:
         raise SceneError([_complaint((), finding) for finding in found])
+
+
+def _motions(ends: Ends) -> list[tuple[tuple[str, ...], Any, Motion]]:
+    """Place, end and motion of the ends that are moved."""
+    named = (("start", ends.start), ("end", ends.end))
+    each = [(("ends", name, "motion"), end, getattr(end, "motion", None)) for name, end in named]
+    return [(here, end, motion) for here, end, motion in each if motion is not None]
 
 
 def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
     """What is wrong with the motions of both ends; paths count from the scene."""
     found: list[Finding] = []
-    for name, end in (("start", ends.start), ("end", ends.end)):
-        if isinstance(end, Free) or end.motion is None:
-            continue
-        here = ("ends", name, "motion")
-        wrong = _file_findings(end, end.motion, duration) if end.motion.file is not None else _harmonic_jump(end.motion)
+    for here, end, motion in _motions(ends):
+        wrong = _file_findings(end, motion, duration) if motion.file is not None else _harmonic_jump(motion)
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
     return found
 
 
-def resolution_findings(ends: Ends, step: float) -> list[Finding]:
-    """Motions that a time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp."""
+def resolution_findings(ends: Ends, environment: Environment | None, step: float) -> list[Finding]:
+    """What a time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp or a move."""
     found: list[Finding] = []
     periods: dict[str, float] = {}
-    for name, end in (("start", ends.start), ("end", ends.end)):
-        if isinstance(end, Free) or end.motion is None:
-            continue
-        here, motion = ("ends", name, "motion"), end.motion
-        periods |= {dotted((*here, what)): h.period for what, h in motion.harmonics().items() if h.amplitude}
-        if motion.ramp is not None and motion.harmonics() and motion.ramp < RAMP_STEPS * step * (1 - 1e-9):
-            expected = f"a ramp of at least {RAMP_STEPS} time steps of {step:g} s, or it is a jump"
-            fix = f"ramp: {2 * max(h.period for h in motion.harmonics().values()):.3g}, two periods"
+    waves = environment.fluid.waves if environment is not None and environment.fluid is not None else None
+    if waves is not None:
+        periods["environment.fluid.waves"] = waves.period
+    shortest = RAMP_STEPS * step * (1 - 1e-9)
+    for here, _, motion in _motions(ends):
+        for what, harmonics in motion.harmonics().items():
+            listed = not isinstance(getattr(motion, what), Harmonic)
+            for i, h in enumerate(harmonics):
+                if h.amplitude:
+                    periods[dotted((*here, what, i) if listed else (*here, what))] = h.period
+        slow = [h.period for harmonics in motion.harmonics().values() for h in harmonics]
+        steps = f"{RAMP_STEPS} time steps of {step:g} s"
+        if motion.ramp is not None and motion.ramp < shortest:
+            fix = f"ramp: {2 * max(slow):.3g}, two periods" if slow else "a longer ramp, or a smaller time.step"
+            expected = f"a ramp of at least {steps}, or it is a jump"
             found.append(Finding((*here, "ramp"), expected, fix, f"{motion.ramp:g}"))
+        if motion.travel is not None and motion.travel.over < shortest:
+            expected = f"a move over at least {steps}, or it is a jump"
+            fix = "a longer time, or a smaller time.step"
+            found.append(Finding((*here, "travel", "over"), expected, fix, f"{motion.travel.over:g}"))
+        if motion.follow is not None and waves is not None and waves.ramp is not None and waves.ramp < shortest:
+            expected = f"a ramp of at least {steps}, because {dotted(here)} follows the waves"
+            fix = f"ramp: {2 * waves.period:.3g}, two periods"
+            found.append(Finding(("environment", "fluid", "waves", "ramp"), expected, fix, f"{waves.ramp:g}"))
         if motion.file is not None:
             missed = _missed_between(read_record(motion.file), step)
             if missed is not None:
@@ -217,6 +286,7 @@ def resolution_findings(ends: Ends, step: float) -> list[Finding]:
 
 def _rounded_down(x: float) -> str:
     """Three digits of a positive number that do not exceed it, for bounds that are to be copied."""
+    x = max(x, 1e-300)  # below, the last of three digits underflows
     unit = 10.0 ** (math.floor(math.log10(x)) - 2)
     return f"{math.floor(x / unit * (1 + 1e-9)) * unit:.3g}"
 
@@ -238,27 +308,19 @@ def _missed_between(record: Record, step: float) -> float | None:
 
 def _harmonic_jump(motion: Motion) -> list[Finding]:
     """A harmonic motion without ramp starts with a velocity (phase 0), a displacement (phase 90), or both."""
-    harmonics = motion.harmonics()
-    longest = max(h.period for h in harmonics.values())
-    for name, h in harmonics.items():
-        if motion.ramp is not None or h.amplitude == 0.0:
-            continue
-        w, phase = 2 * math.pi / h.period, math.radians(h.phase)
-        unit = "m" if name in SHIFTS else "deg"
-        speed, offset = h.amplitude * w * math.cos(phase), h.amplitude * math.sin(phase)
-        jump = f"velocity jumps to {speed:.4g} {unit}/s"
-        if abs(speed) <= AT_REST * abs(h.amplitude) * w:
-            jump = f"position jumps by {offset:.4g} {unit}"
-        expected = "motion that starts from rest where the end is held, because the cable starts at rest"
-        return [
-            Finding(
-                (),
-                expected,
-                f"give `ramp: {2 * longest:.6g}` (s), two periods",
-                f"{name} without ramp: {jump} at t = 0",
-            )
-        ]
-    return []
+    moving = [(name, h) for name, listed in motion.harmonics().items() for h in listed if h.amplitude != 0.0]
+    if motion.ramp is not None or not moving:
+        return []
+    name, h = moving[0]
+    w, phase = 2 * math.pi / h.period, math.radians(h.phase)
+    unit = "m" if name in SHIFTS else "deg"
+    speed, offset = h.amplitude * w * math.cos(phase), h.amplitude * math.sin(phase)
+    jump = f"velocity jumps to {speed:.4g} {unit}/s"
+    if abs(speed) <= AT_REST * abs(h.amplitude) * w:
+        jump = f"position jumps by {offset:.4g} {unit}"
+    expected = "motion that starts from rest where the end is held, because the cable starts at rest"
+    fix = f"give `ramp: {2 * max(h.period for _, h in moving):.6g}` (s), two periods"
+    return [Finding((), expected, fix, f"{name} without ramp: {jump} at t = 0")]
 
 
 def _file_findings(end: Any, motion: Motion, duration: float | None) -> list[Finding]:

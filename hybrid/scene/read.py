@@ -14,7 +14,7 @@ from ruamel.yaml import YAML
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion import motion_findings, resolution_findings
-from hybrid.scene.schema import Ends, Scene, Time
+from hybrid.scene.schema import Ends, Environment, Scene, Time
 from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
 from hybrid.scene.table import Finding, dotted
 from hybrid.scene.words import explain
@@ -97,12 +97,12 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
             # The tables that can be read are held against each other all the same.
             tables = _readable_tables(data) if isinstance(data, dict) else {}
             found += [(finding, False) for finding in contradictions(tables)]
-        ends, time = tables.get("ends"), tables.get("time")
+        ends, around, time = tables.get("ends"), tables.get("environment"), tables.get("time")
         if isinstance(ends, Ends):
             duration = time.duration if isinstance(time, Time) else None
             moving = motion_findings(ends, duration)
             if isinstance(time, Time) and not moving:
-                moving = resolution_findings(ends, time.step)
+                moving = resolution_findings(ends, around if isinstance(around, Environment) else None, time.step)
             found += [(finding, False) for finding in moving]
     complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:

@@ -232,6 +232,8 @@ def first_jump(times: Array, values: Array, unit: Array, until: float = math.inf
     if speed > NEGLIGIBLE * top + doubt:
         return 0.0, speed
     jumps = [j for k in range(values.shape[1]) for j in _kinks(times, values[:, k], unit[:, k], NEGLIGIBLE * top)]
+    if not jumps:
+        jumps = [j for column in values.T for j in _leap_at_the_end(times, column, NEGLIGIBLE * top)]
     jumps = [(max(t, 0.0), size) for t, size in jumps if 0.0 <= t <= until]
     return min(jumps) if jumps else None
 
@@ -298,6 +300,20 @@ def _kinks(times: Array, x: Array, unit: Array, negligible: float) -> list[tuple
     # A kink casts its shadow on the samples that are interpolated from it: of neighbours, the largest is meant.
     largest = [k for k in found if all(k[1] >= other[1] for other in found if abs(k[0] - other[0]) <= NEIGHBOURS)]
     return [(float(times[i + 1]), size) for i, size in largest]
+
+
+def _leap_at_the_end(times: Array, x: Array, negligible: float) -> list[tuple[float, float]]:
+    """A leap between the last samples, which have too few neighbours for the kink test: (time, velocity jump).
+
+    A motion of 12 samples a period moves by at most a quarter of its range from one sample to the next, so more
+    than half of it, at more than twice the speed just before, is a leap.
+    """
+    slopes, leaps = np.abs(np.diff(x) / np.diff(times)), np.abs(np.diff(x))
+    for i in (len(x) - 3, len(x) - 2):
+        jump = float(slopes[i] - slopes[max(i - NEIGHBOURS, 0) : i].max())
+        if leaps[i] > 0.5 * np.ptp(x) and jump > 0.5 * slopes[i] and jump > negligible:
+            return [(float(times[i]), jump)]
+    return []
 
 
 def _weights(t: Array, at: Array) -> Array:

@@ -3,7 +3,7 @@
 Every class is one table of the YAML file; the same classes are the Python API.
 A missing table is None, and None costs nothing downstream.
 
-The tables live in three files (`cable`, `ends`, `task`); import them from here.
+The tables live in five files (`cable`, `attachments`, `sea`, `ends`, `task`); import them from here.
 """
 
 from __future__ import annotations
@@ -13,9 +13,22 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.attachments import Attachment, Clump, Float, Modules
 from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
-from hybrid.scene.ends import Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned, Travel
+from hybrid.scene.sea import (
+    Current,
+    CurrentPoint,
+    CurrentProfile,
+    Friction,
+    JonswapWaves,
+    PowerLawCurrent,
+    RegularWaves,
+    Seabed,
+    UniformCurrent,
+    Waves,
+)
 from hybrid.scene.table import Table, Text, Vector, refuse
 from hybrid.scene.task import (
     CatenaryModel,
@@ -34,10 +47,12 @@ from hybrid.scene.task import (
 )
 
 __all__ = [
-    "AddedMass", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Damping", "Drag", "End", "Ends", "Environment",
-    "Equilibrium", "Fluid", "Free", "Guided", "Harmonic", "Initial", "Load", "Mesh", "Model", "Motion", "Output",
-    "Pinned", "Points", "RodModel", "RodZone", "Scene", "Section", "Straight", "Table", "Time", "Vector",
-    "ZonesModel", "missing_time",
+    "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
+    "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends", "Environment", "Equilibrium", "Float",
+    "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial", "JonswapWaves", "Load", "Mesh", "Model", "Modules",
+    "Motion", "Output", "Pinned", "Points", "PowerLawCurrent", "RegularWaves", "RodModel", "RodZone", "Scene",
+    "Seabed", "Section", "Straight", "Table", "Time", "Travel", "UniformCurrent", "Vector", "Waves", "ZonesModel",
+    "missing_time",
 ]  # fmt: skip
 
 

@@ -18,7 +18,7 @@ from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from hybrid.errors import Complaint
 from hybrid.scene.hints import decimal_comma, did_you_mean
 from hybrid.scene.table import Place, Table, dotted
-from hybrid.scene.words import keys_at, shorthand_key
+from hybrid.scene.words import keys_at, shorthand_keys
 
 Spot = tuple[int, int]
 
@@ -272,9 +272,9 @@ def _open(node: Node, schema: type[Table], path: Place) -> None:
     if node.value is None:
         node.value = {}
     elif not isinstance(node.value, dict | list):
-        key = shorthand_key(schema, path)
-        if key is not None:
-            node.value = {key: Node(node.value, node.place, node.written)}
+        keys = shorthand_keys(schema, path)
+        if keys:
+            node.value = {key: Node(node.value, node.place, node.written) for key in keys}
 
 
 def _annotate(node: Node, note: str) -> None:

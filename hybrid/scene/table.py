@@ -12,6 +12,7 @@ JSON schema and the docs all take them from there.
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
 from typing import Annotated, Any, NoReturn
@@ -76,13 +77,13 @@ def dotted(path: Iterable[str | int]) -> str:
 # --- numbers, words, vectors -------------------------------------------------------------------
 
 
-def _unwrap(value: Any) -> Any:
+def unwrap(value: Any) -> Any:
     """Numpy scalars and arrays as plain Python, so that Python users need not convert."""
     return value.tolist() if hasattr(value, "tolist") else value
 
 
 def _a_number(value: Any) -> float:
-    value = _unwrap(value)
+    value = unwrap(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise PydanticCustomError("number", "a number is needed")
     try:
@@ -92,7 +93,7 @@ def _a_number(value: Any) -> float:
 
 
 def _a_whole_number(value: Any) -> int:
-    value = _unwrap(value)
+    value = unwrap(value)
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value or value != math.floor(value):
         raise PydanticCustomError("whole_number", "a whole number is needed")
     # No mesh and no output needs more; numpy and JSON stop at 2^63.
@@ -108,9 +109,9 @@ def _no_infinity(value: Any) -> Any:
     return value
 
 
-def _numbers(n: int) -> Callable[[Any], Any]:
+def numbers(n: int) -> Callable[[Any], Any]:
     def check(value: Any) -> Any:
-        value = _unwrap(value)
+        value = unwrap(value)
         if not isinstance(value, list | tuple) or len(value) != n:
             raise PydanticCustomError("vector", "{n} numbers are needed", {"n": n})
         return value
@@ -144,14 +145,15 @@ Positive = Annotated[Number, Field(gt=0)]
 NonNegative = Annotated[Number, Field(ge=0)]
 Whole = Annotated[int, BeforeValidator(_a_whole_number), BeforeValidator(_no_infinity)]
 Truth = Annotated[bool, BeforeValidator(_a_truth)]
-Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(_numbers(3)), Words("three numbers [x, y, z]")]
+Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words("three numbers [x, y, z]")]
 Direction = Annotated[
     tuple[Number, Number, Number],
-    BeforeValidator(_numbers(3)),
+    BeforeValidator(numbers(3)),
     AfterValidator(_points_somewhere),
     Words("a direction [x, y, z], not all zero"),
 ]
-NonNegativePair = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(_numbers(2)), Words("two numbers >= 0")]
+Pair = Annotated[tuple[Number, Number], BeforeValidator(numbers(2)), Words("two numbers")]
+NonNegativePair = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(numbers(2)), Words("two numbers >= 0")]
 
 
 def parallel(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
@@ -174,9 +176,14 @@ def value_or_table(value: Any) -> str:
     return "<table>" if isinstance(value, Mapping | Table) else "<value>"
 
 
+def table_or_list(value: Any) -> str:
+    """Discriminator of `Table | list of tables` unions."""
+    return "<list>" if isinstance(unwrap(value), list | tuple) else "<table>"
+
+
 def number_or_list(value: Any) -> str:
     """Discriminator of `number | list of numbers` unions."""
-    return "<list>" if isinstance(_unwrap(value), list | tuple) else "<number>"
+    return "<list>" if isinstance(unwrap(value), list | tuple) else "<number>"
 
 
 def by_kind(value: Any) -> str | None:
@@ -201,7 +208,12 @@ class Kinds:
         return core_schema.no_info_before_validator_function(self.check, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"enum": list(self.names), "description": "short for {kind: ...}"}]}
+        tables = handler(schema)
+        said = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
+        alone = [table["properties"]["kind"]["const"] for table in said if not table.get("required")]
+        if not alone:  # every kind needs more than its name
+            return tables
+        return {"anyOf": [tables, {"enum": alone, "description": "short for {kind: ...}"}]}
 
     def check(self, value: Any) -> Any:
         if isinstance(value, Table):
@@ -232,16 +244,23 @@ class Kinds:
 
 @dataclass(frozen=True)
 class PlainNumber:
-    """Annotation of a table for which a bare number may stand: ``2.0`` is ``{key: 2.0}``."""
+    """Annotation of a table for which a bare number may stand: ``2.0`` is ``{key: 2.0}``, for each of the keys."""
 
-    key: str
+    keys: tuple[str, ...]
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.expand, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        return {"anyOf": [handler(schema), {"type": "number", "description": f"short for {{{self.key}: ...}}"}]}
+        return {"anyOf": [handler(schema), {"type": "number", "description": f"short for {self._table()}"}]}
 
     def expand(self, value: Any) -> Any:
-        value = _unwrap(value)
-        return {self.key: value} if isinstance(value, int | float) and not isinstance(value, bool) else value
+        value = unwrap(value)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            return value
+        if len(self.keys) > 1 and not 0.0 <= value <= sys.float_info.max:  # one mistake, one complaint
+            refuse([Finding((), f"a finite number >= 0, or a table {self._table()}", "check the number")])
+        return dict.fromkeys(self.keys, value)
+
+    def _table(self) -> str:
+        return "{" + ", ".join(f"{key}: ..." for key in self.keys) + "}"

@@ -31,6 +31,13 @@ def _increasing(values: tuple[float, ...]) -> bool:
     return all(a < b for a, b in pairwise(values))
 
 
+def _doubled(points: tuple[tuple[float, float, float], ...]) -> list[Finding]:
+    """The points of a polyline that repeat the one before."""
+    total = sum(math.dist(a, b) for a, b in pairwise(points))
+    same = [i for i, (a, b) in enumerate(pairwise(points), start=1) if math.dist(a, b) <= 1e-9 * total]
+    return [Finding(("points", i), "a point other than the one before", "leave it out") for i in same]
+
+
 # --- where the cable starts --------------------------------------------------------------------
 
 
@@ -60,9 +67,7 @@ class Points(Table):
 
     @model_validator(mode="after")
     def _corners_are_distinct(self) -> Points:
-        total = sum(math.dist(a, b) for a, b in pairwise(self.points))
-        same = [i for i, (a, b) in enumerate(pairwise(self.points), start=1) if math.dist(a, b) <= 1e-9 * total]
-        refuse(Finding(("points", i), "a point other than the one before", "leave it out") for i in same)
+        refuse(_doubled(self.points))
         return self
 
 
@@ -70,14 +75,32 @@ class Equilibrium(Table):
     """The cable starts at rest in static equilibrium."""
 
     kind: Literal["equilibrium"] = Field(default="equilibrium", description="static equilibrium")
-    guess: Literal["auto", "straight", "span"] = Field(
+    guess: Literal["auto", "catenary", "arc", "straight", "span"] = Field(
         default="auto",
-        description="shape to start the search from: straight in a direction, span (straight between the ends), "
-        "or auto (an arc between two held ends, else straight)",
+        description="shape to start the search from: catenary (hanging between the ends, with the seabed), arc, span "
+        "(straight between the ends), straight in a direction, or auto (catenary between two ends, else straight)",
     )
     direction: Direction | None = Field(
         default=None, description="direction of increasing s of a straight guess, inertial frame; any length [-]"
     )
+    points: tuple[Vector, ...] | None = Field(
+        default=None,
+        min_length=2,
+        description="instead of guess: corners of a polyline from s = 0 to s = length to start from, "
+        "inertial frame [m]",
+    )
+
+    @model_validator(mode="after")
+    def _one_guess(self) -> Equilibrium:
+        if self.points is not None:
+            fix = "leave out either points or guess and direction"
+            both = [name for name, given in (("guess", self.guess != "auto"), ("direction", self.direction)) if given]
+            refuse(Finding((name,), "nothing, because points already gives the shape", fix) for name in both)
+            refuse(_doubled(self.points))
+        elif self.direction is not None and self.guess not in ("auto", "straight"):
+            expected = f"nothing, because a direction is for a straight guess and guess is {self.guess}"
+            refuse([Finding(("direction",), expected, "leave direction out, or use guess: straight")])
+        return self
 
 
 Initial = Annotated[

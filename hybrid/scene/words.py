@@ -9,6 +9,8 @@ from __future__ import annotations
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from functools import reduce
+from operator import or_
 from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 import annotated_types
@@ -34,6 +36,38 @@ OTHER_KIND = {
     ("free", "tangent"): "a free end has no tangent; kind: guided holds one",
     ("free", "normal"): "a free end has no normal; kind: guided holds one",
     ("free", "motion"): "a free end cannot be moved; use kind: pinned or clamped",
+    ("free", "mass"): "a free end has no mass; kind: body carries one",
+    ("free", "volume"): "a free end has no volume; kind: body has one",
+    ("free", "thrust"): "use force; kind: body takes a thrust",
+    ("free", "near"): "kind: body has a place near which it floats or hangs; a free end has none",
+    ("pinned", "mass"): "a held end carries no mass; kind: body carries one and is not held",
+    ("clamped", "mass"): "a held end carries no mass; kind: body carries one and is not held",
+    ("guided", "mass"): "a guided end carries no mass; kind: body carries one and is free",
+    ("body", "position"): "a body is not held; near says where the search starts, kind: pinned holds a position",
+    ("body", "tangent"): "a body turns freely; kind: clamped or guided holds a tangent",
+    ("body", "motion"): "a body moves with the cable; kind: pinned or clamped is moved",
+    ("body", "force"): "use thrust",
+    ("body", "moment"): "a body takes no moment; use kind: free",
+    (
+        "body",
+        "buoyancy",
+    ): "use volume (m^3): the fluid that the body displaces; net buoyancy is density x volume - mass",
+    ("body", "weight"): "use mass (kg), in air, and volume (m^3), displaced",
+    ("float", "over"): "a float sits at one arc length; kind: modules goes over a stretch",
+    ("float", "weight"): "use mass (kg): the weight in air / gravity",
+    ("clump", "over"): "a clump sits at one arc length; kind: modules goes over a stretch",
+    ("clump", "weight"): "use mass (kg): the weight in air / gravity",
+    ("clump", "buoyancy"): "use volume (m^3) for the fluid that a clump displaces; kind: float for what lifts",
+    ("modules", "at"): "modules go over a stretch, over: [from, to]; kind: float sits at one arc length",
+    ("modules", "weight"): "use mass (kg/m): the weight in air / gravity",
+    ("modules", "height"): "modules have the extent of the cable; leave height out",
+    ("regular", "gamma"): "regular waves have one period and no spectrum; use kind: jonswap",
+    ("regular", "seed"): "regular waves have nothing random; use kind: jonswap",
+    ("regular", "components"): "regular waves are one component; use kind: jonswap",
+    ("jonswap", "phase"): "the phases are random; another seed gives another sea",
+    ("uniform", "table"): "use kind: profile",
+    ("profile", "velocity"): "use kind: uniform, or give a velocity in each entry of the table",
+    ("power_law", "table"): "use kind: profile",
     ("rod", "slack"): "a rod may go slack; leave slack out",
     ("rod", "zones"): "use kind: zones",
     ("catenary", "zones"): "use kind: zones",
@@ -48,6 +82,8 @@ SHAPES = {
     "zones": "[{rod: ...}, {catenary: ...}]",
     "points": "[[x, y, z], [x, y, z]]",
     "sections": "[{length: ..., mass: ...}]",
+    "table": "[{z: ..., velocity: [x, y, z]}, {z: ..., velocity: [x, y, z]}]",
+    "over": "[from, to]",
 }
 
 
@@ -85,11 +121,12 @@ def _tables(annotation: Any) -> list[type[Table]]:
 
 def _item(annotation: Any, index: int) -> Any:
     """The type of one entry of a list; None if there is none."""
+    found = []
     for a, _ in arms(annotation):
         args = get_args(a)
         if get_origin(a) is tuple and args:
-            return args[0] if args[-1] is Ellipsis else args[min(index, len(args) - 1)]
-    return None
+            found.append(args[0] if args[-1] is Ellipsis else args[min(index, len(args) - 1)])
+    return reduce(or_, found) if found else None
 
 
 def is_tag(part: Any) -> bool:
@@ -104,7 +141,8 @@ def follow(root: type[Table], loc: Place) -> Spot:
             spot = Spot(_item(spot.annotation, part), (), spot.owner, spot.field, spot.kind)
         elif is_tag(part):
             chosen = [(a, m) for a, m in arms(spot.annotation, spot.metadata) if Tag(part) in m]
-            annotation, metadata = chosen[0] if chosen else (spot.annotation, spot.metadata)
+            # several arms under one tag are told apart by the tag that follows
+            annotation, metadata = chosen[0] if len(chosen) == 1 else (spot.annotation, spot.metadata)
             spot = Spot(annotation, metadata, spot.owner, spot.field, part.strip("<>"))
         else:
             tables = _tables(spot.annotation)
@@ -128,13 +166,13 @@ def keys_at(root: type[Table], path: Place) -> list[str]:
     return list(dict.fromkeys(name for a in annotations for t in _tables(a) for name in t.model_fields))
 
 
-def shorthand_key(root: type[Table], path: Place) -> str | None:
-    """The key that a bare word or number at `path` stands for (``model: rod`` is ``{kind: rod}``)."""
+def shorthand_keys(root: type[Table], path: Place) -> tuple[str, ...]:
+    """The keys that a bare word or number at `path` stands for (``model: rod`` is ``{kind: rod}``)."""
     spot = follow(root, path)
     for item in [*spot.metadata, *(m for _, found in arms(spot.annotation) for m in found)]:
         if isinstance(item, PlainNumber):
-            return item.key
-    return "kind" if "kind" in keys_at(root, path) else None
+            return item.keys
+    return ("kind",) if "kind" in keys_at(root, path) else ()
 
 
 # --- types in words ----------------------------------------------------------------------------
@@ -151,8 +189,15 @@ def expected(annotation: Any, metadata: tuple[Any, ...], field: FieldInfo | None
     """What a value should be: ``a number > 0, in kg/m``."""
     found = list(arms(annotation, metadata))
     texts = list(dict.fromkeys(_type_in_words(a, m) for a, m in found))
-    unit = "" if all(a is int for a, _ in found) else unit_of(field)  # what is counted has no unit
+    # What is counted has no unit, and the keys of a table have their own.
+    unit = "" if all(a is int or _tabular(a) for a, _ in found) else unit_of(field)
     return " or ".join(texts) + (f", in {unit}" if unit else "")
+
+
+def _tabular(annotation: Any) -> bool:
+    """Whether a type is a table, or a list of tables."""
+    item = _item(annotation, 0)
+    return bool(_tables(annotation if item is None else item))
 
 
 def _type_in_words(annotation: Any, metadata: tuple[Any, ...]) -> str:
@@ -243,7 +288,8 @@ def _example(kind: str, table: type[Table]) -> str:
 def _shape(key: str, annotation: Any, metadata: tuple[Any, ...]) -> str:
     marks = [mark for _, found in arms(annotation, metadata) for mark in found]
     vector = any(isinstance(mark, Words) and "[x, y, z]" in mark.text for mark in marks)
-    return SHAPES.get(key) or ("[x, y, z]" if vector else "...")
+    shape = SHAPES.get(key) if annotation is not float else None
+    return shape or ("[x, y, z]" if vector else "...")
 
 
 def _number_for_more(key: str, value: float, spot: Spot) -> str:
@@ -251,6 +297,8 @@ def _number_for_more(key: str, value: float, spot: Spot) -> str:
     marks = [mark for _, found in arms(spot.annotation, spot.metadata) for mark in found]
     if key and any(isinstance(mark, Words) and mark.text.startswith("three numbers") for mark in marks):
         return f"write `{key}: [0, 0, {value}]`" if key in ("force", "value") else f"write `{key}: [{value}, 0, 0]`"
+    if key and any(isinstance(mark, Words) and mark.text == "two numbers" for mark in marks):
+        return f"write `{key}: [{value}, 0]`"
     tables = _tables(spot.annotation)
     if len(tables) != 1:
         return ""
@@ -258,7 +306,8 @@ def _number_for_more(key: str, value: float, spot: Spot) -> str:
     first, *others = [name for name, field in fields.items() if field.is_required()] or list(fields)[:1]
     if all(a is not float for a, _ in arms(fields[first].annotation)):
         return ""
-    return f"write `{key}: {{{first}: {value}{''.join(f', {name}: ...' for name in others)}}}`"
+    written = f"{{{first}: {value}{''.join(f', {name}: ...' for name in others)}}}"
+    return f"write `{key}: {written}`" if key else f"write {written}"
 
 
 def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:

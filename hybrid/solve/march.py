@@ -19,15 +19,7 @@ from hybrid.physics.cell import (
     turning,
 )
 from hybrid.physics.element import after, angular_velocity, before, bending, damped_bending
-from hybrid.physics.loads import (
-    ADDED_MASS,
-    DRAG,
-    MASS_DAMPING,
-    ROTARY,
-    STIFFNESS_DAMPING,
-    half_cell_added_mass,
-    half_cell_drag,
-)
+from hybrid.physics.loads import ROTARY, STIFFNESS_DAMPING
 from hybrid.physics.rotations import (
     add,
     cross,
@@ -43,18 +35,13 @@ from hybrid.physics.rotations import (
     sub,
 )
 from hybrid.solve.blocks import ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
+from hybrid.solve.node import Z3, Z9, get3, node_loads
 
-REPORT = 20  # numbers of `report`
+REPORT = 22  # numbers of `report`
 # report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
 #         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
-#         17 power into the added mass
-Z3 = (0.0, 0.0, 0.0)
-Z9 = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-
-
-@inner
-def get3(A, i):
-    return (A[i, 0], A[i, 1], A[i, 2])
+#         17 power into the added mass, 18 power of waves and of buoyancy at the surface, 19 of contact, 20 of friction,
+#         21 force of the seabed along its normal
 
 
 @inner
@@ -72,46 +59,8 @@ def put(W, row, col, A, sign):
         W[o + 2] = sign * A[3 * j + 2]
 
 
-@inner
-def node_loads(line, i, v, vd, dl, ill, dr, ilr, left, right, cv, ca, report):
-    """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
-    vi, vdi = get3(v, i), get3(vd, i)
-    m = line.mass[i]
-    F = sub(get3(line.force, i), scale(m, vdi))
-    c = -ca * m
-    D = (c, 0.0, 0.0, 0.0, c, 0.0, 0.0, 0.0, c)
-    GL, GR = Z9, Z9
-    bits = line.bits
-    if bits & MASS_DAMPING:
-        b = line.damp[i]
-        F = sub(F, scale(b, vi))
-        c = -cv * b
-        D = (D[0] + c, D[1], D[2], D[3], D[4] + c, D[5], D[6], D[7], D[8] + c)
-        report[13] += b * dot(vi, vi)
-    if bits & DRAG:
-        u = (vi[0] - line.current[0], vi[1] - line.current[1], vi[2] - line.current[2])
-        if left:
-            f, Df, GL = half_cell_drag(u, dl, ill, line.drag_n[i - 1], line.drag_t[i - 1], cv)
-            F, D = add(F, f), madd(D, Df)
-            report[12] -= dot(f, vi)
-        if right:
-            f, Df, GR = half_cell_drag(u, dr, ilr, line.drag_n[i], line.drag_t[i], cv)
-            F, D = add(F, f), madd(D, Df)
-            report[12] -= dot(f, vi)
-    if bits & ADDED_MASS:
-        if left:
-            f, Df, L = half_cell_added_mass(vdi, dl, ill, line.added_n[i - 1], line.added_t[i - 1], ca)
-            F, D, GL = add(F, f), madd(D, Df), madd(GL, L)
-            report[17] -= dot(f, vi)
-        if right:
-            f, Df, L = half_cell_added_mass(vdi, dr, ilr, line.added_n[i], line.added_t[i], ca)
-            F, D, GR = add(F, f), madd(D, Df), madd(GR, L)
-            report[17] -= dot(f, vi)
-    return F, D, GL, GR
-
-
 @kernel
-def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows):
+def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows):
     """Assemble and eliminate all block rows for the configuration given.
 
     Everything belongs to the end of the step.  `u` is the displacement since its start,
@@ -155,7 +104,7 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
 
     np_, pNm, pnm, pN0, pn0, pNp, pnp = Z3, Z9, Z3, Z9, Z3, Z9, Z3  # force of cell i-1 and its derivatives
     wide_before = False
-    d_before, il_before = Z3, 0.0
+    d_before, l_before, il_before = Z3, 0.0, 0.0
     row_before, hck_before, gap_before = Z3, -1.0, 0.0  # there is no cell before the start: dT = 0
     for i in range(n + 1):
         # --- unpack: chord and frame of cell i+1, element at node i+1
@@ -230,7 +179,9 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
                 Np, npl = mat_mat(S, An), scale(il, cross(d, an))
 
         # --- balance: residual F of node i and its row
-        F, D, GL, GR = node_loads(line, i, v, vd, d_before, il_before, d, il, i > 0, cell, cv, ca, report)
+        F, D, GL, GR = node_loads(
+            line, sea, i, r, u, e, v, vd, d_before, l_before, il_before, d, l, il, i > 0, cell, cv, ca, report
+        )
         F = add(F, sub(nc, np_))
         held = (i == 0 and ends.held[0]) or (i == n and ends.held[1])
         if i == 0:
@@ -344,7 +295,7 @@ def march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, 
         # --- step along s
         if i == n - 1:
             report[9], report[10], report[11] = Mn
-        d_before, il_before = d, il
+        d_before, l_before, il_before = d, l, il
         row_before, hck_before, gap_before = row, hck, gap
         np_, pNm, pnm, pN0, pn0, pNp, pnp = nc, Nm, nm, N0, n0, Np, npl
         d, l, il, d1, D1, e1, Ra = dn, lnx, iln, d1n, D1n, e1n, Rn

@@ -9,15 +9,18 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.state import Ends, Floats, Line, State
-from hybrid.physics.loads import DRAG, MASS_DAMPING, ROTARY
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.physics.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
-from hybrid.solve.step import newton, slackest
+from hybrid.solve.step import lay, newton, slackest
 from hybrid.solve.timestep import Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration
+# What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
+# length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
+ANCHOR, NEUTRAL = 1e-12, 1e-9
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -29,6 +32,8 @@ NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judge
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
+SOFT_BED = 0.05  # of the length: how deep a cable may rest in the seabed where a continuation begins
+LIMP = 1e-3  # part of the bending stiffness there
 GYRATION = 0.02  # of the length: radius of gyration lent to the spin of a line that settles
 CALM = 1e-4  # of the length: movement in a step below which Newton is tried again
 
@@ -104,16 +109,17 @@ def is_judged(line: Line, ends: Ends, length: float) -> bool:
     return bool(line.element.any()) and float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
 
 
-def is_stable(line: Line, ends: Ends, state: State, length: float, scale: float) -> bool:
+def is_stable(line: Line, sea: Sea, ends: Ends, state: State, length: float, scale: float) -> bool:
     """True when the static stiffness of a state is positive definite, or cannot be judged."""
-    return not is_judged(line, ends, length) or _Solver(line, length, scale, -np.inf).stable(ends, state)
+    return not is_judged(line, ends, length) or _Solver(line, sea, length, scale, -np.inf).stable(ends, state)
 
 
 class _Solver:
-    def __init__(self, line: Line, length: float, scale: float, floor: float) -> None:
+    def __init__(self, line: Line, sea: Sea, length: float, scale: float, floor: float) -> None:
         n = line.h.size
-        self.line, self.length, self.scale, self.floor = line, length, scale, floor
+        self.line, self.sea, self.length, self.scale, self.floor = line, sea, length, scale, floor
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
+        self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)
         self.total = 0
 
     def stable(self, ends: Ends, state: State) -> bool:
@@ -126,14 +132,16 @@ class _Solver:
         line, n = self.line._replace(bits=self.line.bits & ~DRAG), self.line.h.size
         rows = np.zeros((n + 1, SIZE * WIDTH))
         march(
-            line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
-            state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, rows,
+            line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
+            state.w, state.wd, 0.0, NEUTRAL / ANCHOR * self.anchor, self.gaps, self.W, self.X, self.report, rows,
         )  # fmt: skip
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
         return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin)
 
-    def newton(self, line: Line, ends: Ends, start: State, turning: bool = False) -> tuple[Outcome, int, State]:
+    def newton(
+        self, line: Line, ends: Ends, start: State, turning: bool = False, sea: Sea | None = None
+    ) -> tuple[Outcome, int, State]:
         """Static Newton from `start`; a new state is returned, the old one is left as it was.
 
         An equilibrium with a catenary cell that is not under tension is no equilibrium of a cable: SLACK.
@@ -143,19 +151,23 @@ class _Solver:
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
             still[:] = 0.0
         u = np.zeros_like(new.r)
+        if line.bits & FRICTION:
+            lay(self.sea, new.e, new.slip)
         most = MOST_TURNING if turning else MOST_ITERATIONS
         outcome, iterations, _, where = newton(
-            line, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-            0.0, 0.0, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
+            line, sea or self.sea, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
+            0.0, self.anchor, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
             self.report, self.rows,
         )  # fmt: skip
         self.total += iterations
         new.r[:] += u
+        new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
+        new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
         if outcome == Outcome.OK:
             slack = slackest(line, new.T, self.floor)
             if slack >= 0:
                 outcome, where = Outcome.SLACK, slack
-        judged = line is self.line and is_judged(line, ends, self.length)
+        judged = line is self.line and sea is None and is_judged(line, ends, self.length)
         if outcome == Outcome.OK and judged and not self.stable(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
@@ -163,8 +175,8 @@ class _Solver:
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N."""
         march(
-            self.line, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1, state.w,
-            state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, self.rows,
+            self.line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
+            state.w, state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         return float(self.report[15])
 
@@ -208,6 +220,37 @@ def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, 
     return f"a soft line hardened in {steps} steps", outcome, where, state
 
 
+def _eased(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int, State]:
+    """Continuation from an easy sea to the real one: a soft seabed that hardens, a current that grows, little bending.
+
+    A part of the way that fails is halved.
+    """
+    line, sea, state = solver.line, solver.sea, start
+    softest = min(1.0, sea.onset / (SOFT_BED * solver.length)) if line.bits & SEABED else 1.0
+    grown = float(sea.now[1])
+    outcome, where, done, part, steps = Outcome.OK, -1, -1.0, 1.0, 0
+    while done < 1.0 and part > 1e-3:
+        goal = min(1.0, done + part)
+        x = max(goal, 0.0)
+        soft = softest ** (1.0 - x)
+        now = sea.now.copy()
+        now[1] = x * grown
+        easy = sea._replace(stiffness=sea.stiffness * soft, onset=sea.onset / soft, now=now)
+        limp = line._replace(kb=line.kb * LIMP ** (1.0 - x))
+        last = goal >= 1.0
+        outcome, where, found = solver.newton(line if last else limp, ends, state, sea=None if last else easy)
+        steps += 1
+        if outcome == Outcome.OK or (outcome == Outcome.SLACK and not last):
+            state, done, part = found, goal, min(1.5 * part, 0.25) if done < 0.0 else 1.5 * part
+        else:
+            part *= 0.5
+            if done < 0.0 and part <= 0.5:
+                break
+    eased = [what for bit, what in ((SEABED, "a soft seabed"), (FLOW, "no current")) if line.bits & bit]
+    eased += ["little bending"] if line.element.any() else []
+    return f"from {', '.join(eased)} in {steps} steps", outcome, where, state
+
+
 def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the line hardly moves."""
     line, length = solver.line, solver.length
@@ -227,7 +270,7 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     dt = 1e-3 * time_scale
     calm = 0
     for _ in range(RELAXING_STEPS):
-        taken = stepper.step(ends, old, new, dt, 0.0)
+        taken = stepper.step(solver.sea, ends, old, new, dt, 0.0)
         solver.total += taken.iterations
         if taken.outcome != Outcome.OK:
             dt *= 0.25
@@ -259,10 +302,19 @@ def _nudged(solver: _Solver, state: State) -> State:
     return pushed
 
 
+def _settled(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int, State]:
+    """Where friction alone keeps a line: let it settle from its start, with friction, then Newton from there."""
+    rest = start.copy()
+    Stepper(solver.line, solver.length, solver.scale).hold_on(solver.sea, ends, rest)
+    return "settled on the seabed with friction", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
+
+
 def _roads(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     first = ("Newton from the starting shape", *solver.newton(solver.line, ends, start))
     yield first
+    if solver.line.bits & (SEABED | FLOW):
+        yield _eased(solver, ends, start)
     soft = _hardened(solver, ends, start)
     yield soft
     yield from _loaded(solver, ends, start)
@@ -276,6 +328,7 @@ def _roads(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Out
 
 def solve_statics(
     line: Line,
+    sea: Sea,
     ends: Ends,
     start: State,
     length: float,
@@ -294,10 +347,20 @@ def solve_statics(
     `take_slack` a slack solution is taken when there is no taut one.
     """
     # at rest a catenary needs more than no tension: without any, every shape is an equilibrium
-    solver = _Solver(line, length, scale, LEAST_TENSION * abs(1e-6 * scale if floor is None else floor))
+    floor = LEAST_TENSION * abs(1e-6 * scale if floor is None else floor)
+    rough = line._replace(bits=line.bits & ~WAVES)
+    smooth = rough._replace(bits=rough.bits & ~FRICTION)
+    solver = _Solver(smooth, sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
     for how, outcome, where, state in _roads(solver, ends, start):
+        path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
+        if outcome == Outcome.OK:
+            return _found(solver, ends, state, path)
+        failed.append((outcome, where, state))
+    if line.bits & FRICTION:
+        solver = _Solver(rough, sea, length, scale, floor)
+        how, outcome, where, state = _settled(solver, ends, start)
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)

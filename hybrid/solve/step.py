@@ -12,9 +12,12 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
+from hybrid.physics.loads import FRICTION, WAVES
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
+from hybrid.physics.water import stir
 from hybrid.solve.blocks import substitute
 from hybrid.solve.march import get9, march
+from hybrid.solve.node import get3
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
@@ -31,6 +34,8 @@ ROUND_OFF_LENGTH, MOST_NOISE = 1e-15, 1e-3
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
 CLAMP = 20.0
+# A shift of the line as a whole turns nothing; it counts as a part of `reach` times this (that is, of the length).
+WHOLE = 0.1
 # Changes of tension count against the largest tension of the line, or against this part of
 # the tension scale of the scene where that is larger (a line can be free of tension).
 LOW_TENSION = 1e-3
@@ -127,7 +132,9 @@ def first_bad(x, e):
 
 
 @kernel
-def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most, turning, gaps, W, X, x, report, rows):
+def newton(
+    line, sea, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most, turning, gaps, W, X, x, report, rows
+):  # fmt: skip
     """Solve the equilibrium at the end of a step.
 
     Starts from the prediction in (u, e, v, vd, T, a1, w, wd) and leaves the answer
@@ -146,7 +153,7 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
         longest = max(longest, line.h[i])
     noise = min(ROUND_OFF_LENGTH * longest * heavy * ca, MOST_NOISE * scale)
     for it in range(1, most + 1):
-        bad = march(line, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
+        bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
             if not report[15] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
                 return NOT_FINITE, it, left, int(report[16])
@@ -160,6 +167,7 @@ def newton(line, ends, r, u, e, v, vd, T, a1, w, wd, cv, ca, reach, scale, most,
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
         update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
+        turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
         left = size * min(1.0, ratio * ratio)
@@ -222,7 +230,26 @@ def widest_turn(e, u):
 
 
 @kernel
-def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
+def lay(sea, e, slip):
+    """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
+    n, last = sea.normal, e.shape[0]
+    for i in range(last + 1):
+        x, y, z = 0.0, 0.0, 0.0
+        for c in range(max(i - 1, 0), min(i + 1, last)):
+            d, _, _ = chord(get3(e, c))
+            x, y, z = x + d[0], y + d[1], z + d[2]
+        w = n[0] * x + n[1] * y + n[2] * z
+        x, y, z = x - w * n[0], y - w * n[1], z - w * n[2]
+        size = math.sqrt(x * x + y * y + z * z)
+        if not size > 1e-9:  # upright or folded: any direction in the plane
+            x, y, z = 1.0 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]
+            size = math.sqrt(x * x + y * y + z * z)
+        sea.axis[i, 0], sea.axis[i, 1], sea.axis[i, 2] = x / size, y / size, z / size
+        sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
+
+
+@kernel
+def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
@@ -268,8 +295,12 @@ def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x,
             new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = old.a1[i, 0], old.a1[i, 1], old.a1[i, 2]
             new.w[i], new.wd[i] = 0.0, 0.0
 
+    if line.bits & WAVES:  # at the predicted positions, which are right to third order
+        stir(sea, old.r, u)
+    if line.bits & FRICTION:
+        lay(sea, old.e, old.slip)
     outcome, iterations, left, where = newton(
-        line, ends, old.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
+        line, sea, ends, old.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
         cv, ca, reach, scale, most, False, gaps, W, X, x, report, rows,
     )  # fmt: skip
 
@@ -279,6 +310,10 @@ def advance(line, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x,
             rp = dt * old.v[i, k] + dt * dt * (0.5 - be) * old.a[i, k]
             new.a[i, k] = (u[i, k] - rp) / (be * dt * dt)
             new.r[i, k] = old.r[i, k] + u[i, k]
+    if line.bits & FRICTION:
+        for i in range(n + 1):
+            for k in range(3):
+                new.slip[i, k] = sea.slid[i, k]
     for i in range(n):
         if line.spin[i]:
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)

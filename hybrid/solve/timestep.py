@@ -10,10 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.model.state import Ends, Floats, Line, State
-from hybrid.solve.blocks import substitute
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.physics.loads import FRICTION, WAVES
+from hybrid.physics.seabed import contact
+from hybrid.physics.water import stir
+from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
-from hybrid.solve.step import advance, slackest
+from hybrid.solve.step import advance, lay, slackest
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
@@ -22,8 +25,11 @@ REACH = 0.1
 # (EI/(m h^4) is 1e20 at the very worst) shows beside inertia, and far from overflow.
 HEAVY = 1e36
 # report of the march -> powers: start, end (reactions and given moments), applied forces and
-# moments, drag, mass-proportional damping, stiffness-proportional damping, added mass
-POWERS = ("start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass")
+# moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
+# buoyancy at the surface, contact with the seabed, friction on it
+POWERS = (
+    "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact", "friction"
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -38,6 +44,26 @@ class Taken:
     residual: float
 
 
+def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
+    """Elastic travel (N+1, 3) m whose friction takes up the forces (N+1, 3) N along the seabed, or all it can of them.
+
+    sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
+    """
+    p = sea.offset - r @ sea.normal
+    N = np.zeros(r.shape[0])
+    for near, far in ((slice(0, -1), slice(1, None)), (slice(1, None), slice(0, -1))):
+        for c, (a, b) in enumerate(zip(p[near], p[far], strict=True)):
+            if a > 0.0 or b > 0.0:
+                N[near][c] += contact(a, b, 0.0, 0.0, line.h[c], sea.stiffness, sea.damping, sea.onset)[0]
+    side = np.cross(sea.normal, sea.axis)
+    parts = []
+    for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):
+        along = np.einsum("ij,ij->i", force, direction)
+        parts.append(np.divide(along, mu * N, out=np.zeros_like(along), where=mu * N > 0.0))
+    size = np.maximum(np.hypot(*parts), 1.0)
+    return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
+
+
 class Stepper:
     """Takes steps of one line; owns the work arrays, not the state."""
 
@@ -49,10 +75,10 @@ class Stepper:
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.u = np.zeros((n + 1, 3))
 
-    def step(self, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
-        """From `old` to `new` (overwritten) over dt with the end conditions of the new time."""
+    def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
+        """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time."""
         outcome, iterations, left, where = advance(
-            self.line, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
+            self.line, sea, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
             self.gaps, self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
         if outcome == Outcome.OK:
@@ -61,7 +87,27 @@ class Stepper:
                 outcome, where = Outcome.SLACK, slack
         return Taken(Outcome(outcome), iterations, left, where, float(self.report[15]))
 
-    def ignite(self, ends: Ends, acceleration: Floats, state: State) -> Taken:
+    def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
+        """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
+        if not self.line.bits & FRICTION:
+            return
+        n = self.line.s.size
+        rows = np.zeros((n, SIZE * WIDTH))
+        state.slip[:] = 0.0
+        still = np.zeros_like(state.r)
+        stretch = np.linalg.norm(state.e, axis=1) / self.line.h - 1.0
+        tension = np.divide(stretch, self.line.ck, out=np.zeros_like(stretch), where=self.line.ck > 0.0)
+        line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
+        march(
+            line, sea, ends, state.e, still, state.r, state.v, still, tension, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
+        )  # fmt: skip
+        force = -rows.reshape(n, SIZE, WIDTH)[:, 1:4, -1]
+        force[np.flatnonzero(ends.held) * (n - 1)] = 0.0
+        lay(sea, state.e, state.slip)
+        state.slip[:] = travel_that_holds(self.line, sea, state.r, force)
+
+    def ignite(self, sea: Sea, ends: Ends, acceleration: Floats, state: State) -> Taken:
         """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
 
         One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
@@ -78,8 +124,12 @@ class Stepper:
         self.u[:] = 0.0
         self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
         held = ends._replace(position=state.r[[0, -1]])
+        if self.line.bits & WAVES:
+            stir(sea, state.r, self.u)
+        if self.line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
         bad = march(
-            self.line, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
             0.0, HEAVY, gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         if bad >= 0 or not substitute(self.X, self.x):
@@ -92,7 +142,7 @@ class Stepper:
         state.wa[:] = state.wd
         self.u[:] = 0.0
         march(  # once more for the forces that go with them
-            self.line, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
             0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         return Taken(Outcome.OK, 1, 0.0, -1, float(self.report[15]))
@@ -100,7 +150,7 @@ class Stepper:
     def powers(self, ends: Ends, velocity: Floats, state: State) -> Floats:
         """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""
         f, n = self.report, self.line.h.size
-        out = np.empty(7)
+        out = np.empty(len(POWERS))
         applied = 0.0
         for k, node, cell, force, moment in ((0, 0, 0, f[0:3], -f[6:9]), (1, n, n - 1, f[3:6], f[9:12])):
             out[k] = 0.0
@@ -117,4 +167,5 @@ class Stepper:
                 applied += float(ends.moment[k] @ omega)
         out[2] = applied
         out[3], out[4], out[5], out[6] = -f[12], -f[13], -f[14], -f[17]
+        out[7:] = f[18:21]
         return out

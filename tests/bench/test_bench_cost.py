@@ -41,11 +41,13 @@ def scene(zones, every=20.0, start="straight"):
 def moving(zones):
     """A stepper and a state in motion, for timing steps without a driver."""
     model = build(scene(zones, start="equilibrium"))
-    found = solve_statics(model.line, model.ends.at(np.inf), model.start, model.length, model.tension_scale)
+    found = solve_statics(
+        model.line, model.sea.at(np.inf), model.ends.at(np.inf), model.start, model.length, model.tension_scale
+    )
     stepper = Stepper(model.line, model.length, model.tension_scale)
     state = found.state.copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
-    stepper.ignite(model.ends.at(np.inf), np.zeros((2, 3)), state)
+    stepper.ignite(model.sea.at(np.inf), model.ends.at(np.inf), np.zeros((2, 3)), state)
     return model, stepper, state
 
 
@@ -59,7 +61,7 @@ def cost(zones):
         old, new, iterations = start.copy(), start.copy(), 0
         begin = time.process_time()
         for _ in range(steps):
-            taken = stepper.step(ends, old, new, 0.01, 0.5)
+            taken = stepper.step(model.sea.at(np.inf), ends, old, new, 0.01, 0.5)
             iterations += taken.iterations
             old, new = new, old
         each.append(time.process_time() - begin)
@@ -99,7 +101,7 @@ def test_elimination_against_lapack():
     model, stepper, state = moving([("rod", 2.0, 1000)])
     rows = np.zeros((1001, SIZE * WIDTH))
     march(
-        model.line, model.ends.at(np.inf), state.e, stepper.u, state.r, state.v, state.vd, state.T, state.a1, state.w,
+        model.line, model.sea.at(np.inf), model.ends.at(np.inf), state.e, stepper.u, state.r, state.v, state.vd, state.T, state.a1, state.w,
         state.wd, 200.0, 4e4, stepper.gaps, stepper.W, stepper.X, stepper.report, rows,
     )  # fmt: skip
     blocks = rows.reshape(1001, SIZE, WIDTH)

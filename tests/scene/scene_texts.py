@@ -107,6 +107,79 @@ mesh: {nodes: [0.0, 4.0, 10.0]}
 output: {points: [0.0, 5.0, 10.0]}
 """
 
+# Every key of the sea at least once, over four scenes that are accepted.
+SEA = """\
+environment:
+  gravity: 9.81
+  fluid:
+    density: 1025.0
+    current: {kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, turn: 30.0, ramp: 5.0}
+    surface: 0.0
+    waves: {kind: jonswap, height: 3.0, period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}
+  seabed: {z: -100.0, slope: [0.01, -0.02], stiffness: 5.0e+3, damping: 500.0, friction: {axial: 0.3, lateral: 0.5}}
+cable:
+  sections: [{length: 150.0, mass: 5.0, diameter: 0.05, drag: {normal: 1.2}}]
+  attachments:
+    - {kind: float, at: 75.0, buoyancy: 60.0, mass: 4.0, drag_area: 0.02, added_mass: 3.0, height: 0.2}
+    - {kind: clump, at: 100.0, mass: 30.0, volume: 0.004, drag_area: 0.05, added_mass: 2.0, height: 0.3}
+    - {kind: modules, over: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}
+ends:
+  start:
+    kind: pinned
+    position: [0.0, 0.0, 0.0]
+    motion:
+      heave: [{amplitude: 0.5, period: 8.0}, {amplitude: 0.2, period: 5.0, phase: 40.0}]
+      velocity: [0.5, 0.0, 0.0]
+      travel: {by: [10.0, 0.0, -2.0], over: 30.0, begin: 5.0}
+      follow: waves
+      ramp: 16.0
+  end: {kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}
+initial: {kind: equilibrium, guess: catenary}
+model: {kind: catenary}
+time: {duration: 60.0, step: 0.05}
+"""
+
+SEA_TOO = """\
+environment:
+  fluid:
+    density: 1025.0
+    current: {kind: profile, table: [{z: 0.0, velocity: [0.4, 0.0, 0.0]}, {z: -50.0, velocity: [0.1, 0.2, 0.0]}], ramp: 8.0}
+    surface: 0.0
+    waves: {kind: regular, height: 2.0, period: 7.0, direction: 30.0, phase: 90.0, depth: 60.0}
+cable:
+  sections: [{length: 40.0, mass: 2.0, diameter: 0.03}]
+  attachments:
+    - {kind: float, at: 15.0, volume: 0.2, mass: 20.0}
+    - {kind: modules, over: [20.0, 30.0], buoyancy: -5.0, mass: 8.0}
+ends:
+  start: {kind: body, mass: 300.0, volume: 1.0, thrust: {value: [0.0, 5.0, 0.0], until: 20.0, ramp: 2.0}}
+  end: {kind: pinned, position: [0.0, 0.0, -35.0]}
+initial: {kind: equilibrium, points: [[10.0, 0.0, 0.0], [10.0, 0.0, -20.0], [0.0, 0.0, -35.0]]}
+model: {kind: catenary}
+"""
+
+SEA_LIST = """\
+environment:
+  fluid:
+    density: 1025.0
+    current: [{z: -100.0, velocity: [0.0, 0.0, 0.0]}, {z: 0.0, velocity: [0.3, 0.0, 0.0]}]
+  seabed: {z: -20.0, stiffness: 1.0e+4, friction: 0.4}
+cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03, drag: {normal: 1.0}}]}
+ends: {start: {kind: free}, end: {kind: body, mass: 10.0}}
+initial: {kind: equilibrium, points: [[0.0, 0.0, -20.0], [10.0, 0.0, -20.0]]}
+model: {kind: catenary}
+"""
+
+SEA_UNIFORM = """\
+environment: {fluid: {density: 1.2, current: {kind: uniform, velocity: [0.0, 8.0, 0.0], ramp: 4.0}}}
+cable: {sections: [{length: 10.0, mass: 2.0, diameter: 0.03, drag: {normal: 1.0}}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
+
+SEAS = {"sea": SEA, "sea too": SEA_TOO, "sea list": SEA_LIST, "sea uniform": SEA_UNIFORM}
+
 AT_REST = """\
 cable: {sections: [{length: 10.0, mass: 1.0}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}

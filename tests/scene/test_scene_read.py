@@ -7,7 +7,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from pydantic import ValidationError
-from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, complaints, marked
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPENSION, complaints, marked
 
 from hybrid.errors import SceneError
 from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
@@ -31,7 +31,7 @@ from hybrid.scene.schema import (
     missing_time,
 )
 
-ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST]
+ALL = [SUSPENSION, OCEAN, EVERYTHING, EVERYTHING_ELSE, AT_REST, *SEAS.values()]
 
 
 def test_suspension_of_the_sketch() -> None:

@@ -209,7 +209,7 @@ def test_a_complaint_reads_well() -> None:
 
 def test_nothing_is_said_twice() -> None:
     (kind,) = complaints(change(SUSPENSION, PINNED, "{kind: xyzzy, position: [0, 0, 0]}"))
-    assert kind.expected == "one of: pinned, clamped, guided, free" and not kind.fix
+    assert kind.expected == "one of: pinned, clamped, guided, free, body" and not kind.fix
     (later,) = complaints(change(SUSPENSION, MODEL, "adaptive"))
     assert later.value == "adaptive, which is not available in this version (0.1)"
     (bare,) = complaints(change(SUSPENSION, STRAIGHT, "straight"))

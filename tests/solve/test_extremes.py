@@ -70,7 +70,7 @@ def disagreement(model, state, cv, ca):
     rows = np.zeros((model.line.s.size, SIZE * WIDTH))
     u = np.zeros_like(state.r)
     march(
-        model.line, model.ends.at(0.0), state.e, u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+        model.line, model.sea.at(0.0), model.ends.at(0.0), state.e, u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
         cv, ca, stepper.gaps, stepper.W, stepper.X, stepper.report, rows,
     )  # fmt: skip
     assert substitute(stepper.X, stepper.x)
@@ -88,7 +88,7 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
         pytest.skip("bending does not matter to a catenary")
     model = build(hanging(kind, cells, stiffness))
     line = model.line
-    found = solve_statics(line, model.ends.at(0.0), model.start, model.length, model.tension_scale)
+    found = solve_statics(line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale)
     h, tension = LENGTH / cells, 5600.0
     # relative to the weight: what is out of balance is round-off of moments EI/h^2 per node at worst
     assert found.residual < 1e-9 * model.tension_scale + 100 * EPS * stiffness / h**2
@@ -107,10 +107,10 @@ def test_converges_and_agrees_with_lapack(kind, cells, stiffness):
     stepper = Stepper(line, model.length, model.tension_scale, model.slack_floor)
     state = found.state.copy()
     state.v[:, 1] = np.sin(np.pi * line.s / LENGTH)
-    stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), state)
+    stepper.ignite(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), state)
     new = state.copy()
     for _ in range(5):
-        taken = stepper.step(model.ends.at(0.0), state, new, 0.01, 0.5)
+        taken = stepper.step(model.sea.at(0.0), model.ends.at(0.0), state, new, 0.01, 0.5)
         assert taken.outcome == 0 and taken.iterations <= 4
         state, new = new, state
 
@@ -135,11 +135,11 @@ def test_long_line_at_low_tension(stiffness, tension):
     state = model.start.copy()
     x = model.line.s / 1000.0
     state.v[:, 1], state.v[:, 2] = np.sin(3 * np.pi * x) * x, 0.3 * np.sin(5 * np.pi * x) * x
-    stepper.ignite(model.ends.at(0.0), np.zeros((2, 3)), state)
+    stepper.ignite(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), state)
     new = state.copy()
     most = 0
     for _ in range(50):
-        taken = stepper.step(model.ends.at(0.0), state, new, 0.01, 0.5)
+        taken = stepper.step(model.sea.at(0.0), model.ends.at(0.0), state, new, 0.01, 0.5)
         assert taken.outcome == 0
         most = max(most, taken.iterations)
         state, new = new, state

@@ -1,7 +1,7 @@
 """Every hand-written derivative against differences of the residual, on random three-dimensional states.
 
 Tolerance: the residual is smooth and of order one; a fourth-order central difference
-with step 1e-3 has a truncation error near 1e-10 and round-off near 1e-12, so 1e-6 of the
+with step 1e-4 has round-off near 1e-11, and is small enough to stay clear of the kinks of |ut| ut, so 1e-6 of the
 largest entry catches any wrong term while a correct Jacobian passes with room to spare.
 """
 
@@ -10,8 +10,20 @@ import itertools
 import numpy as np
 import pytest
 
-from hybrid.model.state import Ends, Line, blank_state
-from hybrid.physics.loads import ADDED_MASS, DRAG, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
+from hybrid.model.state import Ends, Line, Sea, blank_state
+from hybrid.physics.loads import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    ROTARY,
+    SEABED,
+    STIFFNESS_DAMPING,
+    SURFACE,
+    WAVES,
+)
 from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
 from hybrid.solve.step import update
@@ -25,7 +37,11 @@ ZONES = {
     "catenary-rod": [0, 0, 0, 0, 0, 1, 1, 1],
     "three": [0, 0, 1, 1, 0, 0, 1, 0],
 }
-BITS = [0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, 31]
+LAND = DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY
+BITS = [
+    0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, LAND, DRAG | FLOW, WAVES | ADDED_MASS | DRAG, SURFACE,
+    BODIES | FLOW, SEABED, SEABED | FRICTION, 2047,
+]  # fmt: skip
 
 
 def random_case(seed, element, bits, held=(0, 0)):
@@ -45,8 +61,10 @@ def random_case(seed, element, bits, held=(0, 0)):
         s=np.concatenate([[0], np.cumsum(h)]), h=h, ck=0.3 * p(N), mass=p(N + 1), force=g.normal(size=(N + 1, 3)),
         element=element, spin=spin, kb=p(N + 1, 3), k0=0.2 * g.normal(size=(N + 1, 3)), hn=hn, rotary=p(N),
         polar=p(N), drag_n=p(N), drag_t=p(N), added_n=p(N), added_t=p(N), damp=p(N + 1), tau=0.2 * p(N),
-        current=g.normal(size=3), bits=bits,
+        buoy=p(N), displaced=p(N), diameter=3.0 * p(N), point_mass=p(N + 1), point_drag=p(N + 1), point_added=p(N + 1),
+        point_buoy=p(N + 1), point_displaced=p(N + 1), point_height=4.0 * p(N + 1), bits=bits,
     )  # fmt: skip
+    sea = random_sea(g)
     frames = [np.linalg.qr(g.normal(size=(3, 3)))[0] for _ in range(2)]
     ends = Ends(
         np.array(held, np.int8), g.normal(size=(2, 3)),
@@ -62,15 +80,31 @@ def random_case(seed, element, bits, held=(0, 0)):
         x[:] = g.normal(size=x.shape)
     a = np.cross(d, g.normal(size=(N, 3)))
     st.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
-    return line, ends, st
+    return line, sea, ends, st
 
 
-def assembled(line, ends, st, u, cv=CV, ca=CA):
+def random_sea(g):
+    """Everything that can surround a line near the origin, with the surface and the seabed running through it."""
+    normal = np.array([0.1, -0.2, 1.0])
+    axis = g.normal(size=(N + 1, 3))
+    normal /= np.linalg.norm(normal)
+    axis -= np.outer(axis @ normal, normal)
+    slip = 0.3 * g.normal(size=(N + 1, 3))  # some stick and some slide
+    slip -= np.outer(slip @ normal, normal)
+    return Sea(
+        z=np.array([-9.0, 9.0]), current=g.normal(size=(2, 3)), waves=np.zeros((0, 6)), depth=np.inf, surface=0.3,
+        now=np.array([0.0, 0.7, 1.0, 0.0]), normal=normal, offset=0.2, stiffness=3.0, damping=0.5, onset=50.0,
+        friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)),
+        axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)),
+    )  # fmt: skip
+
+
+def assembled(line, sea, ends, st, u, cv=CV, ca=CA):
     """Dense Jacobian and right-hand side of the rows that the march eliminates."""
     n = st.e.shape[0] + 1
     W, X, _, report, _, gaps = workspace(n - 1)
     rows = np.zeros((n, SIZE * WIDTH))
-    march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
+    march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
     J, b = np.zeros((5 * n, 5 * n + 25)), np.zeros(5 * n)
     for i in range(n):
         block = rows[i].reshape(SIZE, WIDTH)
@@ -80,23 +114,23 @@ def assembled(line, ends, st, u, cv=CV, ca=CA):
     return J[:, 10 : 10 + 5 * n], b
 
 
-def residual_at(line, ends, st, x):
+def residual_at(line, sea, ends, st, x):
     """Right-hand side after the configuration is moved by x (shape (N+1, 5))."""
     s, u = st.copy(), np.zeros_like(st.r)
     update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0, False)
-    return assembled(line, ends, s, u)[1]
+    return assembled(line, sea, ends, s, u)[1]
 
 
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
 def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
-    line, ends, st = random_case(3, ZONES[zones], bits)
-    J, _ = assembled(line, ends, st, np.zeros_like(st.r))
+    line, sea, ends, st = random_case(3, ZONES[zones], bits)
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
     numeric = np.zeros_like(J)
-    t = 1e-3
+    t = 1e-4
     for j in range(J.shape[1]):
         x = np.zeros(J.shape[1])
         x[j] = t
-        f = [residual_at(line, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
         numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
     exact = J.copy()
     identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
@@ -113,14 +147,15 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
 @pytest.mark.parametrize("inextensible", [False, True])
 def test_elimination_equals_a_dense_solve(zones, held, inextensible):
     """The march and the substitution back against LAPACK on the same rows; bound: condition number times round-off."""
-    line, ends, st = random_case(5, ZONES[zones], 31, held)
+    line, sea, ends, st = random_case(5, ZONES[zones], 2047, held)
     if inextensible:
         line = line._replace(ck=np.zeros(N))
     u = np.zeros_like(st.r)
-    J, b = assembled(line, ends, st, u)
+    J, b = assembled(line, sea, ends, st, u)
     W, X, x, report, rows, gaps = workspace(N)
     assert (
-        march(line, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows) == -1
+        march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows)
+        == -1
     )
     assert substitute(X, x)
     assert np.abs(x.ravel() - np.linalg.solve(J, b)).max() < 1e-14 * np.linalg.cond(J) * np.abs(x).max()

@@ -25,7 +25,9 @@ from scipy.optimize import brentq
 def critical_torque(load: float, cells: int, torsional_stiffness: float) -> float:
     """Torque over 2 sqrt(EI T) at which the straight, evenly twisted rod buckles."""
     model = build(twisted_taut_rod(load, cells, torsional_stiffness))
-    taut = solve_statics(model.line, model.ends.at(0.0), model.start, model.length, model.tension_scale).state
+    taut = solve_statics(
+        model.line, model.sea.at(0.0), model.ends.at(0.0), model.start, model.length, model.tension_scale
+    ).state
 
     def stable(ratio: float) -> bool:
         state = taut.copy()

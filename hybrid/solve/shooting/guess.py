@@ -22,7 +22,7 @@ def guesses(line: Line) -> Iterator[list[Fields]]:
     kind = initial.guess if isinstance(initial, Equilibrium) else ""
     if not isinstance(initial, Equilibrium):
         yield given(line)
-    wants_span = kind in ("span", "auto") and (not all(p.rod for p in line.pieces) or _both(line))
+    wants_span = kind in ("span", "auto", "catenary", "arc") and (not all(p.rod for p in line.pieces) or _both(line))
     ways = (hanging, straight) if wants_span else (straight, hanging)
     for way in ways:
         fields = way(line)

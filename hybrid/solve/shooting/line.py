@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.schema import (
+    Body,
     CatenaryModel,
     Clamped,
     End,
@@ -271,7 +272,7 @@ def _hold(table: End, piece: Piece) -> Hold:
     if isinstance(table, Clamped) and table.swivel:
         twist = False
     motion = None
-    if not isinstance(table, Free) and table.motion is not None:
+    if not isinstance(table, Free | Body) and table.motion is not None:
         from hybrid.scene.motion import EndMotion  # only a scene that moves needs it
 
         still = Hold(table, True, tangent, twist).at(0.0)

@@ -1,0 +1,82 @@
+"""The first shape of a search for equilibrium: an elastic catenary under any dead loads, as a convex problem.
+
+Without bending, the force in a cell follows from the force F at the start of the line and the loads f_i in
+between, t_c = F - f_1 - ... - f_c, and the span from all t_c.  The F that gives the right span minimises
+
+    sum of h_c (|t_c| + ck |t_c|^2 / 2)  -  F . span,
+
+the complementary energy, which is convex: Newton's method with a line search finds it from anywhere.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.model.state import Floats
+
+# |t| is rounded off at this part of the largest load, so that a folded or slack line has a minimum too.
+ROUNDED = 1e-4
+# An inextensible cell is lent this strain at the largest load.
+LENT = 1e-4
+MOST_ITERATIONS = 100
+# Chords shorter than this part of their cells: the loads do not tauten the line, and the shape means nothing.
+SLACK = 0.5
+
+
+class Hanging(NamedTuple):
+    """Nodes (N+1, 3) m, tensions (N,) N."""
+
+    r: Floats
+    T: Floats
+
+
+def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> Hanging | None:
+    """The shape of a line from `start` over `span` (3,) m under loads (N+1, 3) N; None when it stays slack."""
+    scale = float(np.abs(loads[1:-1].sum(axis=0)).max() + np.linalg.norm(loads[1:-1], axis=1).sum())
+    if not scale > 0.0:
+        return None
+    eps, soft = ROUNDED * scale, np.maximum(ck, LENT / scale)
+    below = np.concatenate([np.zeros((1, 3)), np.cumsum(loads[1:-1], axis=0)])
+
+    def state(F: Floats) -> tuple[Floats, Floats, float]:
+        t = F - below
+        size = np.sqrt(np.einsum("ij,ij->i", t, t) + eps**2)
+        return t, size, float(h @ (size + 0.5 * soft * size**2) - F @ span)
+
+    F = 0.5 * below[-1] + 0.1 * scale * span / max(float(np.linalg.norm(span)), 1e-12)
+    t, size, energy = state(F)
+    for _ in range(MOST_ITERATIONS):
+        e = (h * (1.0 / size + soft))[:, None] * t
+        gradient = e.sum(axis=0) - span
+        if np.abs(gradient).max() < 1e-9 * h.sum():
+            break
+        d = t / size[:, None]
+        hessian = np.eye(3) * float(h @ (1.0 / size + soft)) - np.einsum("i,ij,ik->jk", h / size, d, d)
+        step, part = -np.linalg.solve(hessian, gradient), 1.0
+        slope = float(gradient @ step)
+        while part > 1e-9:
+            t_new, size_new, energy_new = state(F + part * step)
+            if energy_new <= energy + 1e-4 * part * slope + 1e-15 * abs(energy):
+                break
+            part *= 0.5
+        F, t, size, energy = F + part * step, t_new, size_new, energy_new
+    e = (h * (1.0 / size + soft))[:, None] * t
+    if float((np.linalg.norm(e, axis=1) / h).min()) < SLACK:
+        return None
+    r = start + np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
+    r[-1] = start + span
+    return Hanging(r, np.linalg.norm(t, axis=1))
+
+
+def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats) -> Hanging | None:
+    """The shape of a line held at one end (0 or 1) at `place` (3,) and free at the other; None when it is slack."""
+    # what hangs beyond a cell pulls it
+    t = np.cumsum(loads[::-1], axis=0)[::-1][1:] if held == 0 else -np.cumsum(loads, axis=0)[:-1]
+    size = np.linalg.norm(t, axis=1)
+    if not size.max() > 0.0 or size.min() < 1e-9 * size.max():
+        return None
+    e = (h * (1.0 / size + ck))[:, None] * t
+    r = np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
+    return Hanging(r + place - r[0 if held == 0 else -1], size)

@@ -1,0 +1,106 @@
+"""The seabed: contact and friction of one half of a cell.
+
+A cell that touches presses on the bed with the force per length
+
+    q = k P(p) + c P'(p) dp/dt,   P = p^2/(2 o) for 0 < p < o,  p - o/2 beyond
+
+of the penetration p of its centreline, o the onset.  It is integrated along the chord with
+the shape functions of the nodes, piece by piece between the points where p is 0 or o, so that
+two Gauss points a piece are exact: the force is a smooth function of the configuration while
+touchdown travels through a cell, and without damping it has a potential.
+
+    symbol   meaning                                                shape  unit   frame
+    p0, p1   penetration at the node and at the other node          -      m
+    v0, v1   their rates                                            -      m/s
+    k, c, o  stiffness and damping per length, onset                -      N/m2, N s/m2, m
+    N        force on the node                                      -      N      along the normal
+    q        elastic travel of friction                             3      m      inertial
+    sl       its largest length, beyond which the cable slides      -      m
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.compiled import inner, kernel
+
+G1, G2 = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0  # Gauss points of a piece
+
+
+@inner
+def pressure(x, p0, p1, v0, v1, k, c, o):
+    """Force per length at the part x of the way from the node to the other, and dq/dp, dq/dv."""
+    p, v = p0 + x * (p1 - p0), v0 + x * (v1 - v0)
+    if p <= 0.0:
+        return 0.0, 0.0, 0.0
+    if p >= o:
+        return k * (p - 0.5 * o) + c * v, k, c
+    return 0.5 * k * p * p / o + c * v * p / o, (k * p + c * v) / o, c * p / o
+
+
+@kernel
+def contact(p0, p1, v0, v1, h, k, c, o):
+    """Force N on the node at p0, and its derivatives by p0, p1, v0, v1.  Called where one of p0, p1 is positive."""
+    # pieces between the zeros of p and of p - o
+    xa, xb, xc, xd = 0.0, 1.0, 1.0, 1.0
+    if p1 != p0:
+        z, y = -p0 / (p1 - p0), (o - p0) / (p1 - p0)
+        if z > y:
+            z, y = y, z
+        xb = min(max(z, 0.0), 1.0)
+        xc = min(max(y, 0.0), 1.0)
+    N = N0 = N1 = V0 = V1 = 0.0
+    for a, b in ((xa, xb), (xb, xc), (xc, xd)):
+        w = 0.5 * h * (b - a)
+        if w <= 0.0:
+            continue
+        for g in (G1, G2):
+            x = a + g * (b - a)
+            q, qp, qv = pressure(x, p0, p1, v0, v1, k, c, o)
+            n, m = w * (1.0 - x), x
+            N += n * q
+            N0 += n * (1.0 - m) * qp
+            N1 += n * m * qp
+            V0 += n * (1.0 - m) * qv
+            V1 += n * m * qv
+    return N, N0, N1, V0, V1
+
+
+@inner
+def friction(q, N, axis, normal, mu_a, mu_l, sl):
+    """Friction on a node pressed by N after the elastic travel q (in the plane of the bed).
+
+    Returns the force f, df/dN, df/dq, and the travel that is left after sliding.  The travel
+    grows with the node and stores its force elastically, so a cable at rest stays at rest;
+    where it exceeds sl the node slides under mu N, axial and lateral part each with its own mu.
+    """
+    side = (
+        normal[1] * axis[2] - normal[2] * axis[1],
+        normal[2] * axis[0] - normal[0] * axis[2],
+        normal[0] * axis[1] - normal[1] * axis[0],
+    )
+    a = q[0] * axis[0] + q[1] * axis[1] + q[2] * axis[2]
+    b = q[0] * side[0] + q[1] * side[1] + q[2] * side[2]
+    size = math.sqrt(a * a + b * b)
+    c = 1.0 / sl if size <= sl else 1.0 / size
+    a, b = c * a, c * b
+    g = (
+        -mu_a * a * axis[0] - mu_l * b * side[0],
+        -mu_a * a * axis[1] - mu_l * b * side[1],
+        -mu_a * a * axis[2] - mu_l * b * side[2],
+    )
+    aa, ab, bb = 1.0, 0.0, 1.0
+    left = sl * c if size > sl else 1.0
+    if size > sl:
+        aa, ab, bb = 1.0 - a * a, -a * b, 1.0 - b * b
+    # df/dq = -N c (mu_a axis (aa axis + ab side) + mu_l side (ab axis + bb side))
+    n = -N * c
+    ga = (aa * axis[0] + ab * side[0], aa * axis[1] + ab * side[1], aa * axis[2] + ab * side[2])
+    gb = (ab * axis[0] + bb * side[0], ab * axis[1] + bb * side[1], ab * axis[2] + bb * side[2])
+    na, nb = n * mu_a, n * mu_l
+    D = (
+        na * axis[0] * ga[0] + nb * side[0] * gb[0], na * axis[0] * ga[1] + nb * side[0] * gb[1], na * axis[0] * ga[2] + nb * side[0] * gb[2],
+        na * axis[1] * ga[0] + nb * side[1] * gb[0], na * axis[1] * ga[1] + nb * side[1] * gb[1], na * axis[1] * ga[2] + nb * side[1] * gb[2],
+        na * axis[2] * ga[0] + nb * side[2] * gb[0], na * axis[2] * ga[1] + nb * side[2] * gb[1], na * axis[2] * ga[2] + nb * side[2] * gb[2],
+    )  # fmt: skip
+    return (N * g[0], N * g[1], N * g[2]), g, D, left

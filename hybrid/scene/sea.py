@@ -1,0 +1,225 @@
+"""The sea around the cable: currents, waves, the seabed.
+
+Heights count along z; directions in degrees from x, counter-clockwise seen from above.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.table import (
+    Finding,
+    Kinds,
+    NonNegative,
+    Number,
+    Pair,
+    PlainNumber,
+    Positive,
+    Table,
+    Vector,
+    Whole,
+    Words,
+    by_kind,
+    numbers,
+    refuse,
+    unwrap,
+)
+
+# --- currents ----------------------------------------------------------------------------------
+
+_RAMP = "time over which the {what} grows from nothing, smoothly; absent: there from the beginning [s]"
+
+
+class CurrentPoint(Table):
+    """The velocity of the water at a height."""
+
+    z: Number = Field(description="height, inertial frame [m]")
+    velocity: Vector = Field(description="velocity of the water there, inertial frame [m/s]")
+
+
+def _one_way(points: tuple[CurrentPoint, ...]) -> tuple[CurrentPoint, ...]:
+    """Heights that only rise or only fall; the first that turns back is refused."""
+    up = points[1].z > points[0].z if len(points) > 1 else True
+    for i, (a, b) in enumerate(pairwise(points), start=1):
+        if a.z == b.z or (b.z > a.z) is not up:
+            expected = "heights that only rise or only fall from entry to entry, in m"
+            refuse([Finding((i, "z"), expected, "sort the entries by z and drop duplicates")])
+    return points
+
+
+CurrentPoints = Annotated[tuple[CurrentPoint, ...], Field(min_length=2), AfterValidator(_one_way)]
+
+
+class UniformCurrent(Table):
+    """The same velocity everywhere."""
+
+    kind: Literal["uniform"] = Field(default="uniform", description="the same everywhere")
+    velocity: Vector = Field(description="velocity of the water, inertial frame [m/s]")
+    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
+
+
+class CurrentProfile(Table):
+    """Velocities at heights: linear between them, constant above the highest and below the lowest."""
+
+    kind: Literal["profile"] = Field(default="profile", description="velocities at heights, linear between them")
+    table: CurrentPoints = Field(description="heights, rising or falling, and the velocity at each")
+    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
+
+
+class PowerLawCurrent(Table):
+    """velocity x ((z - bottom) / (top - bottom))^exponent; that of the top above it, nothing below the bottom."""
+
+    kind: Literal["power_law"] = Field(default="power_law", description="a power of the height above the bottom")
+    velocity: Vector = Field(description="velocity of the water at the top, inertial frame [m/s]")
+    top: Number | None = Field(
+        default=None, description="height of the top; absent: the surface of the fluid, or 0 without one [m]"
+    )
+    bottom: Number = Field(description="height at which the current vanishes [m]")
+    exponent: Positive = Field(default=1 / 7, description="the power; absent: one seventh [-]")
+    turn: Number = Field(
+        default=0.0,
+        description="angle by which the current turns from the top to the bottom, in proportion to the depth, "
+        "counter-clockwise seen from above [deg]",
+    )
+    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
+
+    def top_under(self, surface: float | None) -> float:
+        """Height of the top [m] in a fluid with that surface (None: it has none)."""
+        return self.top if self.top is not None else surface if surface is not None else 0.0
+
+    @model_validator(mode="after")
+    def _top_is_above(self) -> PowerLawCurrent:
+        if self.top is not None and self.bottom >= self.top:
+            expected = f"a height below the top, {self.top:.8g} m"
+            refuse([Finding(("bottom",), expected, "z points up; heights below the surface are negative")])
+        return self
+
+
+_KINDS = ("uniform", "profile", "power_law")
+
+
+def _current_form(value: Any) -> str:
+    """Discriminator: a table says its kind, a list of tables is a profile, anything else must be a vector."""
+    value = unwrap(value)
+    if isinstance(value, Mapping | Table) or (isinstance(value, str) and value in _KINDS):
+        return "<table>"
+    listed = isinstance(value, Sequence) and not isinstance(value, str | bytes)
+    return "<list>" if listed and any(isinstance(x, Mapping | Table) for x in value) else "<vector>"
+
+
+_FORMS = f"three numbers [x, y, z] (or a list of {{z, velocity}}, or a table with kind: {' | '.join(_KINDS)})"
+
+Current = Annotated[
+    Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words(_FORMS), Tag("<vector>")]
+    | Annotated[CurrentPoints, Tag("<list>")]
+    | Annotated[
+        Annotated[UniformCurrent, Tag("<uniform>")]
+        | Annotated[CurrentProfile, Tag("<profile>")]
+        | Annotated[PowerLawCurrent, Tag("<power_law>")],
+        Discriminator(by_kind),
+        Kinds(_KINDS, usual=("uniform",)),
+        Tag("<table>"),
+    ],
+    Discriminator(_current_form),
+]
+
+
+# --- waves -------------------------------------------------------------------------------------
+
+_DIRECTION = "direction in which the waves travel, from x counter-clockwise seen from above [deg]"
+_DEPTH = "depth of the water for the length of the waves; absent: down to the seabed, or deep without one [m]"
+
+
+class RegularWaves(Table):
+    """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
+
+    kind: Literal["regular"] = Field(default="regular", description="one period")
+    height: Positive = Field(description="height from trough to crest [m]")
+    period: Positive = Field(description="period [s]")
+    direction: Number = Field(default=0.0, description=_DIRECTION)
+    phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
+    depth: Positive | None = Field(default=None, description=_DEPTH)
+    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
+
+
+class JonswapWaves(Table):
+    """Irregular, long-crested waves: a sum of linear waves with random phases and a JONSWAP spectrum."""
+
+    kind: Literal["jonswap"] = Field(default="jonswap", description="a spectrum of periods")
+    height: Positive = Field(description="significant wave height, four standard deviations of the elevation [m]")
+    period: Positive = Field(description="peak period [s]")
+    gamma: Number = Field(default=3.3, ge=1, description="peak enhancement; 1 is a Pierson-Moskowitz sea [-]")
+    direction: Number = Field(default=0.0, description=_DIRECTION)
+    seed: Whole = Field(default=1, ge=0, description="seed of the random phases: another seed, another sea [-]")
+    components: Whole = Field(default=100, ge=1, le=1000, description="number of waves in the sum [-]")
+    depth: Positive | None = Field(default=None, description=_DEPTH)
+    ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
+
+
+Waves = Annotated[
+    Annotated[RegularWaves, Tag("<regular>")] | Annotated[JonswapWaves, Tag("<jonswap>")],
+    Discriminator(by_kind),
+    Kinds(("regular", "jonswap"), usual=("regular",)),
+]
+
+# Newton's method on the dispersion relation gains digits quadratically from a start within 5 %.
+_MOST_ITERATIONS = 20
+# Values of omega^2 depth / gravity beyond which tanh(k depth) is 1, or k depth, to round-off.
+_DEEP, _SHALLOW = 20.0, 1e-16
+
+
+def wavenumber(omega: float, depth: float | None, gravity: float) -> float:
+    """Wavenumber k > 0 [1/m] of a linear wave: omega^2 = gravity k tanh(k depth), to round-off.
+
+    omega: angular frequency > 0 [rad/s]; depth [m], None for deep water; gravity > 0 [m/s^2].
+    """
+    deep = omega * omega / gravity
+    if depth is None or deep * depth > _DEEP:
+        return deep
+    q = deep * depth
+    if q < _SHALLOW:
+        return omega / math.sqrt(gravity * depth)
+    y = q / math.sqrt(math.tanh(q))  # Eckart (1952): k depth within 5 %
+    for _ in range(_MOST_ITERATIONS):
+        t = math.tanh(y)
+        change = (y * t - q) / (t + y * (1.0 - t * t))
+        y -= change
+        if abs(change) <= 1e-15 * y:
+            break
+    return y / depth
+
+
+# --- the seabed --------------------------------------------------------------------------------
+
+
+class Friction(Table):
+    """Coulomb friction of the seabed on the cable; a plain number means both."""
+
+    axial: NonNegative = Field(description="friction coefficient along the cable [-]")
+    lateral: NonNegative = Field(description="friction coefficient across the cable [-]")
+
+
+class Seabed(Table):
+    """A plane bed that pushes back along its normal like a spring under every metre of cable."""
+
+    z: Number = Field(description="height of the bed at x = y = 0 [m]")
+    slope: Pair | None = Field(
+        default=None, description="[dz/dx, dz/dy], how steeply the bed rises along x and y; absent: level [-]"
+    )
+    stiffness: Positive = Field(description="force per metre of cable and metre of penetration [N/m per m]")
+    damping: NonNegative = Field(
+        default=0.0, description="force per metre of cable and speed of penetration, in contact [N s/m per m]"
+    )
+    friction: Annotated[Friction, PlainNumber(("axial", "lateral"))] | None = Field(
+        default=None, description="friction on the bed; a plain number means axial and lateral; absent: none"
+    )
+
+    def height(self, x: float, y: float) -> float:
+        """Height of the bed [m] at x, y [m]."""
+        rise_x, rise_y = self.slope or (0.0, 0.0)
+        return self.z + rise_x * x + rise_y * y

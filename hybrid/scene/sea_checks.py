@@ -1,0 +1,215 @@
+"""Contradictions about the sea and what floats in it: water, waves, seabed, attachments, bodies."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from hybrid.scene.attachments import Clump, Float, Modules
+from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import Body, Ends, Triple
+from hybrid.scene.sea import wavenumber
+from hybrid.scene.start_checks import SAME_LENGTH
+from hybrid.scene.table import Finding, Place, unit
+from hybrid.scene.task import Equilibrium, Initial, Straight
+
+# Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
+STEEPEST = 0.142
+
+# How far under the seabed an end may be held, as part of the depth: a cable that rests there has sunk in a little.
+SUNK = 1e-3
+
+# Two depths that differ by less than this part are the same: people write six digits.
+SAME_DEPTH = 1e-6
+
+_WATER = "give environment.fluid, such as `fluid: {density: 1025}` (kg/m^3)"
+_WAVES: Place = ("environment", "fluid", "waves")
+
+
+# --- attachments and bodies --------------------------------------------------------------------
+
+
+def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
+    """Attachments beyond the end of the cable."""
+    length = cable.length
+    for i, item in enumerate(cable.attachments):
+        place: Place = ("over", 1) if isinstance(item, Modules) else ("at",)
+        if (item.over[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
+            expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
+            yield Finding(("cable", "attachments", i, *place), expected)
+
+
+def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Finding]:
+    """Attachments that need a fluid and have none, or that do in it what their kind does not say."""
+    for i, item in enumerate(cable.attachments):
+        here: Place = ("cable", "attachments", i)
+        if isinstance(item, Clump):
+            yield from _needs_fluid(here, item, environment)
+        elif environment.fluid is None:
+            fix = f"{_WATER}; what only weighs is kind: clump"
+            yield Finding((*here, "kind"), "a fluid, because nothing floats without one", fix, item.kind)
+        elif item.buoyancy is not None and environment.gravity == 0.0:
+            measure = "volume (m^3/m)" if isinstance(item, Modules) else "volume (m^3)"
+            expected = f"{measure} instead, because without gravity nothing has weight or buoyancy"
+            yield Finding((*here, "buoyancy"), expected, "give volume and leave buoyancy out")
+        else:
+            yield from _floats(here, item, environment.fluid.density, environment.gravity)
+
+
+def _floats(here: Place, item: Float | Modules, density: float, gravity: float) -> Iterator[Finding]:
+    if isinstance(item, Float) and item.volume is not None and density * item.volume < item.mass:
+        expected = f"more than {item.mass / density:.6g} m^3, the volume of fluid that weighs as much as the float"
+        yield Finding((*here, "volume"), expected, "use kind: clump for what sinks, with the same mass and volume")
+    if isinstance(item, Modules) and item.buoyancy is not None and item.volume_in(density, gravity) < 0.0:
+        weight = item.mass * gravity
+        expected = f"at least {0.0 - weight:.6g} N/m: modules cannot sink with more than their weight, {weight:.6g} N/m"
+        yield Finding((*here, "buoyancy"), expected, "give their mass (kg/m), in air")
+
+
+def bodies_in_fluid(environment: Environment, ends: Ends) -> Iterator[Finding]:
+    """Bodies with what only a fluid gives a meaning to."""
+    for name, body in ends.bodies().items():
+        yield from _needs_fluid(("ends", name), body, environment)
+
+
+def _needs_fluid(here: Place, item: Clump | Body, environment: Environment) -> Iterator[Finding]:
+    if environment.fluid is not None:
+        return
+    names = {"volume": "buoyancy", "drag_area": "drag", "added_mass": "added mass", "height": "height under water"}
+    for key, name in names.items():
+        if getattr(item, key):
+            yield Finding((*here, key), f"no {name} without a fluid", f"{_WATER}, or leave {key} out")
+
+
+# --- waves -------------------------------------------------------------------------------------
+
+
+def waves(environment: Environment) -> Iterator[Finding]:
+    """Waves without gravity, of two depths, or so steep that they break."""
+    sea = environment.fluid.waves if environment.fluid is not None else None
+    if sea is None:
+        return
+    if environment.gravity == 0.0:
+        yield Finding(_WAVES, "no waves without gravity", "give environment.gravity, or leave waves out")
+        return
+    depth = environment.depth
+    if depth is not None and depth <= 0.0:
+        return  # the surface is complained of already
+    if sea.depth is not None and depth is not None and abs(sea.depth - depth) > SAME_DEPTH * depth:
+        expected = f"{depth:.8g} m, the depth of the seabed under the surface at x = y = 0"
+        yield Finding((*_WAVES, "depth"), expected, "leave depth out; it follows from the seabed")
+    k = wavenumber(2 * math.pi / sea.period, depth, environment.gravity)
+    length = 2 * math.pi / k if k > 0.0 else math.inf
+    highest = STEEPEST * length * (math.tanh(k * depth) if depth is not None else 1.0)
+    if sea.height >= highest:
+        water = "deep water" if depth is None else f"{depth:.6g} m of water"
+        expected = (
+            f"less than {highest:.4g} m, because in {water} waves of {sea.period:g} s are {length:.4g} m long, "
+            "and higher ones break"
+        )
+        yield Finding((*_WAVES, "height"), expected, "lower waves, or a longer period")
+
+
+def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
+    """Ends that follow waves which are not there, or are there at once."""
+    sea = environment.fluid.waves if environment.fluid is not None else None
+    for name in ("start", "end"):
+        motion = getattr(getattr(ends, name), "motion", None)
+        if motion is None or motion.follow is None:
+            continue
+        if sea is None:
+            fix = "give environment.fluid.waves, with a surface and a ramp"
+            yield Finding(("ends", name, "motion", "follow"), "nothing, because there are no waves to follow", fix)
+        elif sea.ramp is None:
+            expected = f"a number > 0, in s, because ends.{name} follows the waves and starts from rest"
+            yield Finding((*_WAVES, "ramp"), expected, f"add `ramp: {2 * sea.period:.6g}` (s), two periods")
+            return
+
+
+# --- the seabed --------------------------------------------------------------------------------
+
+
+def surface_over_seabed(environment: Environment, ends: Ends) -> Iterator[Finding]:
+    """A surface that leaves no water over the seabed where an end is."""
+    fluid, seabed = environment.fluid, environment.seabed
+    if fluid is None or fluid.surface is None or seabed is None:
+        return
+    places = {f"ends.{name}": p for name, p in (ends.held() | ends.near()).items()} or {"x = y = 0": (0.0, 0.0, 0.0)}
+    for name, (x, y, _) in places.items():
+        bed = seabed.height(x, y)
+        if fluid.surface <= bed:
+            expected = f"a height above {bed:.8g} m, the seabed at {name}"
+            yield Finding(("environment", "fluid", "surface"), expected, "z points up; lower the seabed")
+            return
+
+
+def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
+    """Ends, bodies and initial shapes under the seabed."""
+    seabed, fluid = environment.seabed, environment.fluid
+    if seabed is None:
+        return
+    depth = cable.length
+    if fluid is not None and fluid.surface is not None:
+        depth = max(fluid.surface - seabed.z, 0.0)
+    fix = "raise it, or lower environment.seabed.z"
+    named: list[tuple[Place, Triple]] = [(("ends", n, "position"), p) for n, p in ends.held().items()]
+    named += [(("ends", n, "near"), p) for n, p in ends.near().items()]
+    if not isinstance(initial, Equilibrium | Straight):
+        named += [(("initial", "points", i), p) for i, p in enumerate(initial.points)]
+    for place, (x, y, z) in named:
+        under = seabed.height(x, y) - z
+        if under > SUNK * depth:
+            given = f"[{x:.8g}, {y:.8g}, {z:.8g}], which lies {under:.4g} m under the seabed"
+            yield Finding(place, f"a place on the seabed or above, z >= {seabed.height(x, y):.8g} m", fix, given)
+    if isinstance(initial, Straight) and not ends.held().keys() >= {"start", "end"}:
+        yield from _straight_in_the_ground(environment, cable, ends, initial, SUNK * depth)
+    for name, (x, y, z) in ends.held().items():
+        travel = getattr(getattr(getattr(ends, name), "motion", None), "travel", None)
+        if travel is not None:
+            x, y, z = x + travel.by[0], y + travel.by[1], z + travel.by[2]
+            under = seabed.height(x, y) - z
+            if under > SUNK * depth:
+                given = f"a way to [{x:.8g}, {y:.8g}, {z:.8g}], {under:.4g} m under the seabed"
+                where: Place = ("ends", name, "motion", "travel", "by")
+                yield Finding(where, "a way that ends on the seabed or above", fix, given)
+
+
+def _straight_in_the_ground(
+    environment: Environment, cable: Cable, ends: Ends, initial: Straight, sunk: float
+) -> Iterator[Finding]:
+    """The end of a straight cable that no position places."""
+    seabed, held = environment.seabed, ends.held()
+    origin, sign = held.get("start") or initial.origin, 1.0
+    if "end" in held:
+        origin, sign = held["end"], -1.0
+    if seabed is None or origin is None:
+        return
+    u = unit(initial.direction)
+    x, y, z = (origin[i] + sign * cable.length * u[i] for i in range(3))
+    under = seabed.height(x, y) - z
+    if under > sunk:
+        given = f"a cable that ends at [{x:.8g}, {y:.8g}, {z:.8g}], {under:.4g} m under the seabed"
+        yield Finding(("initial", "direction"), "a cable on the seabed or above", "another direction", given)
+
+
+# --- what the arbiter knows --------------------------------------------------------------------
+
+
+def arbiter_knows(environment: Environment, cable: Cable, ends: Ends, solver: str) -> Iterator[Finding]:
+    """What the shooting arbiter cannot compute."""
+    if solver != "shooting":
+        return
+    fluid = environment.fluid
+    beyond = {
+        "a seabed": environment.seabed is not None,
+        "a surface": fluid is not None and fluid.surface is not None,
+        "a current that is not a plain vector": fluid is not None
+        and fluid.current is not None
+        and not (isinstance(fluid.current, tuple) and isinstance(fluid.current[0], float)),
+        "attachments": bool(cable.attachments),
+        "bodies": bool(ends.bodies()),
+    }
+    unknown = [name for name, there in beyond.items() if there]
+    if unknown:
+        expected = f"elimination, because shooting does not know {' and '.join(unknown)}"
+        yield Finding(("solver",), expected, "leave solver out")

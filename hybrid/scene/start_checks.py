@@ -1,0 +1,250 @@
+"""Contradictions about where the cable is: how far the ends may be apart, and where it starts."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from itertools import pairwise
+
+from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import Ends, Triple
+from hybrid.scene.table import Finding, Place, unit
+from hybrid.scene.task import Equilibrium, Initial, Points, Straight, Time
+
+# Positions that differ by less than this part of the cable's length are the same place:
+# people write six to eight digits.
+SAME_PLACE = 1e-6
+
+# Lengths are sums of what people wrote; only round-off may separate them.
+SAME_LENGTH = 1e-9
+
+# Real cables break at a few per cent; beyond this a typing error is more likely than rubber.
+LARGEST_STRAIN = 0.5
+
+# A polyline drawn by hand, or an extensible cable that starts along one, may be longer or shorter by this part.
+POLYLINE_STRETCH = 0.2
+
+# A weight below this part of all weights and lifts is their round-off.
+WEIGHTLESS = 1e-9
+
+
+def _at(position: Triple) -> str:
+    return f"[{position[0]:.8g}, {position[1]:.8g}, {position[2]:.8g}]"
+
+
+def _along(origin: Triple, direction: Triple, distance: float) -> Triple:
+    u = unit(direction)
+    return (origin[0] + distance * u[0], origin[1] + distance * u[1], origin[2] + distance * u[2])
+
+
+# --- how far the ends may be apart -------------------------------------------------------------
+
+
+def too_short(cable: Cable, distance: float) -> str | None:
+    """What is expected where the ends are `distance` [m] apart and the cable does not reach; None if it does."""
+    length = cable.length
+    if cable.inextensible:
+        if distance < length * (1 - SAME_LENGTH):
+            return None
+        return f"less than {length:.8g} m from the start, the length of this inextensible cable; it is too short"
+    elastic = sum(s.length for s in cable.sections if s.axial_stiffness is not None)
+    strain = (distance - length) / elastic
+    if strain <= LARGEST_STRAIN:
+        return None
+    return (
+        f"at most {length + LARGEST_STRAIN * elastic:.8g} m from the start; the cable, {length:.8g} m long, is too "
+        f"short and would stretch by {100 * strain:.3g} %"
+    )
+
+
+def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
+    """Two held ends that the cable does not join, or a body placed out of its reach."""
+    held, near = ends.held(), ends.near()
+    fix = "a longer cable or closer ends"
+    if cable.inextensible:
+        fix = "a longer cable, closer ends, or give axial_stiffness (N)"
+    if len(held) == 2:
+        distance = math.dist(held["start"], held["end"])
+        expected = too_short(cable, distance)
+        if expected is not None:
+            given = f"{_at(held['end'])}, which is {distance:.8g} m from the start"
+            yield Finding(("ends", "end", "position"), expected, fix, given)
+    elif near and len(places := held | near) == 2:
+        distance, allowed = math.dist(places["start"], places["end"]), cable.length * (1 + POLYLINE_STRETCH)
+        if distance > allowed:
+            name = "end" if "end" in near else "start"
+            expected = f"a place at most {allowed:.8g} m from the other end; the cable is {cable.length:.8g} m long"
+            given = f"{_at(near[name])}, which is {distance:.8g} m from the other end"
+            yield Finding(("ends", name, "near"), expected, "a longer cable or a nearer place", given)
+
+
+def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
+    """Two held ends that travel apart farther than the cable joins them."""
+    held = ends.held()
+    motions = {name: getattr(getattr(ends, name), "motion", None) for name in held}
+    carriers = {name: m for name, m in motions.items() if m is not None and (m.travel or m.velocity)}
+    if time is None or len(held) < 2 or not carriers or too_short(cable, math.dist(held["start"], held["end"])):
+        return
+    moments = {time.duration}
+    for motion in carriers.values():
+        if motion.travel is not None:
+            moments.add(min(motion.travel.begin + motion.travel.over, time.duration))
+    for t in sorted(moments):
+        there = dict(held)
+        for name, motion in carriers.items():
+            far, _ = motion.carried(t)
+            there[name] = (held[name][0] + far[0], held[name][1] + far[1], held[name][2] + far[2])
+        distance = math.dist(there["start"], there["end"])
+        expected = too_short(cable, distance)
+        if expected is not None:
+            name = "end" if "end" in carriers else "start"
+            key = "travel" if carriers[name].travel is not None else "velocity"
+            given = f"motion to {_at(there[name])} at t = {t:.6g} s, {distance:.8g} m from the other end"
+            yield Finding(("ends", name, "motion", key), expected, "a shorter way, or a longer cable", given)
+            return
+
+
+# --- where the cable starts --------------------------------------------------------------------
+
+
+def start_is_known(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
+    """An initial shape that says where the cable is, and agrees with its ends."""
+    if isinstance(initial, Equilibrium):
+        yield from _guess(cable, ends, initial)
+    elif isinstance(initial, Straight):
+        yield from _straight_start(cable, ends, initial)
+    else:
+        yield from _polyline_start(cable, ends, initial, SAME_PLACE if cable.inextensible else POLYLINE_STRETCH)
+
+
+def _guess(cable: Cable, ends: Ends, initial: Equilibrium) -> Iterator[Finding]:
+    places = ends.held() | ends.near()
+    if initial.points is not None:
+        yield from _polyline_start(cable, ends, initial, POLYLINE_STRETCH)
+    elif initial.guess in ("catenary", "arc", "span") and len(places) < 2:
+        expected = f"auto or straight, because a guess like {initial.guess} goes from one known place to another"
+        yield Finding(("initial", "guess"), expected, "hold both ends, or say `near` where a body is")
+    elif initial.guess == "straight" or initial.direction is not None:
+        for name in ends.near():
+            expected = "nothing, because the search starts from a cable straight in a direction (initial)"
+            yield Finding(("ends", name, "near"), expected, "leave near out, or the direction and guess: straight")
+
+
+def equilibrium_exists(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
+    """A cable that nothing holds rests on the seabed or floats at the surface, or has no equilibrium."""
+    if not isinstance(initial, Equilibrium) or ends.held():
+        return
+    reason, fix = _drifts(environment, cable, ends)
+    if reason:
+        yield Finding(("initial", "kind"), f"at least one end with a position, because {reason}", fix)
+    elif initial.points is None and len(ends.near()) < 2:
+        expected = "a polyline [[x, y, z], ...] to start from, in m, because no end is held and it could be anywhere"
+        yield Finding(("initial", "points"), expected, "add `points: [[x, y, z], [x, y, z]]` (m)")
+
+
+def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[float, float]:
+    """Weight of cable, attachments and bodies under water less the lift of forces on the ends, and the sum of
+    all magnitudes: N, positive downwards."""
+    gravity, density = environment.gravity, environment.fluid.density if environment.fluid is not None else 0.0
+    widths = [s.diameter or 0.0 for s in cable.sections]
+    masses = [(s.mass * s.length, math.pi / 4 * d * d * s.length) for s, d in zip(cable.sections, widths, strict=True)]
+    for item in cable.attachments:
+        if density > 0.0 and gravity > 0.0:  # without, attachments that float are refused elsewhere
+            length = item.over[1] - item.over[0] if item.kind == "modules" else 1.0
+            masses.append((item.mass * length, item.volume_in(density, gravity) * length))
+        elif item.kind == "clump":
+            masses.append((item.mass, item.volume))
+    masses += [(body.mass, body.volume) for body in ends.bodies().values()]
+    down = [gravity * mass for mass, _ in masses]
+    up = [gravity * density * volume for _, volume in masses] + [force[2] for force in _forces(ends)]
+    return sum(down) - sum(up), sum(down) + sum(map(abs, up))
+
+
+def _forces(ends: Ends) -> list[Triple]:
+    """Forces on the ends at the beginning, N."""
+    loads = [getattr(end, key, None) for end in (ends.start, ends.end) for key in ("force", "thrust")]
+    return [getattr(load, "value", load) for load in loads if load is not None]
+
+
+def _drifts(environment: Environment, cable: Cable, ends: Ends) -> tuple[str, str]:
+    """Why a cable that nothing holds has no equilibrium, and what to do; empty if it has one."""
+    fluid, seabed = environment.fluid, environment.seabed
+    weight, gross = net_weight(environment, cable, ends)
+    under = "under water" if fluid is not None else "in all"
+    hold = "make an end pinned or clamped, or use initial: {kind: straight}"
+    if abs(weight) <= WEIGHTLESS * gross:
+        return f"nothing holds this cable, and it weighs nothing {under}: it has no height of its own", hold
+    if weight > 0.0 and seabed is None:
+        reason = f"nothing holds this cable, which weighs {weight:.4g} N {under}, and there is no seabed to carry it"
+        return reason, f"{hold}; or give environment.seabed"
+    if weight < 0.0 and (fluid is None or fluid.surface is None):
+        reason = f"nothing holds this cable, which rises with {-weight:.4g} N, and there is no surface to stop it"
+        return reason, f"{hold}; or give environment.fluid.surface"
+    rubs = weight > 0.0 and seabed is not None and seabed.friction is not None
+    remedy = hold if weight < 0.0 else f"{hold}; or give environment.seabed.friction"
+    push = [sum(force[k] for force in _forces(ends)) for k in (0, 1)]
+    if not rubs and math.hypot(*push) > WEIGHTLESS * gross:
+        return f"nothing holds this cable against the horizontal force of {math.hypot(*push):.4g} N at its ends", remedy
+    if not rubs and fluid is not None and fluid.flows() and _drags(cable, ends):
+        return "nothing holds this cable against the current, and it drifts", remedy
+    if not rubs and seabed is not None and weight > 0.0 and seabed.slope is not None and any(seabed.slope):
+        return "nothing holds this cable on the slope of the seabed, and it slides", remedy
+    return "", ""
+
+
+def _drags(cable: Cable, ends: Ends) -> bool:
+    """Whether a current takes hold of anything."""
+    bluff = [getattr(item, "drag_area", 0.0) for item in (*cable.attachments, *ends.bodies().values())]
+    return any(bluff) or any(s.drag is not None and (s.drag.normal or s.drag.tangential) for s in cable.sections)
+
+
+def _straight_start(cable: Cable, ends: Ends, initial: Straight) -> Iterator[Finding]:
+    held, length = ends.held(), cable.length
+    near = SAME_PLACE * length
+    if "start" in held:
+        origin: Triple | None = held["start"]
+    elif "end" in held:
+        origin = _along(held["end"], initial.direction, -length)
+    else:
+        origin = initial.origin
+    if origin is None:
+        expected = "three numbers [x, y, z], in m, because no end is held and the cable could be anywhere"
+        yield Finding(("initial", "origin"), expected, "add `origin: [x, y, z]` (m), the position of s = 0")
+        return
+    if initial.origin is not None and math.dist(initial.origin, origin) > near:
+        expected = f"{_at(origin)}, which follows from the held end"
+        yield Finding(("initial", "origin"), expected, "leave origin out")
+    tip = _along(origin, initial.direction, length)
+    if len(held) == 2 and math.dist(tip, held["end"]) > near:
+        expected = f"a straight cable that ends at ends.end.position {_at(held['end'])}; this one ends at {_at(tip)}"
+        yield Finding(("initial", "direction"), expected, "use `initial: {kind: equilibrium}`; it finds the shape")
+    yield from _bodies_agree(ends, origin, tip, near)
+    if held and initial.velocity is not None and any(initial.velocity):
+        expected = f"rest, because the {next(iter(held))} is held and cannot jump to a velocity"
+        yield Finding(("initial", "velocity"), expected, "leave velocity out, or free both ends")
+
+
+def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, allowed: float) -> Iterator[Finding]:
+    points, length = initial.points or (), cable.length
+    total = sum(math.dist(a, b) for a, b in pairwise(points))
+    if abs(total - length) > allowed * length:
+        exact = "the length of the inextensible cable"
+        why = exact if allowed == SAME_PLACE else "the length of the cable, within 20 %"
+        expected = f"a polyline {length:.8g} m long, {why}"
+        fix = f"move the points, or make the cable {total:.8g} m long"
+        yield Finding(("initial", "points"), expected, fix, f"{len(points)} points, {total:.8g} m in all")
+    for name, index in (("start", 0), ("end", len(points) - 1)):
+        position = ends.held().get(name)
+        if position is not None and math.dist(points[index], position) > SAME_PLACE * length:
+            expected = f"{_at(position)}, where ends.{name}.position holds the cable"
+            yield Finding(("initial", "points", index), expected, "let the polyline begin and end at the held ends")
+    yield from _bodies_agree(ends, points[0], points[-1], SAME_PLACE * length)
+
+
+def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Iterator[Finding]:
+    """Bodies that are said to be elsewhere than the initial shape has its ends."""
+    for name, position in ends.near().items():
+        there = first if name == "start" else last
+        if math.dist(position, there) > near:
+            here: Place = ("ends", name, "near")
+            yield Finding(here, f"{_at(there)}, where initial puts this end of the cable", "leave near out")
