@@ -13,7 +13,6 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
-from hybrid.model.state import Floats
 from hybrid.results.probes import Observer
 from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
@@ -44,7 +43,7 @@ class Motion:
         self.watch = Watch(recorder, model)
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.cpu = clock.process_time()
-        self.work = np.zeros(len(POWERS))
+        self.work = [0.0] * len(POWERS)
         if equilibrium is None:
             self.state = model.start.copy()
             self._bring_ends_in()
@@ -56,7 +55,7 @@ class Motion:
         self._ignite()
         self.spare = self.state.copy()
         self.power = self._powers()
-        self._look(self.watch.shape(0.0, model.ends.values, self.state))
+        self._look(self.watch.still(model.ends.values, self.state))
         if scene.time.rho_inf == 1.0 and not model.line.ck.all():
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             recorder.event(0.0, 0.0, model.length, "undamped", text)
@@ -87,11 +86,11 @@ class Motion:
     def save(self) -> None:
         """Write an output."""
         ends = self.model.ends.at(self.t)
-        values = self.observer.values(ends, self.state, self.stepper.report, self.work)
+        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work))
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
         self.watch.rest(self.t, ends, values, self.state)
-        self._look(self.watch.energy(self.t, values, self.work, self.state))
+        self._look(self.watch.energy(self.t, values, np.array(self.work), self.state))
 
     def _look(self, found: Stop) -> None:
         """Stop where a watch says that going on has no sense."""
@@ -109,7 +108,8 @@ class Motion:
         self.state, self.spare = self.spare, self.state
         self.t, self.steps, self.iterations = end, self.steps + 1, taken.iterations
         power = self._powers()
-        self.work += 0.5 * dt * (self.power + power)
+        half = 0.5 * dt
+        self.work = [w + half * (a + b) for w, a, b in zip(self.work, self.power, power, strict=True)]
         self.power = power
         self.recorder.log(
             {
@@ -118,7 +118,7 @@ class Motion:
                 "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
-        self._look(self.watch.shape(end, self.model.ends.values, self.state))
+        self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)
 
@@ -140,10 +140,10 @@ class Motion:
 
     def _pull(self, k: int) -> float:
         ends = self.model.ends.values
-        x, y, z = (self.stepper.report[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k]).tolist()
+        x, y, z = self.stepper.told[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
         return sqrt(x * x + y * y + z * z)
 
-    def _powers(self) -> Floats:
+    def _powers(self) -> list[float]:
         ends = self.model.ends
         return self.stepper.powers(ends.values, ends.velocity, self.state)
 

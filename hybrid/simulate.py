@@ -21,7 +21,9 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times, step_ends
+from hybrid.model.reasons import reasons_against
 from hybrid.motion import Motion
+from hybrid.physics.loads import SEABED, SURFACE
 from hybrid.results.probes import Observer, output_points
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
@@ -85,7 +87,7 @@ def run(
 
         return run_shooting(scene, output, overwrite)
     model = build(scene)
-    equilibrium = _equilibrium(model, 0.0) if scene.initial.kind == "equilibrium" else None
+    equilibrium = _equilibrium(scene, model, 0.0) if scene.initial.kind == "equilibrium" else None
     outputs = output_times(scene)
     stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
     observer = Observer(
@@ -152,7 +154,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
-    found = _equilibrium(model, np.inf)
+    found = _equilibrium(scene, model, np.inf)
     observer = Observer(
         model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), False
     )
@@ -162,7 +164,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         watch = Watch(recorder, model)
         watch.equilibrium(found)
         watch.strain(0.0, found.state)
-        stop = watch.shape(0.0, ends, found.state)
+        stop = watch.still(ends, found.state)
         if stop is not None:
             raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
         recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
@@ -170,12 +172,19 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     return open_result(target)
 
 
-def _equilibrium(model: Model, t: float) -> Equilibrium:
+def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
-    return solve_statics(
-        model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-        model.slack_floor, take_slack=model.slack == "warn",
-    )  # fmt: skip
+    try:
+        return solve_statics(
+            model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
+            model.slack_floor, take_slack=model.slack == "warn",
+        )  # fmt: skip
+    except ComputationError as failed:
+        reasons = reasons_against(scene)
+        if not reasons:
+            raise
+        because = "\n              ".join([*reasons, failed.detail])
+        raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:
@@ -196,7 +205,7 @@ def _recorder(
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
-    fixed = []
+    fixed = _surroundings(model)
     if scene.output.history:
         points = np.array(scene.output.history)
         fixed.append(
@@ -206,6 +215,21 @@ def _recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=overwrite,
     )  # fmt: skip
+
+
+def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
+    """What pictures show besides the cable: seabed, still water, what is attached."""
+    line, sea = model.line, model.sea.values
+    out: list[tuple[Field, np.ndarray]] = []
+    if line.bits & SEABED:
+        text = "plane of the seabed: unit normal n and offset c, n . x = c on it"
+        out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), np.append(sea.normal, sea.offset)))
+    if line.bits & SURFACE:
+        out.append((Field("surface", "m", "height of still water"), np.array(sea.surface)))
+    if model.attached:
+        text = "arc lengths of floats, clumps and end bodies"
+        out.append((Field("attached", "m", text, (len(model.attached),), ("attached",)), np.array(model.attached)))
+    return out
 
 
 @contextmanager

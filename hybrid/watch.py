@@ -6,7 +6,7 @@ worse; what makes going on pointless is returned as an Outcome, with its node or
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -16,7 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.state import Ends, Floats, State
 from hybrid.results.record import Recorder
 from hybrid.solve.statics import Equilibrium, is_stable
-from hybrid.solve.step import sharpest, slackest
+from hybrid.solve.step import lowest, sharpest
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
@@ -66,10 +66,16 @@ class Watch:
             text = "the stability of this equilibrium is not judged, because an end moment is not conservative"
             self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
 
-    def shape(self, t: float, ends: Ends, state: State) -> Stop:
-        """Bends and twists that the mesh does not resolve."""
-        line = self._model.line
-        bend, node, twist, twisted = sharpest(line, ends, state.e, state.T, state.a1)
+    def still(self, ends: Ends, state: State) -> Stop:
+        """As `shape`, for a state that no step has led to."""
+        return self.shape(0.0, sharpest(self._model.line, ends, state.e, state.T, state.a1), state)
+
+    def shape(self, t: float, sharp: Sequence[float], state: State) -> Stop:
+        """Bends and twists that the mesh does not resolve; `sharp`: what solve.step.sharpest has found."""
+        bend, twist = sharp[0], sharp[2]
+        if bend <= self._bend and twist <= min(self._twist, LARGEST_TWIST):
+            return None
+        node, twisted = int(sharp[1]), int(sharp[3])
         if bend > self._bend:
             self.note(t, node, "unresolved bend", self._bend_text(node, bend, state))
             self._bend = 1.5 * bend
@@ -107,9 +113,8 @@ class Watch:
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""
-        cell = slackest(self._model.line, state.T, self._slack)
-        if cell >= 0:
-            tension = float(state.T[cell])
+        tension, cell = lowest(self._model.line, state.T)
+        if not tension > self._slack:
             s = float(self._model.line.s[cell])
             text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
             self.note(t, cell, "slack", text)

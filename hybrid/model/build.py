@@ -17,6 +17,7 @@ from hybrid.model.ends import EndConditions
 from hybrid.model.ledger import Entry, ledger
 from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes
 from hybrid.model.properties import (
+    attachments_at,
     bending_stiffness,
     damping,
     merged_sections,
@@ -53,6 +54,7 @@ class Model:
     slack_floor: float  # N, tension at or below which a catenary cell is slack
     slack: Literal["stop", "warn"]
     inextensible: bool
+    attached: tuple[float, ...]  # m, arc lengths of floats, clumps and end bodies
 
     @property
     def cells(self) -> int:
@@ -171,6 +173,7 @@ def build(scene: Scene) -> Model:
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
+        attached=tuple(sorted({at for at, _ in attachments_at(scene)})),
     )  # fmt: skip
 
 

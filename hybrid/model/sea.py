@@ -77,7 +77,7 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             wave_ramp = fluid.waves.ramp
     if bed is not None:
         slope = bed.slope or (0.0, 0.0)
-        normal = np.array([-slope[0], -slope[1], 1.0]) / math.hypot(*slope, 1.0)
+        normal = np.array([0.0 - slope[0], 0.0 - slope[1], 1.0]) / math.hypot(*slope, 1.0)
         friction = np.array([bed.friction.axial, bed.friction.lateral] if bed.friction else [np.nan, np.nan])
         sea = sea._replace(
             normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.stiffness, damping=bed.damping,

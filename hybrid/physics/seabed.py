@@ -38,19 +38,23 @@ def pressure(x, p0, p1, v0, v1, k, c, o):
     return 0.5 * k * p * p / o + c * v * p / o, (k * p + c * v) / o, c * p / o
 
 
+@inner
+def pieces(p0, p1, o):
+    """Where p passes 0 and o between the nodes, as parts of the way, in order."""
+    if p1 == p0:
+        return 1.0, 1.0
+    z, y = -p0 / (p1 - p0), (o - p0) / (p1 - p0)
+    if z > y:
+        z, y = y, z
+    return min(max(z, 0.0), 1.0), min(max(y, 0.0), 1.0)
+
+
 @kernel
 def contact(p0, p1, v0, v1, h, k, c, o):
     """Force N on the node at p0, and its derivatives by p0, p1, v0, v1.  Called where one of p0, p1 is positive."""
-    # pieces between the zeros of p and of p - o
-    xa, xb, xc, xd = 0.0, 1.0, 1.0, 1.0
-    if p1 != p0:
-        z, y = -p0 / (p1 - p0), (o - p0) / (p1 - p0)
-        if z > y:
-            z, y = y, z
-        xb = min(max(z, 0.0), 1.0)
-        xc = min(max(y, 0.0), 1.0)
+    xb, xc = pieces(p0, p1, o)
     N = N0 = N1 = V0 = V1 = 0.0
-    for a, b in ((xa, xb), (xb, xc), (xc, xd)):
+    for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
         w = 0.5 * h * (b - a)
         if w <= 0.0:
             continue
@@ -64,6 +68,37 @@ def contact(p0, p1, v0, v1, h, k, c, o):
             V0 += n * (1.0 - m) * qv
             V1 += n * m * qv
     return N, N0, N1, V0, V1
+
+
+@kernel
+def stored(line, sea, r, v):
+    """Energy (J) that the bed has stored under the line, and the power (W) that its damping takes out."""
+    energy = power = 0.0
+    n, k, c, o = sea.normal, sea.stiffness, sea.damping, sea.onset
+    for i in range(line.h.shape[0]):
+        p0 = sea.offset - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+        p1 = sea.offset - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
+        if p0 <= 0.0 and p1 <= 0.0:
+            continue
+        v0 = -(n[0] * v[i, 0] + n[1] * v[i, 1] + n[2] * v[i, 2])
+        v1 = -(n[0] * v[i + 1, 0] + n[1] * v[i + 1, 1] + n[2] * v[i + 1, 2])
+        xb, xc = pieces(p0, p1, o)
+        for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
+            w = 0.5 * line.h[i] * (b - a)
+            if w <= 0.0:
+                continue
+            for g in (G1, G2):
+                x = a + g * (b - a)
+                p, s = p0 + x * (p1 - p0), v0 + x * (v1 - v0)
+                if p <= 0.0:
+                    continue
+                if p >= o:
+                    energy += w * k * (0.5 * p * (p - o) + o * o / 6.0)
+                    power += w * c * s * s
+                else:
+                    energy += w * k * p * p * p / (6.0 * o)
+                    power += w * c * s * s * p / o
+    return energy, power
 
 
 @inner

@@ -4,7 +4,11 @@ Plots read the file, through `read.Result`, and nothing else.  matplotlib is imp
 something is drawn, and never pyplot: no window, no display, no state that outlives a call.
 
 Colours are those of Okabe and Ito, which stay apart for colour-blind eyes.  A zone kind has
-one colour on the whole page; points followed over time have others; grey is what was earlier.
+one colour on the whole page; points followed over time have others; grey is what was earlier;
+sand and water are pale, behind everything.
+
+What a file has beside the cable is drawn, and nothing else: `seabed` (unit normal n and n . x on it), `surface` (z
+of the still water), `attached` (arc lengths of floats, clumps and bodies), `touchdown` and `contact`.
 """
 
 from __future__ import annotations
@@ -27,11 +31,15 @@ _Numbers = Sequence[float] | np.ndarray
 _INK, _GREY, _RANGE, _ALARM = "#222222", "#6E6E6E", "#E8E8E8", "#C00000"
 _KIND_COLOURS = {"rod": "#D55E00", "catenary": "#0072B2"}  # kinds that are not named here are drawn in ink
 _POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+_SAND, _BED, _WATER, _LEVEL, _BODY = "#EEE5D0", "#8C6D31", "#EFF6FA", "#4A90C2", "#F0E442"
 _SMALL, _NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
 _SHAPES = 9  # earlier shapes on a page; more become a blur
 _ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
+_ENTRIES = 8  # of a legend, in a row
 _STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
+_NEAR = 0.4  # of the height of a shape: a seabed or a surface so close to it is shown with it
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
+_NAMES |= {"contact": "contact force"}
 _NEWS = ("not judged", "turned in")  # events that warn of nothing
 _AXES = ("x", "y", "z")
 _NAMES |= {x: f"position {x}" for x in _AXES}
@@ -48,9 +56,14 @@ class _View(NamedTuple):
     def project(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         return position @ self.across, position @ self.up
 
+    @property
+    def upright(self) -> bool:
+        return bool(self.up[2] == 1.0)
+
 
 # Pages for one view and for two: panels, widths of columns, heights of rows, and the width over height that these
-# leave for a shape.  s, S: views; p, P: profiles along s; h, H: histories (statics: more profiles).
+# leave for a shape.  s, S: views; p, P: profiles along s; h, H: histories (statics: more profiles).  Where the cable
+# lies on a seabed also c, the contact force along s, and T, the touchdown over time.
 _BLOCK, _COLUMN = [["p", "h"], ["P", "H"]], [["p"], ["P"], ["h"], ["H"]]
 _Pages = list[tuple[list[Any], list[float], list[float], float]]
 _ONE_VIEW: _Pages = [([["s", "s"], *_BLOCK], [1, 1], [h, 1, 1], r) for h, r in ((1.3, 5.1), (1.8, 4.2), (2.5, 3.6))]
@@ -60,6 +73,14 @@ _ONE_VIEW += [([["s", _BLOCK]], [w, 1], [1], r) for w, r in ((0.65, 0.64), (0.45
 _TWO_VIEWS: _Pages = [([["s", "p"], ["S", "P"], ["h", "H"]], [w, 1], [1, 1, 1], r) for w, r in ((1.7, 3.8), (1.2, 3.3))]
 _TWO_VIEWS += [([["s", "p", "h"], ["S", "P", "H"]], [w, 1, 1], [1, 1], r) for w, r in ((2.5, 1.7), (1.6, 1.4), (1, 1))]
 _TWO_VIEWS += [([["s", "S", _COLUMN]], [1, 1, w], [1], r) for w, r in ((1.2, 0.46), (2, 0.36), (3, 0.29))]
+
+_ROWS, _BLOCK_BED = [["p", "P", "c"], ["h", "T", "H"]], [["p", "h"], ["P", "T"], ["c", "H"]]
+_PAIR = [["s"] * 3 + ["S"] * 3, *([name for name in row for _ in "12"] for row in _ROWS)]
+_ONE_VIEW_BED: _Pages = [([["s"] * 3, *_ROWS], [1, 1, 1], [h, 1, 1], r) for h, r in ((1, 5.0), (1.5, 4.0), (2.2, 3.0))]
+_ONE_VIEW_BED += [([["s", _BLOCK_BED]], [w, 1], [1], r) for w, r in ((1, 0.9), (0.7, 0.7), (0.45, 0.5))]
+_TWO_VIEWS_BED: _Pages = [(_PAIR, [1] * 6, [h, 1, 1], r) for h, r in ((1, 2.5), (1.5, 2.0), (2.2, 1.5))]
+_TWO_VIEWS_BED += [([[[["s"], ["S"]], _BLOCK_BED]], [w, 1], [1], r) for w, r in ((1.3, 2.0), (0.9, 1.5), (0.6, 1.0))]
+_TWO_VIEWS_BED += [([["s", "S", _BLOCK_BED]], [1, 1, w], [1], r) for w, r in ((1.6, 0.5), (2.2, 0.35))]
 
 
 def plot_summary(
@@ -84,9 +105,10 @@ def plot_summary(
     if len(result.times) == 0:
         figure.text(0.5, 0.5, "no output was saved", ha="center", fontsize=_NORMAL, color=_GREY)
     else:
-        views = _views(result)
-        pages, drawn = _ONE_VIEW if len(views) == 1 else _TWO_VIEWS, _ratio(views, result.position)
-        panels, widths, heights, _ = min(pages, key=lambda page: abs(math.log(page[3] / drawn)))
+        views, lies = _views(result), _lies(result)
+        pages = (_ONE_VIEW_BED, _TWO_VIEWS_BED) if lies else (_ONE_VIEW, _TWO_VIEWS)
+        drawn = _ratio(views, result)
+        panels, widths, heights, _ = min(pages[len(views) - 1], key=lambda page: abs(math.log(page[3] / drawn)))
         axes = figure.subplot_mosaic(panels, width_ratios=widths, height_ratios=heights)
         points = _history_points(result, history) if len(result.times) > 1 else np.zeros(0)
         for name, view in zip("sS", views, strict=False):
@@ -96,21 +118,27 @@ def plot_summary(
         angles = ("theta", "phi") if len(views) > 1 else ("theta" if views[0].up_label == "z" else "phi",)
         profiles += [n for n in ("curvature", *angles) if n in result]
         profiles += [views[-1].up_label.replace("across", "z"), "x", "y"]
-        for name, quantity in zip("pP" if len(points) else "pPhH", profiles, strict=False):
-            plot_profiles(axes[name], result, quantity)
+        profiles[2:2] = ["contact"] * lies
+        along, over = ("pPc", "hTH") if lies else ("pP", "hH")
+        for name, quantity in zip(along if len(points) else along + over, profiles, strict=False):
+            plot_profiles(axes[name], result, quantity, times=earlier if quantity == "contact" else ())
         if len(points):
             plot_history(axes["h"], result, "tension", points, legend=False)
             moves = np.ptp(result.at(s=points, names=["position"])["position"], axis=0).max(axis=0)
             plot_history(axes["H"], result, "position", points, component=int(moves.argmax()), legend=False)
-        for upper, lower in ("pP", "hH"):
-            if axes[upper].get_position().x0 == axes[lower].get_position().x0:  # they share the axis of s or t
+        if len(points) and lies:
+            plot_touchdown(axes["T"], result)
+        for upper, lower in zip(along + over, along[1:] + " " + over[1:] + " ", strict=True):
+            if lower in axes and axes[upper].get_position().x0 == axes[lower].get_position().x0:  # one axis of s or t
                 axes[upper].set_xlabel("")
                 axes[upper].tick_params(labelbottom=False)
-        for name, y in (("s", foot + 0.0275), ("h", foot + 0.0025))[: 1 + (len(points) > 0)]:
-            entries = dict(zip(*axes[name].get_legend_handles_labels()[::-1], strict=True))
+        entries = [_legend(axes["s"]), _legend(axes["h"]) if len(points) else {}]
+        first, rest = list(entries[0].items()), list(entries[1].items())
+        for row, y in ((first[:_ENTRIES], foot + 0.0275), ([*first[_ENTRIES:], *rest][:_ENTRIES], foot + 0.0025)):
             look: dict[str, Any] = {"fontsize": _SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
             look |= {"loc": "lower center", "bbox_to_anchor": (0.5, y), "ncols": 8, "frameon": False, "borderpad": 0.1}
-            figure.legend(list(entries.values())[:8], list(entries)[:8], labelcolor=_INK, **look)
+            if row:
+                figure.legend([mark for _, mark in row], [n for n, _ in row], labelcolor=_INK, **look)
     if path is not None:
         try:
             figure.savefig(path, dpi=150)
@@ -132,6 +160,7 @@ def plot_shape(
 
     view = _letters(view) if isinstance(view, str) else view or _views(result)[0]
     position, last, s = result.position, result.position[-1], result.s
+    _draw_sea(ax, view, result)
     earlier = _telling_times(result) if times is None else np.asarray(times, dtype=float)
     outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
     strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
@@ -139,9 +168,8 @@ def plot_shape(
     name = "range over time" * bool(np.ptp(position, axis=0).max() > _STILL * np.ptp(position, axis=(0, 1)).max())
     ax.add_collection(PolyCollection(list(strips), color=_RANGE, lw=0.4, zorder=0.4, rasterized=True, label=name))
     for k, shape in enumerate(result.at(t=earlier, names=["position"])["position"]):
-        grey = 0.7 - 0.3 * k / max(len(earlier) - 1, 1)
         name = "_" * (k > 0) + "earlier shapes (later: darker)"
-        ax.plot(*view.project(shape), color=str(grey), linewidth=0.7, zorder=1, label=name)
+        ax.plot(*view.project(shape), color=_earlier_grey(k, len(earlier)), linewidth=0.7, zorder=1, label=name)
     zones = result.zones[-1] or [Zone("cable", float(s[0]), float(s[-1]))]
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
@@ -152,22 +180,32 @@ def plot_shape(
         ax.plot(*view.project(_along(joints, s, last)), zorder=5, **_mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
         ax.plot(*view.project(last[[k]]), zorder=4, **_mark(marker), label="end" if k else "start")
+    if "attached" in result:
+        bodies = view.project(_along(result["attached"], s, last))
+        ax.plot(*bodies, zorder=3.5, **_mark("o", _BODY) | {"markersize": 8}, label="float, clump, body")
+    if "touchdown_position" in result:
+        away = np.abs(result["touchdown"][-1] - [s[0], s[-1]]) > 0.005 * (s[-1] - s[0])  # the ends have marks of their own
+        places = view.project(result["touchdown_position"][-1][away])  # NaN, of a cable that hangs, is not away
+        ax.plot(*places, zorder=5, **_mark("v", _BED), label="touchdown" if away.any() else "_")
     for k, point in enumerate(points):
         ax.plot(*view.project(_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
-    wider, taller = _magnified(view, position)
+    wider, taller = _magnified(view, result)
     factors = zip((view.across_label.split(",")[0], view.up_label), (wider, taller), strict=True)
     stretch = "".join(f", {name} × {factor:g}" for name, factor in factors if factor > 1.0)
     above = "" if "z" in (view.across_label, view.up_label) else " from above"
     _style(ax, f"shape{above}{_at(result, -1)}{stretch}", f"{view.across_label} (m)", f"{view.up_label} (m)")
+    ax.update_datalim(_extent(view, result).T)
     ax.margins(0.06)
     ax.set_aspect(taller / wider, adjustable="datalim")
 
 
-def plot_profiles(ax: Axes, result: Result, names: str | Sequence[str], *, output: int = -1) -> None:
+def plot_profiles(
+    ax: Axes, result: Result, names: str | Sequence[str], *, output: int = -1, times: _Numbers = ()
+) -> None:
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
     The zones of that output are shaded.  Further names after the first are dashed, and left
-    out where they are zero everywhere.
+    out where they are zero everywhere.  times: other times at which to show the first, in grey.
     """
     names = [names] if isinstance(names, str) else list(names)
     for zone in result.zones[output]:
@@ -187,6 +225,9 @@ def plot_profiles(ax: Axes, result: Result, names: str | Sequence[str], *, outpu
                 ax.set_ylim(low.min() - 0.1 * usual, 1.5 * usual)
                 spike = f"peak {high.max():.3g} {unit} at s = {result.s[high.argmax()]:.4g} m"
                 ax.text(0.03, 0.91, spike, transform=ax.transAxes, fontsize=_SMALL, color=_INK)
+        for n, t in enumerate(times if k == 0 else ()):
+            then = values[int(np.abs(result.times - t).argmin())]
+            ax.plot(result.s, then * factor, color=_earlier_grey(n, len(times)), linewidth=0.7, zorder=2.5, label="_")
         line: dict[str, Any] = {"color": _INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
         ax.plot(result.s, values[output] * factor, zorder=3, label=_title(name), **line)
     short = _title(names[0]).replace("bending ", "")
@@ -229,6 +270,21 @@ def plot_history(
         ax.legend(fontsize=_SMALL, framealpha=0.75, edgecolor="none", handlelength=1.2, borderpad=0.2)
 
 
+def plot_touchdown(ax: Axes, result: Result) -> None:
+    """Between which arc lengths the cable lies on the seabed, over time: sand; nothing while it hangs free."""
+    edges, s = result["touchdown"], result.s
+    known = np.isfinite(edges).all(axis=1)
+    held = np.abs(edges[known] - s[[0, -1]]).max(axis=0, initial=0.0) < 0.005 * (s[-1] - s[0])  # lies to its very end
+    for k in (0, 1) if held.all() else np.flatnonzero(~held):
+        ax.plot(result.times, edges[:, k], color=_BED, linewidth=1.3, zorder=3, label=("first", "last")[k] + " contact")
+    _style(ax, "touchdown over time", "t (s)", "touchdown, s (m)")
+    ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # as the histories beside it
+    _open_up(ax, float(s[-1]))
+    low, high = ax.get_ylim()
+    ax.fill_between(result.times, *edges.T, color=_SAND, linewidth=0, zorder=0.2)
+    ax.set_ylim(low, high)
+
+
 # ---- what to look at ------------------------------------------------------------------------------
 
 
@@ -245,7 +301,7 @@ def _views(result: Result) -> list[_View]:
     along = _View(np.array([*ahead, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")
     if _is_flat(result.position, sideways):
         return [along]
-    if z >= max(x, y):
+    if z >= max(x, y) and not _lies(result):
         return [_letters("xz"), _letters("yz")]
     if np.ptp(level @ sideways[:2]) < 0.08 * min(x, y):  # in x-y it would be a mere line
         return [along, along._replace(up=sideways, up_label="across")]
@@ -268,9 +324,38 @@ def _letters(plane: str) -> _View:
     return _View(*(np.eye(3)["xyz".index(c)] for c in plane), *plane)
 
 
-def _magnified(view: _View, position: np.ndarray) -> tuple[float, float]:
+def _lies(result: Result) -> bool:
+    """Whether the cable ever touches a seabed."""
+    return "contact" in result and "touchdown" in result and bool(np.isfinite(result["touchdown"]).any())
+
+
+def _bed_in(view: _View, result: Result) -> tuple[float, float] | None:
+    """The seabed in an upright view, where the cable lies: height at the origin, and rise per metre across."""
+    if "seabed" not in result or not view.upright:
+        return None
+    *normal, offset = result["seabed"]
+    out, last = np.cross(view.across, view.up), result.position[-1]
+    lying = result["contact"][-1] > 0.0 if "contact" in result else np.zeros(len(last), bool)
+    depth = float((last[lying] if lying.any() else last).mean(axis=0) @ out)  # of the bed, behind the paper
+    return (offset - depth * (normal @ out)) / normal[2], -(normal @ view.across) / normal[2]
+
+
+def _extent(view: _View, result: Result) -> np.ndarray:
+    """What is to be seen, low and high, across and up (2, 2): the cable, and a seabed or a surface near to it."""
+    across, up = view.project(result.position)
+    box = np.array([[across.min(), across.max()], [up.min(), up.max()]])
+    room = _NEAR * max(np.ptp(box[1]), 0.3 * np.ptp(box[0]))
+    bed = _bed_in(view, result)
+    if bed is not None and np.min(up - bed[0] - bed[1] * across) < room:
+        box[1, 0] = min(box[1, 0], max(bed[0] + min(bed[1] * box[0]), box[1, 0] - room))
+    if "surface" in result and view.upright and box[1, 0] < float(result["surface"]) < box[1, 1] + room:
+        box[1, 1] = max(box[1, 1], float(result["surface"]))
+    return box
+
+
+def _magnified(view: _View, result: Result) -> tuple[float, float]:
     """Factors across and up: 1, but a round number that opens the smaller one where it would be a mere line."""
-    across, up = (float(np.ptp(p)) for p in view.project(position))
+    across, up = np.ptp(_extent(view, result), axis=1).tolist()
     ratio = min(across, up) / max(across, up, 1e-300)
     if not _STILL < ratio < 0.08:  # straighter than that is straight; less straight needs no help
         return 1.0, 1.0
@@ -280,9 +365,9 @@ def _magnified(view: _View, position: np.ndarray) -> tuple[float, float]:
     return (1.0, factor) if up < across else (factor, 1.0)
 
 
-def _ratio(views: list[_View], position: np.ndarray) -> float:
+def _ratio(views: list[_View], result: Result) -> float:
     """Width over height as drawn; the geometric mean of the views; of a straight line, something large or small."""
-    sizes = np.array([np.ptp(v.project(position), axis=(1, 2)) * _magnified(v, position) for v in views])
+    sizes = np.array([np.ptp(_extent(v, result), axis=1) * _magnified(v, result) for v in views])
     sizes += 1e-9 * sizes.max() + 1e-300
     return float(np.exp(np.mean(np.log(sizes[:, 0] / sizes[:, 1]))))
 
@@ -306,9 +391,9 @@ def _telling_times(result: Result) -> np.ndarray:
 
 
 def _history_points(result: Result, history: _Numbers | None) -> np.ndarray:
-    """By default the middle and the ends, or where an end is held the quarter point beside it."""
+    """By default the middle and the ends, or where an end is held the quarter point beside it; on a seabed the ends."""
     moves = np.ptp(result.position, axis=0).max(axis=1)
-    start, end = (bool(m <= 1e-3 * moves.max()) for m in moves[[0, -1]])  # held
+    start, end = (bool(m <= 1e-3 * moves.max()) and not _lies(result) for m in moves[[0, -1]])  # held
     quarters = np.linspace(result.s[0], result.s[-1], 5)[[start, 2, 4 - end]]
     given = result["history"] if history is None and "history" in result else history
     points = np.asarray(quarters if given is None else given, dtype=float)
@@ -339,6 +424,37 @@ def _at(result: Result, output: int) -> str:
     return f" at t = {result.times[output]:.5g} s" if len(result.times) > 1 else ""
 
 
+def _earlier_grey(k: int, count: int) -> str:
+    return str(0.7 - 0.3 * k / max(count - 1, 1))
+
+
+def _legend(ax: Axes) -> dict[str, Any]:
+    """What an Axes shows, each name once."""
+    return dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
+
+
+def _draw_sea(ax: Axes, view: _View, result: Result) -> None:
+    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
+    from matplotlib.patches import Polygon
+
+    bed, box = _bed_in(view, result), _extent(view, result)
+    middle, far = box.mean(axis=1), 30.0 * float(np.ptp(box, axis=1).max())  # more than any panel shows
+    x, deep = middle[0] + far * np.array([-1.0, 1.0]), middle[1] - far
+    top = int(np.argmax(view.project(result.position[-1])[1]))
+    aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
+    planes = [(float(result["surface"]), 0.0, _WATER, _LEVEL, "still water", 2)] if "surface" in result and view.upright else []
+    planes += [(*bed, _SAND, _BED, "seabed", -3)] if bed else []
+    for n, (height, rise, fill, line, name, lift) in enumerate(planes):
+        z, at = height + rise * x, box[0, aside]
+        corners = [(x[0], z[0]), (x[1], z[1]), (x[1], min(z[1], deep)), (x[0], min(z[0], deep))]
+        ax.add_artist(Polygon(corners, facecolor=fill, edgecolor="none", zorder=0.1 + 0.1 * n))
+        ax.add_artist(Polygon(corners[:2], closed=False, edgecolor=line, linewidth=0.9, zorder=0.6))
+        ax.annotate(
+            name, (at, height + rise * at), (0, lift), textcoords="offset points", color=line, fontsize=_SMALL,
+            ha=("left", "right")[aside], va="bottom" if lift > 0 else "top",
+        )  # fmt: skip
+
+
 def _mark(symbol: str, face: str = _INK) -> dict[str, Any]:
     edge = {"markeredgecolor": _INK, "markeredgewidth": 0.8}
     return {"linestyle": "", "marker": symbol, "markersize": 4.5, "markerfacecolor": face, **edge}
@@ -357,7 +473,7 @@ def _prefix(unit: str, peak: float) -> tuple[float, str]:
         return 1e3, "1/km"
     if unit == "m":
         return (1e3, "mm") if _ZERO < peak < 0.01 else (1e-3, "km") if peak >= 1e4 else (1.0, "m")
-    if unit.split(" ")[0] in ("N", "J", "W", "Pa") and peak > _ZERO:
+    if unit.replace("/", " ").split(" ")[0] in ("N", "J", "W", "Pa") and peak > _ZERO:
         power = min(max(math.floor(math.log10(peak) / 3.0 + 1e-12), -4), 4)
         return 10.0 ** (-3 * power), ("p", "n", "µ", "m", "", "k", "M", "G", "T")[power + 4] + unit
     return 1.0, unit or "–"

@@ -37,11 +37,13 @@ from hybrid.physics.rotations import (
 from hybrid.solve.blocks import ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
 from hybrid.solve.node import Z3, Z9, get3, node_loads
 
-REPORT = 22  # numbers of `report`
+REPORT, STEP_REPORT = 28, 22  # numbers of `report`; those from 22 on are not the march's
 # report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
 #         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
-#         17 power into the added mass, 18 power of waves and of buoyancy at the surface, 19 of contact, 20 of friction,
-#         21 force of the seabed along its normal
+#         17 power into the added mass, 18 power of waves and of buoyancy at the surface, 20 of friction,
+#         21 force of the seabed along its normal; of a whole step (solve.step.advance): 19 power of
+#         the damping of contact, 22-25 `sharpest`,
+#         26 lowest tension of a catenary cell, 27 that cell
 
 
 @inner
@@ -72,7 +74,7 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
     n = e.shape[0]
     bits = line.bits
     moving = bits & (ROTARY | STIFFNESS_DAMPING)
-    for j in range(REPORT):
+    for j in range(STEP_REPORT):
         report[j] = 0.0
     report[16] = -1.0
 

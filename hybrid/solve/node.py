@@ -133,7 +133,6 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
             touched += h
     F, slope, q = scale(N, n), n, (0.0, 0.0, 0.0)
     D = Z9
-    report[19] += N * -pd
     report[21] += N
     if line.bits & FRICTION and N > 0.0:
         w = dot(n, get3(u, i))

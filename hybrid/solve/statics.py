@@ -13,7 +13,7 @@ from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
-from hybrid.solve.step import lay, newton, slackest
+from hybrid.solve.step import lay, lowest, newton
 from hybrid.solve.timestep import Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
@@ -164,9 +164,9 @@ class _Solver:
         new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
         new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
         if outcome == Outcome.OK:
-            slack = slackest(line, new.T, self.floor)
-            if slack >= 0:
-                outcome, where = Outcome.SLACK, slack
+            tension, cell = lowest(line, new.T)
+            if not tension > self.floor:
+                outcome, where = Outcome.SLACK, cell
         judged = line is self.line and sea is None and is_judged(line, ends, self.length)
         if outcome == Outcome.OK and judged and not self.stable(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
@@ -377,6 +377,7 @@ def solve_statics(
 
 def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equilibrium:
     residual = solver.prove(ends, state)
-    slack = slackest(solver.line, state.T, solver.floor)
+    tension, cell = lowest(solver.line, state.T)
+    slack = -1 if tension > solver.floor else cell
     judged = is_judged(solver.line, ends, solver.length) or not solver.line.element.any()
     return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), judged)

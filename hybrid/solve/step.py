@@ -12,8 +12,9 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
-from hybrid.physics.loads import FRICTION, WAVES
+from hybrid.physics.loads import FRICTION, SEABED, WAVES
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
+from hybrid.physics.seabed import stored
 from hybrid.physics.water import stir
 from hybrid.solve.blocks import substitute
 from hybrid.solve.march import get9, march
@@ -230,6 +231,16 @@ def widest_turn(e, u):
 
 
 @kernel
+def lowest(line, T):
+    """Lowest tension of a catenary zone and its cell; infinity and -1 without one."""
+    where, low = -1, math.inf
+    for i in range(T.shape[0]):
+        if not line.spin[i] and not T[i] > low:
+            where, low = i, T[i]
+    return low, where
+
+
+@kernel
 def lay(sea, e, slip):
     """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
     n, last = sea.normal, e.shape[0]
@@ -323,14 +334,9 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
         turn, cell = widest_turn(old.e, u)
         if not turn < LARGEST_STEP_TURN:
             outcome, where = TURNED_TOO_FAR, cell
+        report[22], report[23], report[24], report[25] = sharpest(line, ends, new.e, new.T, new.a1)
+        report[26], report[27] = lowest(line, new.T)
+        if line.bits & SEABED:
+            _, power = stored(line, sea, new.r, new.v)
+            report[19] = -power
     return outcome, iterations, left, where
-
-
-@kernel
-def slackest(line, T, floor):
-    """Cell of a catenary zone whose tension is lowest and not above `floor`, or -1."""
-    where, low = -1, floor
-    for i in range(T.shape[0]):
-        if not line.spin[i] and not T[i] > low:
-            where, low = i, T[i]
-    return where

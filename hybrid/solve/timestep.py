@@ -11,12 +11,12 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import FRICTION, WAVES
-from hybrid.physics.seabed import contact
+from hybrid.physics.loads import FRICTION, SEABED, WAVES
+from hybrid.physics.seabed import contact, stored
 from hybrid.physics.water import stir
 from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
-from hybrid.solve.step import advance, lay, slackest
+from hybrid.solve.step import advance, lay
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
@@ -64,6 +64,9 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
     return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
 
 
+OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
+
+
 class Stepper:
     """Takes steps of one line; owns the work arrays, not the state."""
 
@@ -74,6 +77,7 @@ class Stepper:
         n = line.h.size
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.u = np.zeros((n + 1, 3))
+        self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time."""
@@ -81,11 +85,10 @@ class Stepper:
             self.line, sea, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
             self.gaps, self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
-        if outcome == Outcome.OK:
-            slack = slackest(self.line, new.T, self.floor)
-            if slack >= 0:
-                outcome, where = Outcome.SLACK, slack
-        return Taken(Outcome(outcome), iterations, left, where, float(self.report[15]))
+        self.told = told = self.report.tolist()
+        if outcome == OK and not told[26] > self.floor:
+            outcome, where = Outcome.SLACK, int(told[27])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[15])
 
     def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
@@ -145,27 +148,31 @@ class Stepper:
             self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
             0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
-        return Taken(Outcome.OK, 1, 0.0, -1, float(self.report[15]))
+        if self.line.bits & SEABED:
+            self.report[19] = -stored(self.line, sea, state.r, state.v)[1]
+        self.told = self.report.tolist()
+        return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
 
-    def powers(self, ends: Ends, velocity: Floats, state: State) -> Floats:
+    def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""
-        f, n = self.report, self.line.h.size
-        out = np.empty(len(POWERS))
-        applied = 0.0
-        for k, node, cell, force, moment in ((0, 0, 0, f[0:3], -f[6:9]), (1, n, n - 1, f[3:6], f[9:12])):
-            out[k] = 0.0
+        f, n = self.told, self.line.h.size
+        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18], f[19], f[20]]
+        for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
             if ends.held[k]:
-                out[k] = -float(force @ velocity[k])
-            else:
-                applied += float(ends.force[k] @ state.v[node])
+                out[k] -= _dot(f[3 * k : 3 * k + 3], velocity[k])
+            elif ends.force[k].any():
+                out[2] += _dot(ends.force[k].tolist(), state.v[node])
             if self.line.element[node]:
-                out[k] += float(moment @ ends.spin[k])
+                moment = _dot(f[6 + 3 * k : 9 + 3 * k], ends.spin[k])
+                out[k] += moment if k else -moment
             elif self.line.spin[cell] and ends.moment[k].any():
                 e = state.e[cell]
                 e1 = state.v[cell + 1] - state.v[cell]
                 omega = np.cross(e, e1) / (e @ e) + state.w[cell] * e / np.sqrt(e @ e)
-                applied += float(ends.moment[k] @ omega)
-        out[2] = applied
-        out[3], out[4], out[5], out[6] = -f[12], -f[13], -f[14], -f[17]
-        out[7:] = f[18:21]
+                out[2] += float(ends.moment[k] @ omega)
         return out
+
+
+def _dot(a: list[float], b: Floats) -> float:
+    x, y, z = b.tolist()
+    return float(a[0] * x + a[1] * y + a[2] * z)

@@ -1,0 +1,52 @@
+"""Why a scene may have no equilibrium, or none that a flexible line can hold: said when the search has failed."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.model.properties import net_weight
+from hybrid.scene.schema import Body, Free, Scene
+
+# A line that is longer than taut by less than this part of its length is not called slack.
+HARDLY = 1e-3
+
+
+def reasons_against(scene: Scene) -> list[str]:
+    """What speaks against an equilibrium of the scene, in sentences; empty when nothing is known."""
+    found = []
+    bed, held = scene.environment.seabed, scene.ends.held()
+    weight = net_weight(scene)
+    if bed is not None and weight > 0.0 and len(held) == 2:
+        (xa, ya, za), (xb, yb, zb) = held["start"], held["end"]
+        # the longest way that can be taut: straight up from the bed, and along it
+        heights = [z - bed.height(x, y) for x, y, z in (held["start"], held["end"])]
+        along = math.dist((xa, ya, za - heights[0]), (xb, yb, zb - heights[1]))
+        over = scene.length - along - sum(max(h, 0.0) for h in heights)
+        if over > HARDLY * scene.length:
+            found.append(
+                f"the cable is {over:.4g} m longer than from end to end along the seabed and straight up: "
+                f"that much lies slack on it, where only bending and friction give it a shape"
+            )
+    if bed is not None and weight > 0.0:
+        for name, end in (("start", scene.ends.start), ("end", scene.ends.end)):
+            if isinstance(end, Free) and end.force is None and held and not bed.friction:
+                found.append(
+                    f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
+                    f"and a flexible line without tension has no shape (a rod has)"
+                )
+    if bed is not None and not held and bed.slope is not None:
+        slope = math.hypot(*bed.slope)
+        least = min(bed.friction.axial, bed.friction.lateral) if bed.friction else 0.0
+        if slope > least:
+            found.append(
+                f"the seabed slopes by {math.degrees(math.atan(slope)):.3g} deg and friction holds up to "
+                f"{math.degrees(math.atan(least)):.3g} deg: nothing else keeps the cable from sliding"
+            )
+    if not weight and not any(isinstance(x, Body) for x in (scene.ends.start, scene.ends.end)) and len(held) == 2:
+        apart = math.dist(held["start"], held["end"])
+        if scene.length > apart * (1.0 + HARDLY):
+            found.append(
+                f"the cable has no weight in its surroundings and is {scene.length - apart:.4g} m longer than its "
+                f"span: nothing tautens it"
+            )
+    return found
