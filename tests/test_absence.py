@@ -13,7 +13,20 @@ import pytest
 
 import hybrid
 from hybrid.model.build import Model, build
-from hybrid.physics.loads import ADDED_MASS, DRAG, FORCES, MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
+from hybrid.physics.loads import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    FORCES,
+    FRICTION,
+    MASS_DAMPING,
+    ROTARY,
+    SEABED,
+    STIFFNESS_DAMPING,
+    SURFACE,
+    WAVES,
+)
 
 BARE = {"length": 2.0, "mass": 0.1}
 BENDS = BARE | {"bending_stiffness": 1.0e-2}
@@ -29,7 +42,33 @@ PARAMETERS = {
     "tau": STIFFNESS_DAMPING,
     "rotary": ROTARY,
     "polar": ROTARY,
+    "buoy": SURFACE,
+    "diameter": SURFACE,
+    "displaced": WAVES,
+    **dict.fromkeys(("point_drag", "point_added", "point_buoy", "point_displaced", "point_height"), BODIES),
 }
+SEA_PARAMETERS = {
+    "surface": SURFACE,
+    "offset": SEABED,
+    "stiffness": SEABED,
+    "damping": SEABED,
+    "onset": SEABED,
+    "slip_length": FRICTION,
+    "friction": FRICTION,
+    "depth": WAVES,
+}
+
+
+def wet(**more: Any) -> dict[str, Any]:
+    return {"environment": {"fluid": {"density": 1000.0} | more}}
+
+
+def bed(**more: Any) -> dict[str, Any]:
+    return {"environment": {"seabed": {"z": -1.5, "stiffness": 100.0} | more}}
+
+
+def on_it(**attachment: Any) -> dict[str, Any]:
+    return {"cable": {"sections": [BARE | {"diameter": 0.01}], "attachments": [attachment]}}
 
 
 def scene(section: dict[str, Any], model: Any = "catenary", **tables: Any) -> hybrid.Scene:
@@ -60,6 +99,25 @@ SCENES = {
     "rotary inertia": (scene(BENDS | {"rotary_inertia": 1e-5}, "rod"), ROTARY),
     "diameter of a rod": (scene(BENDS | {"diameter": 0.01}, "rod"), ROTARY),
     "diameter of a catenary": (scene(BARE | {"diameter": 0.01}), 0),
+    "current without drag": (scene(BARE | {"diameter": 0.01}, **wet(current=[1, 0, 0])), FLOW),
+    "surface": (scene(BARE | {"diameter": 0.005}, **wet(surface=1.0)), SURFACE),
+    "waves": (
+        scene(
+            BARE | {"diameter": 0.005},
+            **wet(surface=1.0, waves={"kind": "regular", "height": 0.1, "period": 3, "depth": 9}),
+        ),
+        SURFACE | WAVES,
+    ),
+    "seabed": (scene(BENDS, "rod", **bed()), SEABED),
+    "friction": (scene(BENDS, "rod", **bed(friction=0.3)), SEABED | FRICTION),
+    "friction of zero": (scene(BENDS, "rod", **bed(friction=0)), SEABED),
+    "clump": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2)), 0),
+    "clump with drag": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2, drag_area=0.01)), BODIES),
+    "modules": (scene(BARE, **WET, **on_it(kind="modules", over=[0.5, 1.0], buoyancy=0.1)), 0),
+    "modules with drag": (
+        scene(BARE, **WET, **on_it(kind="modules", over=[0.5, 1.0], buoyancy=0.1, drag_area=0.01)),
+        DRAG,
+    ),
     "damping of zero": (scene(BARE | {"damping": {"mass": 0.0, "stiffness": 0.0}}), 0),
     "everything": (
         scene(
@@ -77,8 +135,13 @@ each_scene = pytest.mark.parametrize(("asked", "bits"), SCENES.values(), ids=SCE
 
 @each_scene
 def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits: int) -> None:
-    line = build(asked).line
+    model = build(asked)
+    line = model.line
     assert line.bits == bits
+    for name, bit in SEA_PARAMETERS.items():
+        value = getattr(model.sea.values, name)
+        assert np.isnan(value).any() != bool(bits & bit), name
+    assert bool(model.sea.values.waves.size) == bool(bits & WAVES)
     for name, bit in PARAMETERS.items():
         value = getattr(line, name)
         assert (np.isfinite(value) if bits & bit else np.isnan(value)).all(), name
@@ -103,7 +166,7 @@ def test_a_parameter_that_is_off_is_never_read(asked: hybrid.Scene, bits: int) -
     result = hybrid.run(asked)
     assert result.status == "complete"
     for name in result.names:
-        if result[name].dtype.kind == "f":
+        if result[name].dtype.kind == "f" and not name.startswith("touchdown"):  # NaN where nothing touches
             assert np.isfinite(result[name]).all(), name
 
 
@@ -144,6 +207,15 @@ def test_a_catenary_records_no_moments() -> None:
     names = set(hybrid.run(scene(BENDS)).names)
     assert not names & ROD_ONLY
     assert set(hybrid.run(scene(BENDS, "rod")).names) >= names | ROD_ONLY
+
+
+BED_ONLY = {"contact", "contact_force", "grounded_length", "touchdown", "touchdown_position", "energy/contact"}
+
+
+def test_no_seabed_no_touchdown() -> None:
+    assert not BED_ONLY | {"seabed", "surface", "attached"} <= set(hybrid.run(scene(BENDS, "rod")).names)
+    names = set(hybrid.run(scene(BENDS, "rod", **bed())).names)
+    assert names >= BED_ONLY | {"seabed"} and not names & {"surface", "attached"}
 
 
 def test_no_history_without_history(tmp_path: Any) -> None:

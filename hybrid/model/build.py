@@ -25,7 +25,7 @@ from hybrid.model.properties import (
     tension_scale,
     torsional_stiffness,
 )
-from hybrid.model.sea import Surroundings, surroundings
+from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import attachment_cuts, corners, ends_and_frames, hung, initial_nodes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.model.water import water
@@ -48,6 +48,7 @@ class Model:
     ends: EndConditions
     sea: Surroundings
     start: State
+    start_shape: str  # what it is, for people
     ledger: tuple[Entry, ...]
     length: float  # m
     tension_scale: float  # N
@@ -128,7 +129,7 @@ def build(scene: Scene) -> Model:
     damp = np.full(n + 1, np.nan)
     bed = scene.environment.seabed
     if bed is not None:
-        bits |= SEABED | (FRICTION if bed.friction and (bed.friction.axial or bed.friction.lateral) else 0)
+        bits |= SEABED | (FRICTION if rubs(bed) else 0)
     if any(damping(x).mass for x in sections):
         bits |= MASS_DAMPING
         damp = to_nodes(h * per_cell(lambda x: x.mass * damping(x).mass))
@@ -151,11 +152,12 @@ def build(scene: Scene) -> Model:
     )  # fmt: skip
 
     start = blank_state(n)
-    start.r[:] = initial_nodes(scene, s)
+    start.r[:], shape_name = initial_nodes(scene, s)
     start.T[:] = scale
     shape = hung(scene, line, sea.values)
     if shape is not None:
         start.r[:], start.T[:] = shape
+        shape_name = "an elastic catenary under all loads"
     start.e[:] = np.diff(start.r, axis=0)
     if isinstance(scene.initial, Points):
         _exact_lengths(start, h, compliance == 0.0, scene)
@@ -168,7 +170,7 @@ def build(scene: Scene) -> Model:
     ends, frames = ends_and_frames(scene, start.e, rod, sea)
     start.a1[:] = frames
     return Model(
-        line=line, zones=zones, ends=ends, sea=sea, start=start,
+        line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name,
         ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),

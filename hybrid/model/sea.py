@@ -78,12 +78,19 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
     if bed is not None:
         slope = bed.slope or (0.0, 0.0)
         normal = np.array([0.0 - slope[0], 0.0 - slope[1], 1.0]) / math.hypot(*slope, 1.0)
-        friction = np.array([bed.friction.axial, bed.friction.lateral] if bed.friction else [np.nan, np.nan])
         sea = sea._replace(
             normal=normal, offset=float(normal[2] * bed.z), stiffness=bed.stiffness, damping=bed.damping,
-            onset=ONSET * pressing(scene) / bed.stiffness, friction=friction, slip_length=slip_length(scene, bed),
+            onset=ONSET * pressing(scene) / bed.stiffness,
         )  # fmt: skip
+        if rubs(bed):
+            friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
+            sea = sea._replace(friction=friction, slip_length=slip_length(scene, bed))
     return Surroundings(sea, current_ramp, wave_ramp)
+
+
+def rubs(bed: Seabed | None) -> bool:
+    """Whether a seabed has friction."""
+    return bed is not None and bed.friction is not None and (bed.friction.axial > 0.0 or bed.friction.lateral > 0.0)
 
 
 def pressing(scene: Scene) -> float:

@@ -19,26 +19,26 @@ from hybrid.scene.schema import Clamped, Equilibrium, Guided, Points, Scene, Str
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 
 
-def initial_nodes(scene: Scene, s: Floats) -> Floats:
-    """First positions of the nodes (N+1, 3), m; what hangs is refined by `hung` once its loads are known."""
+def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
+    """First positions of the nodes (N+1, 3), m, and the shape's name; what hangs is refined by `hung`."""
     start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
     initial, length = scene.initial, scene.length
     if isinstance(initial, Points):
-        return along_polyline(np.array(initial.points, float), s)
+        return along_polyline(np.array(initial.points, float), s), "the polyline given"
     if isinstance(initial, Straight):
         direction = np.array(initial.direction, float) / np.linalg.norm(initial.direction)
         origin = initial.origin or start
         first = np.array(origin, float) if origin else np.array(end, float) - length * direction
-        return first + s[:, None] * direction
+        return first + s[:, None] * direction, "the straight line given"
     assert isinstance(initial, Equilibrium)
     if initial.points is not None:
-        return along_polyline(np.array(initial.points, float), s)
+        return along_polyline(np.array(initial.points, float), s), "the polyline given"
     down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
     start, end = (x or getattr(e, "near", None) for x, e in ((start, scene.ends.start), (end, scene.ends.end)))
     if start and end and initial.guess == "span":
-        return np.array(start) + (s / length)[:, None] * np.subtract(end, start)
+        return np.array(start) + (s / length)[:, None] * np.subtract(end, start), "the straight span"
     if start and end and initial.guess != "straight":
-        return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0)
+        return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0), "an arc"
     if initial.direction is not None:
         direction = np.array(initial.direction, float)
     else:
@@ -46,13 +46,8 @@ def initial_nodes(scene: Scene, s: Floats) -> Floats:
         hanging = -1.0 if down == bool(start) else 1.0
         direction = np.array(tangent if tangent else (0.0, 0.0, hanging), float)
     direction /= np.linalg.norm(direction)
-    if not start and not end:  # on the seabed, or at the surface: somewhere near the origin, level
-        bed, fluid = scene.environment.seabed, scene.environment.fluid
-        level = bed.z if bed and down else fluid.surface if fluid and fluid.surface is not None else 0.0
-        direction = direction if initial.direction is not None else np.array([1.0, 0.0, 0.0])
-        return np.array([0.0, 0.0, level]) + (s - 0.5 * length)[:, None] * direction
     first = np.array(start, float) if start else np.array(end, float) - length * direction
-    return first + s[:, None] * direction
+    return first + s[:, None] * direction, "a straight line"
 
 
 def along_polyline(points: Floats, s: Floats) -> Floats:

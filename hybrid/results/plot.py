@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -74,13 +75,16 @@ _TWO_VIEWS: _Pages = [([["s", "p"], ["S", "P"], ["h", "H"]], [w, 1], [1, 1, 1], 
 _TWO_VIEWS += [([["s", "p", "h"], ["S", "P", "H"]], [w, 1, 1], [1, 1], r) for w, r in ((2.5, 1.7), (1.6, 1.4), (1, 1))]
 _TWO_VIEWS += [([["s", "S", _COLUMN]], [1, 1, w], [1], r) for w, r in ((1.2, 0.46), (2, 0.36), (3, 0.29))]
 
-_ROWS, _BLOCK_BED = [["p", "P", "c"], ["h", "T", "H"]], [["p", "h"], ["P", "T"], ["c", "H"]]
-_PAIR = [["s"] * 3 + ["S"] * 3, *([name for name in row for _ in "12"] for row in _ROWS)]
-_ONE_VIEW_BED: _Pages = [([["s"] * 3, *_ROWS], [1, 1, 1], [h, 1, 1], r) for h, r in ((1, 5.0), (1.5, 4.0), (2.2, 3.0))]
-_ONE_VIEW_BED += [([["s", _BLOCK_BED]], [w, 1], [1], r) for w, r in ((1, 0.9), (0.7, 0.7), (0.45, 0.5))]
-_TWO_VIEWS_BED: _Pages = [(_PAIR, [1] * 6, [h, 1, 1], r) for h, r in ((1, 2.5), (1.5, 2.0), (2.2, 1.5))]
-_TWO_VIEWS_BED += [([[[["s"], ["S"]], _BLOCK_BED]], [w, 1], [1], r) for w, r in ((1.3, 2.0), (0.9, 1.5), (0.6, 1.0))]
-_TWO_VIEWS_BED += [([["s", "S", _BLOCK_BED]], [1, 1, w], [1], r) for w, r in ((1.6, 0.5), (2.2, 0.35))]
+_ROW, _BLOCK_BED = ["h", "T", "H"], [["p", "h"], ["P", "T"], ["c", "H"]]
+_BESIDE = [["s", "s", name] for name in "pPc"]
+_PAIR = [["s"] * 3 + ["S"] * 3, *([name for name in row for _ in "12"] for row in (["p", "P", "c"], _ROW))]
+_ONE_VIEW_BED: _Pages = [
+    ([["s"] * 3, ["p", "P", "c"], _ROW], [1] * 3, [h, 1, 1], r) for h, r in ((1, 6.5), (1.5, 5.1), (2.2, 4.1))
+]
+_ONE_VIEW_BED += [([*_BESIDE, _ROW], [1] * 3, [1, 1, 1, h], r) for h, r in ((1.3, 1.57), (1, 1.48))]
+_ONE_VIEW_BED += [([["s", _BLOCK_BED]], [w, 1], [1], r) for w, r in ((0.7, 0.66), (0.5, 0.54), (0.35, 0.42))]
+_TWO_VIEWS_BED: _Pages = [(_PAIR, [1] * 6, [h, 1, 1], r) for h, r in ((1, 3.0), (1.5, 2.3), (2.2, 1.9))]
+_TWO_VIEWS_BED += [([[[["s"], ["S"]], _BLOCK_BED]], [w, 1], [1], r) for w, r in ((0.75, 1.4), (0.6, 1.2), (0.45, 0.95))]
 
 
 def plot_summary(
@@ -175,7 +179,7 @@ def plot_shape(
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
         piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
         ax.plot(*view.project(piece), color=_KIND_COLOURS.get(zone.kind, _INK), lw=2.0, zorder=3, label=zone.kind)
-    joints = np.array([z.s_b for z in zones[:-1]])
+    joints = np.array([a.s_b for a, b in pairwise(zones) if a.kind != b.kind])  # else one zone is merely cut in two
     if len(joints):
         ax.plot(*view.project(_along(joints, s, last)), zorder=5, **_mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
@@ -184,7 +188,7 @@ def plot_shape(
         bodies = view.project(_along(result["attached"], s, last))
         ax.plot(*bodies, zorder=3.5, **_mark("o", _BODY) | {"markersize": 8}, label="float, clump, body")
     if "touchdown_position" in result:
-        away = np.abs(result["touchdown"][-1] - [s[0], s[-1]]) > 0.005 * (s[-1] - s[0])  # the ends have marks of their own
+        away = np.abs(result["touchdown"][-1] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own marks
         places = view.project(result["touchdown_position"][-1][away])  # NaN, of a cable that hangs, is not away
         ax.plot(*places, zorder=5, **_mark("v", _BED), label="touchdown" if away.any() else "_")
     for k, point in enumerate(points):
@@ -213,7 +217,7 @@ def plot_profiles(
     ax.set_xlim(result.s[0], result.s[-1])
     drawn = [(name, _scalar(result, name)) for k, name in enumerate(names) if k == 0 or name in result]
     peak = float(np.abs(drawn[0][1]).max())
-    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(_ZERO, 1e-6 * peak)]
+    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(_ZERO, 5e-3 * peak)]  # what can be seen
     peak = max(float(np.abs(v).max()) for _, v in drawn)
     factor, unit = _prefix("m" if names[0] in _AXES else result.units[names[0]], peak)
     for k, (name, values) in enumerate(drawn):
@@ -230,7 +234,7 @@ def plot_profiles(
             ax.plot(result.s, then * factor, color=_earlier_grey(n, len(times)), linewidth=0.7, zorder=2.5, label="_")
         line: dict[str, Any] = {"color": _INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
         ax.plot(result.s, values[output] * factor, zorder=3, label=_title(name), **line)
-    short = _title(names[0]).replace("bending ", "")
+    short = _title(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(_title(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
     _style(ax, (short if drawn[1:] else _title(names[0])) + _at(result, output), "s (m)", f"{up} ({unit})")
     if len(drawn) > 1:
@@ -256,7 +260,8 @@ def plot_history(
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
         label = _title(name)
     peak = float(np.abs(values).max())
-    factor, unit = _prefix(result.units[name], peak)
+    round_off = _STILL * float(np.ptp(result.position, axis=(0, 1)).max()) if label.startswith("Δ") else 0.0
+    factor, unit = _prefix(result.units[name], max(peak, round_off))
     for k, point in enumerate(s):
         ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
     changes = np.unique(result["zones/t"])[1:]
@@ -266,6 +271,8 @@ def plot_history(
     _style(ax, title, "t (s)", f"{label} ({unit})")
     ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # room for the dots of the last shape
     _open_up(ax, peak * factor)
+    if peak < round_off:
+        ax.set_ylim(-round_off * factor, round_off * factor)
     if legend:
         ax.legend(fontsize=_SMALL, framealpha=0.75, edgecolor="none", handlelength=1.2, borderpad=0.2)
 
@@ -277,7 +284,7 @@ def plot_touchdown(ax: Axes, result: Result) -> None:
     held = np.abs(edges[known] - s[[0, -1]]).max(axis=0, initial=0.0) < 0.005 * (s[-1] - s[0])  # lies to its very end
     for k in (0, 1) if held.all() else np.flatnonzero(~held):
         ax.plot(result.times, edges[:, k], color=_BED, linewidth=1.3, zorder=3, label=("first", "last")[k] + " contact")
-    _style(ax, "touchdown over time", "t (s)", "touchdown, s (m)")
+    _style(ax, "touchdown over time", "t (s)", "s (m)")
     ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # as the histories beside it
     _open_up(ax, float(s[-1]))
     low, high = ax.get_ylim()
@@ -347,7 +354,7 @@ def _extent(view: _View, result: Result) -> np.ndarray:
     room = _NEAR * max(np.ptp(box[1]), 0.3 * np.ptp(box[0]))
     bed = _bed_in(view, result)
     if bed is not None and np.min(up - bed[0] - bed[1] * across) < room:
-        box[1, 0] = min(box[1, 0], max(bed[0] + min(bed[1] * box[0]), box[1, 0] - room))
+        box[1, 0] = min(box[1, 0], max(bed[0] + min(bed[1] * box[0]), box[1, 0] - room)) - 0.1 * room  # a strip of sand
     if "surface" in result and view.upright and box[1, 0] < float(result["surface"]) < box[1, 1] + room:
         box[1, 1] = max(box[1, 1], float(result["surface"]))
     return box
@@ -442,7 +449,8 @@ def _draw_sea(ax: Axes, view: _View, result: Result) -> None:
     x, deep = middle[0] + far * np.array([-1.0, 1.0]), middle[1] - far
     top = int(np.argmax(view.project(result.position[-1])[1]))
     aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
-    planes = [(float(result["surface"]), 0.0, _WATER, _LEVEL, "still water", 2)] if "surface" in result and view.upright else []
+    wet = "surface" in result and view.upright
+    planes = [(float(result["surface"]), 0.0, _WATER, _LEVEL, "still water", 2)] if wet else []
     planes += [(*bed, _SAND, _BED, "seabed", -3)] if bed else []
     for n, (height, rise, fill, line, name, lift) in enumerate(planes):
         z, at = height + rise * x, box[0, aside]

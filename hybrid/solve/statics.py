@@ -309,9 +309,9 @@ def _settled(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, i
     return "settled on the seabed with friction", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
 
 
-def _roads(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
+def _roads(solver: _Solver, ends: Ends, start: State, shape: str) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
-    first = ("Newton from the starting shape", *solver.newton(solver.line, ends, start))
+    first = (f"Newton from {shape}", *solver.newton(solver.line, ends, start))
     yield first
     if solver.line.bits & (SEABED | FLOW):
         yield _eased(solver, ends, start)
@@ -335,11 +335,13 @@ def solve_statics(
     scale: float,
     floor: float | None = None,
     take_slack: bool = False,
+    shape: str = "the starting shape",
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
     length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
-    (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that.
+    (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
+    start is, for people.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -353,7 +355,7 @@ def solve_statics(
     solver = _Solver(smooth, sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
-    for how, outcome, where, state in _roads(solver, ends, start):
+    for how, outcome, where, state in _roads(solver, ends, start, shape):
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
