@@ -242,7 +242,16 @@ def _equilibrium(result: Result) -> dict[str, Any]:
         "tension_min": {"value": float(tension[low]), "s": float(s[low])},
         "lowest": {"position": position[bottom].tolist(), "s": float(s[bottom])},
         "force": force,
-    }
+    } | _on_the_seabed(result)
+
+
+def _on_the_seabed(result: Result) -> dict[str, Any]:
+    """Touchdown, grounded length and contact force, where there is a seabed; None where nothing touches."""
+    if "grounded_length" not in result:
+        return {}
+    edges = [float(x) if x == x else None for x in result["touchdown"][-1]]
+    grounded, force = float(result.grounded_length[-1]), float(result.contact_force[-1])
+    return {"touchdown": edges, "grounded_length": grounded, "contact_force": force}
 
 
 def _equilibrium_table(facts: dict[str, Any]) -> Any:
@@ -260,6 +269,12 @@ def _equilibrium_table(facts: dict[str, Any]) -> Any:
         table.add_row(name, f"{facts[key]['value']:.5g} N at s = {facts[key]['s']:.5g} m")
     for end, force in facts["force"].items():
         table.add_row(f"force at {end}", f"{vector(force)} N on the cable")
+    if facts.get("grounded_length"):
+        a, b = facts["touchdown"]
+        table.add_row("on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m")
+        table.add_row("contact force", f"{facts['contact_force']:.5g} N")
+    elif "grounded_length" in facts:
+        table.add_row("on the seabed", "nothing")
     table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")
     table.columns[0].style = "bold"
     return table

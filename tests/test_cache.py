@@ -23,16 +23,17 @@ TWICE_AS_STIFF = "    kb = (2.0 * kb[0], 2.0 * kb[1], 2.0 * kb[2])\n" + STIFF
 
 SPIN = """
 import numpy as np
+from hybrid.model.material import POINT
 from hybrid.model.state import Ends, Line, blank_state
-from hybrid.model.water import CELLS, NODES
 from hybrid.solve.observe import observe
 
+WET = ("drag_n", "drag_t", "added_n", "added_t", "buoy", "displaced", "diameter")
 # one cell of a rod, 1 m long, whose two ends swing against each other: rotary energy ~ (turn rate)^2 ~ 1/l^2
 line = Line(
     s=np.array([0.0, 1.0]), h=np.ones(1), ck=np.zeros(1), mass=np.zeros(2), force=np.zeros((2, 3)),
     element=np.zeros(2, np.int8), spin=np.ones(1, np.int8), kb=np.zeros((2, 3)), k0=np.zeros((2, 3)),
     hn=np.full(2, 0.5), rotary=np.ones(1), polar=np.ones(1), damp=np.zeros(2), tau=np.zeros(1),
-    **{x: np.zeros(1) for x in CELLS}, point_mass=np.zeros(2), **{x: np.zeros(2) for x in NODES}, bits=16,
+    **{x: np.zeros(1) for x in WET}, **{x: np.zeros(2) for x in POINT}, bits=16,
 )
 z = np.zeros((2, 3))
 ends = Ends(np.zeros(2, np.int8), z, np.zeros((2, 9)), z, z, z)

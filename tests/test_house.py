@@ -19,7 +19,7 @@ PACKAGE = Path(hybrid.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Which rooms and files a room may import, most special place first.  `scene` alone means a file or a room.
-# Only model/{build,properties,start,ledger,plan,reasons,sea,water} see the scene; solve and adapt never meet; plots read files.
+# Only model/{build,properties,start,ledger,material,plan,reasons,sea} see the scene; solve and adapt never meet; plots read files.
 SEES_SCENE = ("errors", "physics", "model", "scene")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),
@@ -33,7 +33,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "model/plan": SEES_SCENE,
     "model/sea": SEES_SCENE,
     "model/reasons": SEES_SCENE,
-    "model/water": SEES_SCENE,
+    "model/material": SEES_SCENE,
     "model": ("errors", "physics", "model"),
     "solve/shooting": ("errors", "scene", "solve/shooting"),  # the arbiter shares nothing with production but the scene
     "solve": ("errors", "compiled", "physics", "model/state", "solve"),
@@ -47,7 +47,19 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/touchdown"),
     "watch": ("errors", "model", "solve", "results"),
     "motion": ("errors", "watch", "scene", "model", "solve", "adapt", "results"),
-    "simulate": ("errors", "scene", "physics", "model", "solve", "adapt", "results", "motion", "watch", "arbitrate", "live"),
+    "simulate": (
+        "errors",
+        "scene",
+        "physics",
+        "model",
+        "solve",
+        "adapt",
+        "results",
+        "motion",
+        "watch",
+        "arbitrate",
+        "live",
+    ),
     "arbitrate": ("errors", "scene", "model", "solve/shooting", "results"),
     "live": ("errors", "compiled", "results", "model", "simulate", ""),
     "cli": ("errors", "scene", "model", "results", "simulate", "live", "compiled", ""),

@@ -6,7 +6,7 @@ keeps a ledger: what is on and who asked for it, what is off.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -15,22 +15,15 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.ends import EndConditions
 from hybrid.model.ledger import Entry, ledger
+from hybrid.model.line import line_on
+from hybrid.model.material import material
 from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes
-from hybrid.model.properties import (
-    attachments_at,
-    bending_stiffness,
-    damping,
-    merged_sections,
-    rotary_inertia,
-    tension_scale,
-    torsional_stiffness,
-)
+from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
-from hybrid.model.start import attachment_cuts, corners, ends_and_frames, hung, initial_nodes
+from hybrid.model.start import corners, ends_and_frames, hung, initial_nodes
 from hybrid.model.state import Floats, Line, State, blank_state
-from hybrid.model.water import water
-from hybrid.physics.loads import FRICTION, MASS_DAMPING, ROTARY, SEABED, STIFFNESS_DAMPING
-from hybrid.scene.schema import Clamped, Guided, Points, RodZone, Scene, Section, Straight, ZonesModel
+from hybrid.physics.loads import FRICTION, SEABED
+from hybrid.scene.schema import Points, RodZone, Scene, Straight, ZonesModel
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
@@ -91,65 +84,31 @@ def build(scene: Scene) -> Model:
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
     """
-    sections = merged_sections(scene.cable.sections)
-    bounds = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
+    cable = material(scene)
     plans = zone_plans(scene)
-    cuts = sorted({float(x) for x in bounds[1:-1]} | set(corners(scene)) | set(attachment_cuts(scene)))
+    cuts = sorted({*cable.cuts, *corners(scene)})
     mesh = scene.mesh
     if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
         s, zones = place_nodes(plans, cuts, mesh.cells if mesh else None, mesh.ratio if mesh else None)
-    h = np.diff(s)
-    n = h.size
+    n = s.size - 1
     middle = 0.5 * (s[:-1] + s[1:])
-    of = [sections[int(i)] for i in np.clip(np.searchsorted(bounds, middle) - 1, 0, len(sections) - 1)]
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
     rod = np.array([zones[int(i)].kind == "rod" for i in zone_of])
     _refuse_single_rod_cells(zones, zone_of)
     _refuse_too_many(n)
 
-    def per_cell(f: Callable[[Section], float]) -> Floats:
-        return np.array([f(x) for x in of], float)
-
-    def to_nodes(x: Floats) -> Floats:
-        y = np.zeros((n + 1, *x.shape[1:]))
-        y[:-1] += 0.5 * x
-        y[1:] += 0.5 * x
-        return y
-
     sea = surroundings(scene, n)
     fastest = float(np.linalg.norm(sea.values.current, axis=1).max())
+    sections = merged_sections(scene.cable.sections)
     scale = tension_scale(scene, sections, bool(rod.any()), fastest)
     # a stiff rod beside a light catenary must not hide that the catenary is slack
     slack_scale = tension_scale(scene, sections, False, fastest)
-    wet = water(scene, s, of)
-    bits = wet.bits
-    tau = rotary = polar = np.full(n, np.nan)
-    damp = np.full(n + 1, np.nan)
     bed = scene.environment.seabed
-    if bed is not None:
-        bits |= SEABED | (FRICTION if rubs(bed) else 0)
-    if any(damping(x).mass for x in sections):
-        bits |= MASS_DAMPING
-        damp = to_nodes(h * per_cell(lambda x: x.mass * damping(x).mass))
-    if any(damping(x).stiffness for x in sections):
-        bits |= STIFFNESS_DAMPING
-        tau = per_cell(lambda x: damping(x).stiffness)
-    if rod.any() and any(rotary_inertia(x)[1] > 0 for x in of):
-        bits |= ROTARY
-        rotary = h * rod * per_cell(lambda x: rotary_inertia(x)[0])
-        polar = h * rod * per_cell(lambda x: rotary_inertia(x)[1])
-
-    compliance = per_cell(lambda x: 1.0 / x.axial_stiffness if x.axial_stiffness else 0.0)
-    element, kb, k0, hn = _elements(scene, h, rod, of)
-    force = np.zeros((n + 1, 3))
-    force[:, 2] = wet.lift - to_nodes(h * per_cell(lambda x: x.mass * scene.environment.gravity))
-    line = Line(
-        s=s, h=h, ck=compliance, mass=to_nodes(h * per_cell(lambda x: x.mass)) + wet.mass,
-        force=force, element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
-        damp=damp, tau=tau, bits=bits, **wet.arrays,
-    )  # fmt: skip
+    touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
+    line = line_on(cable, s, rod, touch)
+    h, compliance = line.h, line.ck
 
     start = blank_state(n)
     start.r[:], shape_name = initial_nodes(scene, s)
@@ -175,7 +134,7 @@ def build(scene: Scene) -> Model:
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
-        attached=tuple(sorted({at for at, _ in attachments_at(scene)})),
+        attached=tuple(cable.at.tolist()),
     )  # fmt: skip
 
 
@@ -225,30 +184,3 @@ def _refuse_single_rod_cells(zones: Sequence[Zone], zone_of: np.ndarray) -> None
                     )
                 ]
             )
-
-
-def _elements(
-    scene: Scene, h: Floats, rod: np.ndarray, of: Sequence[Section]
-) -> tuple[np.ndarray, Floats, Floats, Floats]:
-    """Where elements sit, their stiffness B/hn, their strain without stress, and the length each stands for."""
-    n = h.size
-    B = np.array([[*bending_stiffness(x), torsional_stiffness(x)] for x in of])
-    kappa = np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float)
-    element = np.zeros(n + 1, np.int8)
-    kb, k0, hn = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
-    hn[:-1] += 0.5 * h
-    hn[1:] += 0.5 * h
-    element[1:-1] = rod[:-1] & rod[1:]
-    for i in np.flatnonzero(element):
-        half_a, half_b = 0.5 * h[i - 1], 0.5 * h[i]
-        kb[i] = 1.0 / (half_a / B[i - 1] + half_b / B[i])  # two halves in series
-        k0[i] = half_a * kappa[i - 1] + half_b * kappa[i]
-    for node, cell, end in ((0, 0, scene.ends.start), (n, n - 1, scene.ends.end)):
-        if rod[cell] and isinstance(end, Clamped | Guided):
-            element[node] = 1
-            kb[node] = B[cell] / (0.5 * h[cell])
-            k0[node] = 0.5 * h[cell] * kappa[cell]
-            free_to_twist = end.swivel if isinstance(end, Clamped) else end.normal is None
-            if free_to_twist:
-                kb[node, 2] = 0.0
-    return element, kb, k0, hn

@@ -9,7 +9,7 @@ from scipy.optimize import brentq
 
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
 from hybrid.model.hanging import Hanging, hang, trail
-from hybrid.model.properties import attachments_at, modules_of, net_weight
+from hybrid.model.properties import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.model.state import Floats, Line, Sea
 from hybrid.physics.loads import BODIES, DRAG, FLOW, SURFACE
@@ -141,13 +141,6 @@ def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
     x = radius * (np.sin(angle) + np.sin(half))
     y = radius * (np.cos(angle) - np.cos(half))
     return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
-
-
-def attachment_cuts(scene: Scene) -> list[float]:
-    """Arc lengths at which an attachment needs a node."""
-    cuts = {at for at, _ in attachments_at(scene)} | {x for m in modules_of(scene) for x in m.over}
-    near = 1e-9 * scene.length
-    return [x for x in cuts if near < x < scene.length - near]
 
 
 def corners(scene: Scene) -> list[float]:

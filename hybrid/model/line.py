@@ -1,0 +1,76 @@
+"""A material on nodes: the arrays of `Line` for a mesh and the kinds of its cells."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.model.material import Material
+from hybrid.model.state import Floats, Line
+from hybrid.physics.loads import BODIES, ROTARY
+
+
+def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0) -> Line:
+    """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
+
+    more_bits: forces that the surroundings ask for.
+    """
+    h = np.diff(s)
+    n = h.size
+    middle = 0.5 * (s[:-1] + s[1:])
+    of = np.clip(np.searchsorted(material.bounds, middle) - 1, 0, material.mass.size - 1)
+    bits = material.bits | more_bits
+    rotary = polar = np.full(n, np.nan)
+    if rod.any() and (material.polar[of] > 0.0).any():
+        bits |= ROTARY
+        rotary, polar = h * rod * material.rotary[of], h * rod * material.polar[of]
+    point = {name: np.full(n + 1, 0.0 if name == "point_mass" or bits & BODIES else np.nan) for name in material.points}
+    place = np.searchsorted(s, material.at - 1e-9 * s[-1])
+    for name, values in material.points.items():
+        if name == "point_mass" or bits & BODIES:
+            point[name][place] = values
+    force = np.zeros((n + 1, 3))
+    force[:, 2] = -_to_nodes(h * material.weight[of])
+    force[place, 2] += material.lift
+    element, kb, k0, hn = _elements(material, h, rod, of)
+    half = 0.5 * h
+    return Line(
+        s=s, h=h, ck=material.ck[of], mass=_to_nodes(h * material.mass[of]) + point["point_mass"], force=force,
+        element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
+        drag_n=half * material.drag_n[of], drag_t=half * material.drag_t[of],
+        added_n=half * material.added_n[of], added_t=half * material.added_t[of],
+        damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
+        buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
+        bits=bits, **point,
+    )  # fmt: skip
+
+
+def _to_nodes(x: Floats) -> Floats:
+    y = np.zeros(x.size + 1)
+    y[:-1] += 0.5 * x
+    y[1:] += 0.5 * x
+    return y
+
+
+def _elements(
+    material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
+) -> tuple[np.ndarray, Floats, Floats, Floats]:
+    """Where elements sit, their stiffness B/hn, their strain without stress, and the length each stands for."""
+    n = h.size
+    B, kappa, half = material.B[of], material.kappa[of], 0.5 * h[:, None]
+    element = np.zeros(n + 1, np.int8)
+    kb, k0, hn = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(n + 1)
+    hn[:-1] += 0.5 * h
+    hn[1:] += 0.5 * h
+    element[1:-1] = rod[:-1] & rod[1:]
+    inner = np.flatnonzero(element)
+    a, b = inner - 1, inner
+    kb[inner] = 1.0 / (half[a] / B[a] + half[b] / B[b])  # two halves in series
+    k0[inner] = half[a] * kappa[a] + half[b] * kappa[b]
+    for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
+        if rod[cell] and material.held_tangent[k]:
+            element[node] = 1
+            kb[node] = B[cell] / half[cell]
+            k0[node] = half[cell] * kappa[cell]
+            if not material.held_twist[k]:
+                kb[node, 2] = 0.0
+    return element, kb, k0, hn

@@ -1,0 +1,187 @@
+"""What a scene's cable is made of, per metre: everything a line needs to know, whatever its mesh and its zones.
+
+Properties are constant on pieces between the ends of sections and of modules; floats, clumps
+and end bodies sit at points.  `hybrid.model.line` puts a Material on nodes.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from hybrid.model.properties import (
+    attachments_at,
+    bending_stiffness,
+    damping,
+    merged_sections,
+    modules_of,
+    rotary_inertia,
+    torsional_stiffness,
+)
+from hybrid.model.state import Floats
+from hybrid.physics.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
+from hybrid.scene.schema import Clamped, Guided, Scene, Section
+
+POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height")
+
+
+@dataclass
+class Material:
+    """A cable per metre.  K pieces, P points; SI units; material axes (a1, a2, tangent) for B and kappa."""
+
+    bounds: Floats  # (K+1,) m, arc lengths between which everything is constant
+    mass: Floats  # (K,) kg/m, with modules
+    weight: Floats  # (K,) N/m, downwards, less the buoyancy that does not depend on the surface
+    ck: Floats  # (K,) 1/N
+    B: Floats  # (K, 3) N m2: two bending stiffnesses, torsion
+    kappa: Floats  # (K, 3) 1/m, curvatures and twist without stress
+    rotary: Floats  # (K,) kg m
+    polar: Floats  # (K,) kg m
+    damp: Floats  # (K,) kg/s per m
+    tau: Floats  # (K,) s
+    drag_n: Floats  # (K,) kg/m2: rho/2 D Cn
+    drag_t: Floats  # (K,) kg/m2: rho/2 pi D Ct
+    added_n: Floats  # (K,) kg/m
+    added_t: Floats  # (K,) kg/m
+    buoy: Floats  # (K,) N/m, buoyancy that depends on the surface
+    displaced: Floats  # (K,) kg/m
+    diameter: Floats  # (K,) m, of the displaced volume
+    bits: int  # optional forces that are on wherever the line is; rods may ask for more
+    held_tangent: tuple[bool, bool]  # whether an element sits at the ends of a rod
+    held_twist: tuple[bool, bool]  # and resists twist
+    at: Floats  # (P,) m, where points are
+    lift: Floats  # (P,) N, constant force upwards of each
+    points: dict[str, Floats] = field(default_factory=dict)  # POINT -> (P,)
+
+    @property
+    def cuts(self) -> list[float]:
+        """Arc lengths at which a node must lie."""
+        return sorted({*self.bounds[1:-1].tolist(), *self.at[(self.at > 0.0) & (self.at < self.bounds[-1])].tolist()})
+
+
+def material(scene: Scene) -> Material:
+    """The cable of a scene."""
+    sections = merged_sections(scene.cable.sections)
+    ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
+    length, near = float(ends[-1]), 1e-9 * float(ends[-1])
+    modules = list(modules_of(scene))
+    edges = [*ends.tolist(), *(x for m in modules for x in m.over)]
+    bounds = [0.0]
+    for x in sorted(min(x, length) for x in edges):
+        if x - bounds[-1] > near:
+            bounds.append(x)
+    bounds[-1] = length
+    middle = 0.5 * (np.array(bounds[:-1]) + np.array(bounds[1:]))
+    of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
+    out = _bare(scene, np.array(bounds), of)
+    for m in modules:
+        on = (middle > m.over[0]) & (middle < m.over[1])
+        out.mass[on] += m.mass
+        out.weight[on] += m.mass * scene.environment.gravity
+    if scene.environment.fluid is not None:
+        _wetted(out, scene, of, middle)
+    _points(out, scene)
+    return out
+
+
+def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
+    """The cable without its water and its attachments."""
+    k, gravity = len(of), scene.environment.gravity
+    nothing = np.full(k, np.nan)
+    pair = (scene.ends.start, scene.ends.end)
+    out = Material(
+        bounds=bounds,
+        mass=np.array([x.mass for x in of], float),
+        weight=np.array([x.mass * gravity for x in of], float),
+        ck=np.array([1.0 / x.axial_stiffness if x.axial_stiffness else 0.0 for x in of]),
+        B=np.array([[*bending_stiffness(x), torsional_stiffness(x)] for x in of], float),
+        kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
+        rotary=np.array([rotary_inertia(x)[0] for x in of]),
+        polar=np.array([rotary_inertia(x)[1] for x in of]),
+        damp=nothing, tau=nothing, drag_n=nothing, drag_t=nothing, added_n=nothing, added_t=nothing,
+        buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
+        held_tangent=(isinstance(pair[0], Clamped | Guided), isinstance(pair[1], Clamped | Guided)),
+        held_twist=(_resists_twist(pair[0]), _resists_twist(pair[1])),
+        at=np.zeros(0), lift=np.zeros(0), points={name: np.zeros(0) for name in POINT},
+    )  # fmt: skip
+    if any(damping(x).mass for x in of):
+        out.bits |= MASS_DAMPING
+        out.damp = np.array([x.mass * damping(x).mass for x in of])
+    if any(damping(x).stiffness for x in of):
+        out.bits |= STIFFNESS_DAMPING
+        out.tau = np.array([damping(x).stiffness for x in of], float)
+    return out
+
+
+def _resists_twist(end: object) -> bool:
+    if isinstance(end, Clamped):
+        return not end.swivel
+    return isinstance(end, Guided) and end.normal is not None
+
+
+def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> None:
+    """Buoyancy, drag, added mass, pressure of waves, with what modules add."""
+    fluid, gravity = scene.environment.fluid, scene.environment.gravity
+    assert fluid is not None
+    rho = fluid.density
+    width = np.array([x.diameter or 0.0 for x in of])
+    disc = 0.25 * np.pi * width**2
+    volume, area, extra = disc.copy(), np.zeros(len(of)), np.zeros(len(of))
+    for m in modules_of(scene):
+        on = (middle > m.over[0]) & (middle < m.over[1])
+        volume[on] += m.volume_in(rho, gravity)
+        area[on] += m.drag_area
+        extra[on] += m.added_mass
+    if any(x.drag for x in of) or area.any():
+        out.bits |= DRAG
+        out.drag_n = 0.5 * rho * (width * np.array([x.drag.normal if x.drag else 0.0 for x in of]) + area)
+        out.drag_t = 0.5 * rho * np.pi * width * np.array([x.drag.tangential if x.drag else 0.0 for x in of])
+    if any(x.added_mass for x in of) or extra.any():
+        out.bits |= ADDED_MASS
+        out.added_n = rho * disc * np.array([x.added_mass.normal if x.added_mass else 0.0 for x in of]) + extra
+        out.added_t = rho * disc * np.array([x.added_mass.tangential if x.added_mass else 0.0 for x in of])
+    if fluid.current is not None:
+        out.bits |= FLOW
+    if fluid.waves is not None:
+        out.bits |= WAVES
+        out.displaced = rho * volume
+    if fluid.surface is not None:
+        out.bits |= SURFACE
+        out.buoy = rho * gravity * volume
+        out.diameter = np.sqrt(4.0 / np.pi * volume)
+    else:
+        out.weight = out.weight - rho * gravity * volume
+
+
+def _points(out: Material, scene: Scene) -> None:
+    """Floats, clumps and end bodies; bodies at one place are one."""
+    fluid, gravity = scene.environment.fluid, scene.environment.gravity
+    rho = fluid.density if fluid else 0.0
+    everything = list(attachments_at(scene))
+    near = 1e-9 * scene.length
+    at: list[float] = []
+    for x, _ in sorted(everything, key=lambda pair: pair[0]):
+        if not at or x - at[-1] > near:
+            at.append(min(x, scene.length))
+    out.at = np.array(at)
+    out.lift = np.zeros(len(at))
+    out.points = {name: np.zeros(len(at)) for name in POINT}
+    for x, body in everything:
+        i = int(np.argmin(np.abs(out.at - x)))
+        out.points["point_mass"][i] += body.mass
+        out.lift[i] -= gravity * body.mass
+        if fluid is None:
+            continue
+        displaced = rho * body.volume_in(rho, gravity)
+        out.points["point_drag"][i] += 0.5 * rho * body.drag_area
+        out.points["point_added"][i] += body.added_mass
+        out.points["point_displaced"][i] += displaced
+        if fluid.surface is None:
+            out.lift[i] += gravity * displaced
+        elif displaced > 0.0:
+            out.points["point_buoy"][i] += gravity * displaced
+            out.points["point_height"][i] = max(out.points["point_height"][i], body.height_in(rho, gravity))
+    asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
+    if any(out.points[name].any() for name in asked):
+        out.bits |= BODIES
