@@ -140,6 +140,8 @@ class Motion:
 
     def _pull(self, k: int) -> float:
         ends = self.model.ends.values
+        if not ends.held[k] and self.model.line.point_mass[-k] > 0.0:
+            return abs(float(self.state.T[-k]))
         x, y, z = self.stepper.told[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
         return sqrt(x * x + y * y + z * z)
 

@@ -46,7 +46,7 @@ STEP_FIELDS = (
     Field("residual", "N", "largest force out of balance at a node before the last correction"),
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
     Field("pull_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
-    Field("pull_end", "N", "the same at the end"),
+    Field("pull_end", "N", "the same at the end; of an end body: tension of the last cell"),
     Field("cpu", "s", "processor time since the start of the run"),
 )
 
@@ -180,10 +180,12 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
             model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape,
         )  # fmt: skip
     except ComputationError as failed:
-        reasons = reasons_against(scene)
+        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))
         if not reasons:
             raise
-        because = "\n              ".join([*reasons, failed.detail])
+        roads = failed.detail.splitlines()
+        tried = f"{len(roads)} ways to an equilibrium were tried, the last: {roads[-1].strip()}"
+        because = "\n              ".join([*reasons, tried])
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 

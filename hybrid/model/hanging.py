@@ -10,6 +10,7 @@ the complementary energy, which is convex: Newton's method with a line search fi
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -23,6 +24,10 @@ LENT = 1e-4
 MOST_ITERATIONS = 100
 # Chords shorter than this part of their cells: the loads do not tauten the line, and the shape means nothing.
 SLACK = 0.5
+# Rounds of finding out how much of a line lies on the seabed: each changes it by a cell or none, but the first.
+LAYING = 20
+# Bisections of the lift of a floating body: to 1e-9 of it.
+FLOATING = 30
 
 
 class Hanging(NamedTuple):
@@ -70,13 +75,81 @@ def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> H
     return Hanging(r, np.linalg.norm(t, axis=1))
 
 
-def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats) -> Hanging | None:
-    """The shape of a line held at one end (0 or 1) at `place` (3,) and free at the other; None when it is slack."""
+def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool = False) -> Hanging | None:
+    """The shape of a line held at one end (0 or 1) at `place` (3,) and free at the other; None when it is slack.
+
+    on_bed: the held end lies on a level seabed, which carries the line as far as nothing lifts it.
+    """
     # what hangs beyond a cell pulls it
     t = np.cumsum(loads[::-1], axis=0)[::-1][1:] if held == 0 else -np.cumsum(loads, axis=0)[:-1]
+    if on_bed:
+        away = 1.0 if held == 0 else -1.0
+        t[:, 2] = away * np.maximum(away * t[:, 2], 0.0)
     size = np.linalg.norm(t, axis=1)
     if not size.max() > 0.0 or size.min() < 1e-9 * size.max():
         return None
     e = (h * (1.0 / size + ck))[:, None] * t
     r = np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
     return Hanging(r + place - r[0 if held == 0 else -1], size)
+
+
+def laid(
+    loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, bed: Callable[[float, float], float]
+) -> Hanging | None:
+    """As `trail` for a line that is held above the seabed and long enough to lie on it with its free end.
+
+    bed: height (m) of the seabed at x, y.  What lies on the bed goes on the way the line came down, without tension.
+    """
+    away = range(1, h.size + 1) if held == 0 else range(h.size - 1, -1, -1)
+    lying = np.zeros(h.size + 1, bool)
+    shape = None
+    for _ in range(LAYING):
+        found = trail(np.where(lying[:, None], 0.0, loads), h, ck, held, place) if not lying.all() else None
+        if found is None:
+            if shape is None:
+                return None
+            found = shape
+        r, T = found.r.copy(), found.T.copy()
+        now = np.zeros_like(lying)
+        heading = np.array([1.0, 0.0, 0.0])
+        for i in away:
+            before, cell = (i - 1, i - 1) if held == 0 else (i + 1, i)
+            if not now[before]:
+                step = found.r[i] - found.r[before]
+                level = np.hypot(step[0], step[1])
+                if level > 1e-6 * h[cell]:
+                    heading = np.array([step[0] / level, step[1] / level, 0.0])
+                r[i] = r[before] + step
+                now[i] = r[i, 2] <= bed(r[i, 0], r[i, 1])
+            else:
+                r[i], now[i], T[cell] = r[before] + h[cell] * heading, True, 0.0
+            if now[i]:
+                r[i, 2] = bed(r[i, 0], r[i, 1])
+        shape = Hanging(r, T)
+        if (now == lying).all():
+            break
+        lying = now
+    return shape
+
+
+def moored(
+    loads: Floats, lift: float, surface: float, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool
+) -> Hanging | None:
+    """As `trail`, with a body at the free end that floats at `surface` (m) on as much of its `lift` (N) as it needs."""
+    free = -1 if held == 0 else 0
+    low, high, best = 0.0, 1.0, None
+    for _ in range(FLOATING):
+        part = 1.0 if best is None else 0.5 * (low + high)
+        lifted = loads.copy()
+        lifted[free, 2] += part * lift
+        shape = trail(lifted, h, ck, held, place, on_bed)
+        if shape is None:
+            return best
+        best = shape
+        if shape.r[free, 2] <= surface:
+            if part == 1.0:
+                break  # it sinks, or hangs too low to reach the surface
+            low = part
+        else:
+            high = part
+    return best

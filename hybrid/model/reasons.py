@@ -11,8 +11,11 @@ from hybrid.scene.schema import Body, Free, Scene
 HARDLY = 1e-3
 
 
-def reasons_against(scene: Scene) -> list[str]:
-    """What speaks against an equilibrium of the scene, in sentences; empty when nothing is known."""
+def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
+    """What speaks against an equilibrium of the scene, in sentences; empty when nothing is known.
+
+    rod_ends: whether the line begins and ends with a rod.
+    """
     found = []
     bed, held = scene.environment.seabed, scene.ends.held()
     weight = net_weight(scene)
@@ -28,11 +31,11 @@ def reasons_against(scene: Scene) -> list[str]:
                 f"that much lies slack on it, where only bending and friction give it a shape"
             )
     if bed is not None and weight > 0.0:
-        for name, end in (("start", scene.ends.start), ("end", scene.ends.end)):
-            if isinstance(end, Free) and end.force is None and held and not bed.friction:
+        for name, end, rod in zip(("start", "end"), (scene.ends.start, scene.ends.end), rod_ends, strict=True):
+            if not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
                 found.append(
                     f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
-                    f"and a flexible line without tension has no shape (a rod has)"
+                    f"and a flexible line without tension has no shape: make it a rod there"
                 )
     if bed is not None and not held and bed.slope is not None:
         slope = math.hypot(*bed.slope)

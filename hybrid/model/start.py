@@ -8,13 +8,13 @@ import numpy as np
 from scipy.optimize import brentq
 
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
-from hybrid.model.hanging import Hanging, hang, trail
+from hybrid.model.hanging import Hanging, hang, laid, moored, trail
 from hybrid.model.properties import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.model.state import Floats, Line, Sea
 from hybrid.physics.loads import BODIES, DRAG, FLOW, SURFACE
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Clamped, Equilibrium, Guided, Points, Scene, Straight
+from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Points, Scene, Straight
 
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 
@@ -77,6 +77,9 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
         loads[1:, 2] += line.buoy
         if line.bits & BODIES:
             loads[:, 2] += line.point_buoy
+    floating = _floating_end(scene, line)
+    if floating is not None:
+        loads[floating, 2] -= line.point_buoy[floating]
     for k, end in ((0, scene.ends.start), (-1, scene.ends.end)):
         load = getattr(end, "force", None) or getattr(end, "thrust", None)
         if load is not None:
@@ -91,10 +94,29 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
             found = hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
         else:
             held = 0 if places[0] else 1
-            found = trail(loads + drag, line.h, line.ck, held, np.array(places[held], float))
+            place, bed = np.array(places[held], float), scene.environment.seabed
+            on_bed = bed is not None and place[2] - bed.height(place[0], place[1]) < 1e-3 * scene.length
+            if floating is None and (bed is None or on_bed):
+                found = trail(loads + drag, line.h, line.ck, held, place, on_bed)
+            elif floating is None:
+                assert bed is not None
+                found = laid(loads + drag, line.h, line.ck, held, place, bed.height)
+            else:
+                lift = float(line.point_buoy[floating])
+                found = moored(loads + drag, lift, sea.surface, line.h, line.ck, held, place, on_bed)
         if found is None:
             break
     return found
+
+
+def _floating_end(scene: Scene, line: Line) -> int | None:
+    """The node of a free end whose body may float at the surface."""
+    if not (line.bits & SURFACE and line.bits & BODIES):
+        return None
+    for node, end in ((0, scene.ends.start), (-1, scene.ends.end)):
+        if isinstance(end, Body) and line.point_buoy[node] > 0.0:
+            return node
+    return None
 
 
 def drag_on(line: Line, sea: Sea, r: Floats) -> Floats:

@@ -2,7 +2,7 @@
 
 A cell that touches presses on the bed with the force per length
 
-    q = k P(p) + c P'(p) dp/dt,   P = p^2/(2 o) for 0 < p < o,  p - o/2 beyond
+    q = k P(p) + c P'(p) dp/dt, never below 0,   P = p^2/(2 o) for 0 < p < o,  p - o/2 beyond
 
 of the penetration p of its centreline, o the onset.  It is integrated along the chord with
 the shape functions of the nodes, piece by piece between the points where p is 0 or o, so that
@@ -34,8 +34,10 @@ def pressure(x, p0, p1, v0, v1, k, c, o):
     if p <= 0.0:
         return 0.0, 0.0, 0.0
     if p >= o:
-        return k * (p - 0.5 * o) + c * v, k, c
-    return 0.5 * k * p * p / o + c * v * p / o, (k * p + c * v) / o, c * p / o
+        q = k * (p - 0.5 * o) + c * v
+        return (q, k, c) if q > 0.0 else (0.0, 0.0, 0.0)
+    q = (0.5 * k * p + c * v) * p / o
+    return (q, (k * p + c * v) / o, c * p / o) if q > 0.0 else (0.0, 0.0, 0.0)
 
 
 @inner
@@ -92,12 +94,13 @@ def stored(line, sea, r, v):
                 p, s = p0 + x * (p1 - p0), v0 + x * (v1 - v0)
                 if p <= 0.0:
                     continue
+                q, _, _ = pressure(x, p0, p1, v0, v1, k, c, o)
                 if p >= o:
                     energy += w * k * (0.5 * p * (p - o) + o * o / 6.0)
-                    power += w * c * s * s
+                    power += w * (q - k * (p - 0.5 * o)) * s
                 else:
                     energy += w * k * p * p * p / (6.0 * o)
-                    power += w * c * s * s * p / o
+                    power += w * (q - 0.5 * k * p * p / o) * s
     return energy, power
 
 

@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -94,7 +93,8 @@ def plot_summary(
 
     path: where to save it (png, pdf, svg ...).  times: which earlier shapes (s).  history:
     which arc lengths to follow (m); else those recorded as `history`, else the middle and
-    the ends that move.  A static result shows curvature and tangent in place of histories.
+    the ends that move.  A static result shows curvature and tangent in place of histories; a
+    cable that touches a seabed also shows the force of contact and, over time, where it does.
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -136,13 +136,7 @@ def plot_summary(
             if lower in axes and axes[upper].get_position().x0 == axes[lower].get_position().x0:  # one axis of s or t
                 axes[upper].set_xlabel("")
                 axes[upper].tick_params(labelbottom=False)
-        entries = [_legend(axes["s"]), _legend(axes["h"]) if len(points) else {}]
-        first, rest = list(entries[0].items()), list(entries[1].items())
-        for row, y in ((first[:_ENTRIES], foot + 0.0275), ([*first[_ENTRIES:], *rest][:_ENTRIES], foot + 0.0025)):
-            look: dict[str, Any] = {"fontsize": _SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
-            look |= {"loc": "lower center", "bbox_to_anchor": (0.5, y), "ncols": 8, "frameon": False, "borderpad": 0.1}
-            if row:
-                figure.legend([mark for _, mark in row], [n for n, _ in row], labelcolor=_INK, **look)
+        _legends(figure, axes["s"], axes["h"] if len(points) else None, foot)
     if path is not None:
         try:
             figure.savefig(path, dpi=150)
@@ -159,6 +153,7 @@ def plot_shape(
     times: earlier times to show (s), else those whose shapes differ most.  view: None for the
     plane of the largest extent, or two letters such as "xz".  points: arc lengths to mark (m).
     A cable that is nearly straight is drawn with its deflection magnified, and says so.
+    Seabed, water, what is attached and where the cable touches down: as the file has them.
     """
     from matplotlib.collections import PolyCollection
 
@@ -174,12 +169,12 @@ def plot_shape(
     for k, shape in enumerate(result.at(t=earlier, names=["position"])["position"]):
         name = "_" * (k > 0) + "earlier shapes (later: darker)"
         ax.plot(*view.project(shape), color=_earlier_grey(k, len(earlier)), linewidth=0.7, zorder=1, label=name)
-    zones = result.zones[-1] or [Zone("cable", float(s[0]), float(s[-1]))]
+    zones = _whole(result.zones[-1]) or [Zone("cable", float(s[0]), float(s[-1]))]
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
         piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
         ax.plot(*view.project(piece), color=_KIND_COLOURS.get(zone.kind, _INK), lw=2.0, zorder=3, label=zone.kind)
-    joints = np.array([a.s_b for a, b in pairwise(zones) if a.kind != b.kind])  # else one zone is merely cut in two
+    joints = np.array([z.s_b for z in zones[:-1]])
     if len(joints):
         ax.plot(*view.project(_along(joints, s, last)), zorder=5, **_mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
@@ -209,7 +204,7 @@ def plot_profiles(
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
     The zones of that output are shaded.  Further names after the first are dashed, and left
-    out where they are zero everywhere.  times: other times at which to show the first, in grey.
+    out where nothing would be seen of them.  times: when else to show the first, in grey.
     """
     names = [names] if isinstance(names, str) else list(names)
     for zone in result.zones[output]:
@@ -331,6 +326,16 @@ def _letters(plane: str) -> _View:
     return _View(*(np.eye(3)["xyz".index(c)] for c in plane), *plane)
 
 
+def _whole(zones: list[Zone]) -> list[Zone]:
+    """Zones with neighbours of one kind made one, since nothing happens between them."""
+    whole: list[Zone] = []
+    for zone in zones:
+        if whole and whole[-1].kind == zone.kind:
+            zone = zone._replace(s_a=whole.pop().s_a)
+        whole.append(zone)
+    return whole
+
+
 def _lies(result: Result) -> bool:
     """Whether the cable ever touches a seabed."""
     return "contact" in result and "touchdown" in result and bool(np.isfinite(result["touchdown"]).any())
@@ -356,7 +361,7 @@ def _extent(view: _View, result: Result) -> np.ndarray:
     if bed is not None and np.min(up - bed[0] - bed[1] * across) < room:
         box[1, 0] = min(box[1, 0], max(bed[0] + min(bed[1] * box[0]), box[1, 0] - room)) - 0.1 * room  # a strip of sand
     if "surface" in result and view.upright and box[1, 0] < float(result["surface"]) < box[1, 1] + room:
-        box[1, 1] = max(box[1, 1], float(result["surface"]))
+        box[1, 1] = max(box[1, 1], float(result["surface"]) + 0.1 * room)  # and of air
     return box
 
 
@@ -435,9 +440,15 @@ def _earlier_grey(k: int, count: int) -> str:
     return str(0.7 - 0.3 * k / max(count - 1, 1))
 
 
-def _legend(ax: Axes) -> dict[str, Any]:
-    """What an Axes shows, each name once."""
-    return dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True))
+def _legends(figure: Figure, shape: Axes, history: Axes | None, foot: float) -> None:
+    """Two rows below the panels: what the shape shows, and under it what is left of that, and the histories."""
+    shown = [dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True)) for ax in (shape, history) if ax]
+    first, rest = list(shown[0].items()), [entry for more in shown[1:] for entry in more.items()]
+    for row, y in ((first[:_ENTRIES], foot + 0.0275), ([*first[_ENTRIES:], *rest][:_ENTRIES], foot + 0.0025)):
+        look: dict[str, Any] = {"fontsize": _SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
+        look |= {"loc": "lower center", "bbox_to_anchor": (0.5, y), "ncols": 8, "frameon": False, "borderpad": 0.1}
+        if row:
+            figure.legend([mark for _, mark in row], [name for name, _ in row], labelcolor=_INK, **look)
 
 
 def _draw_sea(ax: Axes, view: _View, result: Result) -> None:
@@ -521,8 +532,9 @@ def _head_and_foot(figure: Figure, result: Result, earlier: np.ndarray) -> float
     if n:
         span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
         facts.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
-        if 0 < len(result.zones[-1]) <= 4:  # more are to be seen, not to be read
-            facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in result.zones[-1]))
+        zones = _whole(result.zones[-1])
+        if 0 < len(zones) <= 4:  # more are to be seen, not to be read
+            facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in zones))
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
     _line(figure, 0.985, result.title or "(no title)", fontsize=10, fontweight="bold", color=_INK)

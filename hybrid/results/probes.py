@@ -161,13 +161,7 @@ class View:
             if self.line.element[first]:  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
-            pull = float(force @ t) / float(np.linalg.norm(t))
-            if self.line.point_mass[first] > 0.0 and not self.ends.held[k]:  # a body holds the cable: extrapolate
-                T, h = self.state.T, self.line.h
-                pull = (
-                    float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second])) if len(h) > 1 else T[0]
-                )
-            ends.append(pull)
+            ends.append(float(force @ t) / float(np.linalg.norm(t)))
         return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
 
     @cached_property
@@ -267,8 +261,15 @@ class View:
         return np.asarray(np.linalg.norm(self.moment - self.torque[:, None] * self.tangent, axis=1))
 
     def reaction(self, k: int) -> Floats:
-        """Force of the support on the cable at end k; the applied force where the end is not held."""
-        return -self.report[3 * k : 3 * k + 3] if self.ends.held[k] else self.ends.force[k].copy()
+        """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
+        if self.ends.held[k]:
+            return -self.report[3 * k : 3 * k + 3]
+        first, second, out = (0, 1, -1.0) if k == 0 else (-1, -2, 1.0)
+        if self.line.point_mass[first] == 0.0:
+            return self.ends.force[k].copy()
+        T, h, d = self.state.T, self.line.h, self.d  # the tension of the cable, extrapolated to its end
+        pull = T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0]
+        return np.asarray(out * pull * d[first])
 
 
 @dataclass(frozen=True)

@@ -49,4 +49,4 @@ def contact_pressure(line: Line, sea: Sea, state: State, s: Floats) -> Floats:
     o = sea.onset
     linear = sea.stiffness * (p - 0.5 * o) + sea.damping * v
     onset = 0.5 * sea.stiffness * p * p / o + sea.damping * v * p / o
-    return np.where(p <= 0.0, 0.0, np.where(p < o, onset, linear))
+    return np.where(p <= 0.0, 0.0, np.maximum(np.where(p < o, onset, linear), 0.0))

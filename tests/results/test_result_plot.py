@@ -38,16 +38,34 @@ def made(
     title: str = "Made-up mooring",
     curvature: float = 0.0,
     events: Sequence[tuple[float, str, str]] = (),
+    bed: Sequence[float] | None = None,
+    surface: float | None = None,
+    attached: Sequence[float] = (),
 ) -> Result:
-    """A result on 0 <= s <= 100 m and 0 <= t <= 10 s with a given shape and plausible forces."""
+    """A result on 0 <= s <= 100 m and 0 <= t <= 10 s with a given shape and plausible forces.
+
+    bed: what is not above the plane n . x = c, given as (n, c), touches it.
+    """
     s = np.linspace(0.0, 100.0, 41)
+    fixed: list[tuple[Field, np.ndarray]] = []
+    if bed is not None:
+        fixed.append((Field("seabed", "", "d", (4,), ("plane",), "inertial"), np.array(bed)))
+    if surface is not None:
+        fixed.append((Field("surface", "m", "d"), np.array(surface)))
+    if attached:
+        fixed.append((Field("attached", "m", "d", (len(attached),), ("attached",)), np.array(attached)))
     names = [("tension", "N"), ("curvature", "1/m"), ("theta", "rad")] + [("bending_moment", "N m")] * moment
     fields = [Field(n, u, "d", (41,), ("s",)) for n, u in [*names, ("torque", "N m")]]
     fields.append(Field("position", "m", "d", (41, 3), ("s", "xyz"), "inertial"))
+    if bed is not None:
+        fields.append(Field("contact", "N/m", "d", (41,), ("s",)))
+        fields.append(Field("touchdown", "m", "d", (2,), ("edge",), nan_ok=True))
+        fields.append(Field("touchdown_position", "m", "d", (2, 3), ("edge", "xyz"), "inertial", nan_ok=True))
     memory = io.BytesIO()
     recorder = Recorder(
-        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, scene_text="", outputs=nt
-    )
+        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, scene_text="",
+        fixed=fixed, outputs=nt,
+    )  # fmt: skip
     for t in np.linspace(0.0, 10.0, nt):
         values = {
             "position": np.stack([np.broadcast_to(x, s.shape) for x in position(s, t)], axis=1),
@@ -58,6 +76,12 @@ def made(
         }
         if moment:
             values["bending_moment"] = np.where(s > 75.0, 3.0 + np.sin(t), 0.0)
+        if bed is not None:
+            lies = values["position"] @ bed[:3] <= bed[3] + 1e-9
+            edges = np.flatnonzero(lies)[[0, -1]] if lies.any() else None
+            values["contact"] = np.where(lies, 180.0, 0.0)
+            values["touchdown"] = np.full(2, np.nan) if edges is None else s[edges]
+            values["touchdown_position"] = np.full((2, 3), np.nan) if edges is None else values["position"][edges]
         recorder.save(float(t), values, zones(float(t)))
     for t, kind, text in events:
         recorder.event(t, 0.0, 100.0, kind, text)
@@ -203,9 +227,15 @@ def test_the_area_that_was_swept_is_shaded() -> None:
 
 
 def test_the_table_of_pages_tells_what_room_they_leave(monkeypatch: pytest.MonkeyPatch) -> None:
-    for name, position in (("_ONE_VIEW", sag), ("_TWO_VIEWS", CASES["bowed"][0])):
-        result = made(position, nt=3)
-        for page in getattr(plot, name)[::3]:  # every kind of page, not every width
+    bowed = CASES["bowed"][0]
+    for name, position, bed in (
+        ("_ONE_VIEW", sag, None),
+        ("_TWO_VIEWS", bowed, None),
+        ("_ONE_VIEW_BED", sag, (0.0, 0.0, 1.0, -30.0)),
+        ("_TWO_VIEWS_BED", bowed, (0.0, 0.0, 1.0, -30.0)),
+    ):
+        result = made(position, nt=3, bed=bed)
+        for page in getattr(plot, name)[:: 1 if bed else 3]:  # every kind of page, not every width
             monkeypatch.setattr(plot, name, [page])
             figure = plot.plot_summary(result)
             figure.get_layout_engine().execute(figure)
@@ -247,6 +277,140 @@ def test_a_small_sway_across_a_sagging_line_is_shown() -> None:
     assert above.get_title("left") == "shape from above at t = 10 s, y × 20"
     figure.draw_without_rendering()
     assert 1.0 / np.ptp(above.get_ylim()) > 0.5
+
+
+def moored(s: np.ndarray, t: float) -> Sequence[Any]:
+    """From an anchor at s = 0 along the bed at z = -40, up to the surface, and back and forth."""
+    down = 40.0 + 5.0 * np.sin(t)
+    above = np.maximum(s - down, 0.0)
+    return s - 0.004 * above**2, 0.0, -40.0 + 40.0 * (above / (100.0 - down)) ** 2
+
+
+FLAT, HIGH_UP = (0.0, 0.0, 1.0, -40.0), (0.0, 0.0, 1.0, -400.0)
+
+
+def _sea(ax: Any) -> list[str]:
+    """Names written on the planes of the sea that an Axes shows, from the top."""
+    return [t.get_text() for t in ax.texts]
+
+
+def _planes(ax: Any) -> list[Any]:
+    return [patch for patch in ax.patches if type(patch).__name__ == "Polygon"]
+
+
+def _by_name(figure: Figure) -> dict[str, Any]:
+    return {ax.get_label(): ax for ax in figure.axes}
+
+
+def test_the_sea_is_drawn_as_far_as_the_file_has_it() -> None:
+    figure = plot.plot_summary(made(moored, nt=41, bed=FLAT, surface=0.0, attached=[70.0, 100.0]))
+    axes = _by_name(figure)
+    assert set(axes) == set("spPchTH")
+    shape = axes["s"]
+    assert _sea(shape) == ["still water", "seabed"]
+    heights = [plane.get_xy()[:2, 1] for plane in _planes(shape)]
+    assert [h.tolist() for h in heights] == [[0, 0], [0, 0], [-40, -40], [-40, -40]]  # an area and its rim
+    marks = {line.get_label(): line for line in shape.lines}
+    assert marks["touchdown"].get_xydata() == pytest.approx(np.array([[35.0, -40.0]]))  # its other edge is the anchor
+    assert marks["float, clump, body"].get_xdata()[1] == pytest.approx(moored(np.array([100.0]), 10.0)[0][0])
+    assert shape.get_ylim()[0] < -42.0 and shape.get_ylim()[1] > 0.5 and shape.get_aspect() == 1.0
+    assert (axes["c"].get_title("left"), axes["c"].get_ylabel()) == ("contact force at t = 10 s", "contact (N/m)")
+    assert len([line for line in axes["c"].lines if line.get_linewidth() == 0.7]) == 9  # at the times of the shapes
+    touchdown = axes["T"]
+    (line,) = touchdown.lines
+    assert (touchdown.get_title("left"), touchdown.get_xlabel()) == ("touchdown over time", "t (s)")
+    assert line.get_ydata() == pytest.approx(made(moored, nt=41, bed=FLAT)["touchdown"][:, 1])
+    assert touchdown.get_ylim()[0] > 30.0  # the sand below the line does not reach down to the anchor
+    text = texts(figure)
+    for part in ("touchdown", "float, clump, body", "s = 0 m", "s = 100 m"):  # both ends are followed
+        assert part in text
+    assert_tidy(figure)
+
+
+def test_without_a_sea_there_is_none() -> None:
+    figure = plot.plot_summary(made(sag))
+    assert set(_by_name(figure)) == set("spPhH")
+    assert _planes(_by_name(figure)["s"]) == [] and all(_sea(ax) == [] for ax in figure.axes)
+    for part in ("touchdown", "contact", "seabed", "water", "float"):
+        assert part not in texts(figure)
+
+
+def test_a_bed_that_is_never_touched_is_a_bed_only() -> None:
+    figure = plot.plot_summary(made(sag, bed=(0.0, 0.0, 1.0, -36.0)))
+    shape = _by_name(figure)["s"]
+    assert set(_by_name(figure)) == set("spPhH") and _sea(shape) == ["seabed"]
+    assert shape.get_ylim()[0] < -38.0 and "touchdown" not in texts(figure)
+    deep = _by_name(plot.plot_summary(made(sag, bed=HIGH_UP)))["s"]
+    assert deep.get_ylim()[0] > -100.0  # one that is far away does not make the cable small
+    assert_tidy(figure)
+
+
+def test_a_cable_that_lifts_off_and_comes_back_leaves_a_gap() -> None:
+    ax = Figure().subplots()
+
+    def height(s: np.ndarray) -> np.ndarray:
+        return -40.0 + 0.01 * np.maximum(s - 20.0, 0.0) ** 2
+
+    result = made(lambda s, t: (s, 0.0, height(s) + 3.0 * (2.0 < t < 6.0)), nt=41, bed=FLAT)
+    plot.plot_touchdown(ax, result)
+    (line,) = ax.lines
+    assert np.array_equal(np.isnan(line.get_ydata()), (result.times > 2.0) & (result.times < 6.0))
+    both = Figure().subplots()
+    plot.plot_touchdown(both, made(lambda s, t: (s, 0.0, height(abs(s - 50.0))), bed=FLAT))
+    assert [line.get_label() for line in both.lines] == ["first contact", "last contact"]
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.7])
+def test_a_sloping_bed_passes_under_the_cable(turn: float) -> None:
+    """Seen in its plane, whatever that is; the bed also falls across it."""
+    normal = np.array([0.1, -0.2, 1.0]) / np.sqrt(1.05)
+
+    def lying(s: np.ndarray, t: float) -> Sequence[Any]:
+        x, y = 5.0 + 0.8 * s * np.cos(turn), 9.0 + 0.8 * s * np.sin(turn)
+        return x, y, -40.0 - 0.1 * x + 0.2 * y + 0.01 * np.maximum(s - 40.0 - t, 0.0) ** 2
+
+    figure = plot.plot_summary(made(lying, nt=5, bed=(*normal, -40.0 * normal[2]), surface=0.0))
+    shape = _by_name(figure)["s"]
+    bed = _planes(shape)[-1].get_xy()
+    (cable,) = (line for line in shape.lines if line.get_label() == "catenary")
+    across, up = cable.get_xdata()[:15], cable.get_ydata()[:15]  # up to s = 35 m it lies
+    assert np.interp(across, bed[:, 0], bed[:, 1]) == pytest.approx(up, abs=1e-9)
+    assert_tidy(figure)
+
+
+def test_what_lies_on_a_bed_is_also_seen_from_above() -> None:
+    """Deeper than it is long, yet the side views alone would hide how it lies."""
+
+    def bight(s: np.ndarray, t: float) -> Sequence[Any]:
+        lies = np.minimum(s, 40.0)
+        return 12.0 * np.sin(lies / 13.0), 12.0 * (1.0 - np.cos(lies / 13.0)), np.maximum(s - 40.0, 0.0) - 60.0
+
+    figure = plot.plot_summary(made(bight, nt=3, bed=(0.0, 0.0, 1.0, -60.0), torque=-0.5))
+    axes = _by_name(figure)
+    assert axes["s"].get_ylabel() == "z (m)" and axes["S"].get_title("left") == "shape from above at t = 10 s"
+    assert _sea(axes["s"]) == ["seabed"] and _sea(axes["S"]) == []
+    assert_tidy(figure)
+
+
+def test_statics_on_a_bed_fill_all_panels() -> None:
+    figure = plot.plot_summary(made(moored, nt=1, bed=FLAT))
+    titles = [_by_name(figure)[k].get_title("left") for k in "pPchTH"]
+    assert titles == ["tension", "|bending moment|", "contact force", "curvature", "angle to z", "position z"]
+    assert_tidy(figure)
+
+
+def test_zones_of_one_kind_are_one() -> None:
+    cut = made(sag, zones=lambda t: [("rod", 0.0, 40.0), ("rod", 40.0, 60.0), ("catenary", 60.0, 100.0)])
+    figure = plot.plot_summary(cut)
+    (joint,) = (line for line in _by_name(figure)["s"].lines if line.get_label() == "joint")
+    assert joint.get_xdata() == pytest.approx([54.0])
+    assert "; rod 0 … 60 m, catenary 60 … 100 m;" in texts(figure)
+
+
+def test_what_stands_still_is_a_straight_line_of_histories() -> None:
+    ax = Figure().subplots()
+    plot.plot_history(ax, made(lambda s, t: (s, 0.0, 1e-10 * np.sin(t))), "position", [50.0], component=2)
+    assert ax.get_ylim() == pytest.approx((-0.1, 0.1)) and ax.get_ylabel() == "Δz (mm)"
 
 
 EVENTS = [
@@ -409,6 +573,7 @@ def test_parts_draw_on_axes_of_the_user() -> None:
         ("N", 0.02, "mN", 1e3),
         ("N", 1000.0, "kN", 1e-3),
         ("N", 999.0, "N", 1.0),
+        ("N/m", 2.5e4, "kN/m", 1e-3),
         ("N m", 3e-5, "µN m", 1e6),
         ("N m", 0.0, "N m", 1.0),
         ("N m", 1e-15, "N m", 1.0),
