@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-KERNEL_ROOMS = ("physics", "solve")
+KERNEL_ROOMS = ("physics", "solve", "adapt")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 
 

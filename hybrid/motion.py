@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
 from hybrid.results.probes import Observer
@@ -20,7 +21,9 @@ from hybrid.scene.schema import Scene
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.timestep import POWERS, Stepper, Taken
 from hybrid.watch import Stop, Watch
+from hybrid.zoning import Zoning
 
+MOST_RESCUES = 20  # of one step, by more rod
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 
 
@@ -35,12 +38,14 @@ class Motion:
         recorder: Recorder,
         target: Path | io.BytesIO,
         equilibrium: Equilibrium | None,
+        zoning: Zoning | None = None,
     ) -> None:
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
         self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
         self.watch = Watch(recorder, model)
+        self.zoning, self._stale = zoning, False
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.cpu = clock.process_time()
         self.work = [0.0] * len(POWERS)
@@ -65,7 +70,7 @@ class Motion:
         assert self.scene.time is not None
         dt = until - self.t
         smallest = dt * 0.5**HALVINGS
-        repeats = wasted = 0
+        repeats = wasted = rescues = 0
         while self.t < until:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
             ends = self.model.ends.at(end)
@@ -75,6 +80,9 @@ class Motion:
             if taken.outcome == Outcome.OK:
                 self._accept(taken, end, repeats, wasted)
                 wasted = 0
+            elif self.zoning is not None and self._rescued(taken, rescues):
+                rescues += 1
+                wasted += taken.iterations
             elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
                 # A slack catenary is no matter of the step: its answer would be grid noise at any dt.
                 self._stop(taken, end - self.t)
@@ -85,6 +93,9 @@ class Motion:
 
     def save(self) -> None:
         """Write an output."""
+        if self._stale:
+            self.observer = self.observer.on(self.model.line, self.model.sea.values, self.model.zones)
+            self._stale = False
         ends = self.model.ends.at(self.t)
         values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work))
         self.recorder.save(self.t, values, self.observer.zone_rows)
@@ -121,6 +132,45 @@ class Motion:
         self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)
+        if self.zoning is not None:
+            ends = self.model.ends.values
+            self.work[-1] += self.zoning.settle(end, dt, ends, self.state)
+            change = self.zoning.look(end, dt, ends, self.state)
+            if change is not None:
+                self._switch(change)
+
+    def _rescued(self, taken: Taken, rescues: int) -> bool:
+        """After a step that failed: more rod where it failed, as long as there is anything to add."""
+        assert self.zoning is not None
+        if rescues > MOST_RESCUES:
+            return False
+        if taken.outcome == Outcome.SLACK:
+            cells = np.flatnonzero((self.model.line.spin == 0) & (self.spare.T <= self.model.slack_floor))
+        else:
+            cells = np.array([min(max(taken.where, 0), self.model.cells - 1)])
+        change = self.zoning.manager.insist(cells)
+        if (change.rod == self.zoning.manager.layout.rod).all():
+            return False
+        self._switch(change)
+        return True
+
+    def _switch(self, change: Change) -> None:
+        """Zones change: nothing moves, and accelerations are found anew."""
+        assert self.zoning is not None
+        ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
+        self.model, self.state, booked = self.zoning.switch(change, self.t, ends, self.state, sea)
+        self.work[-1] += booked
+        base = self.zoning.manager.layout.base
+        for k, (a, b, kind, why) in enumerate(change.reasons):
+            text = f"{why}; energy booked {booked:.3g} J" if k == 0 else why
+            self.recorder.event(self.t, float(base[a]), float(base[b]), "split" if kind == "rod" else "merge", text)
+        self.spare = self.state.copy()
+        floor = self.stepper.floor
+        self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)
+        self.watch.follow(self.model)
+        self._stale = True
+        self._ignite()
+        self.power = self._powers()
 
     def _bring_ends_in(self) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and the result says so."""

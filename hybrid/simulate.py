@@ -29,10 +29,11 @@ from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
 from hybrid.scene.motion import check_motions
 from hybrid.scene.read import scene_text
-from hybrid.scene.schema import Scene, missing_time
+from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.timestep import POWERS
 from hybrid.watch import Watch
+from hybrid.zoning import Zoning, first_zones, manager_for
 
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
@@ -87,16 +88,21 @@ def run(
 
         return run_shooting(scene, output, overwrite)
     model = build(scene)
-    equilibrium = _equilibrium(scene, model, 0.0) if scene.initial.kind == "equilibrium" else None
+    zoning = None
+    if model.layout is not None:
+        model, equilibrium, zoning = _first_zones(scene, model, 0.0)
+    else:
+        equilibrium = _equilibrium(scene, model, 0.0) if scene.initial.kind == "equilibrium" else None
     outputs = output_times(scene)
     stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
+    kinds = {"rod", "catenary"} if zoning else None
     observer = Observer(
-        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), True
+        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), True, kinds
     )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
     with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
-        motion = Motion(scene, model, observer, recorder, target, equilibrium)
+        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning)
         motion.save()
         for stop in stops:
             for until in step_ends(motion.t, stop, scene.time.step):
@@ -143,7 +149,7 @@ class _Told:
         now = clock.perf_counter() - self._begin
         if finished or now - self._last > REPORT_EVERY:
             self._last = now
-            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, self._zones, now))
+            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, motion.model.zones, now))
 
 
 def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
@@ -187,6 +193,24 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
         tried = f"{len(roads)} ways to an equilibrium were tried, the last: {roads[-1].strip()}"
         because = "\n              ".join([*reasons, tried])
         raise ComputationError(failed.outcome, None, failed.s, because) from None
+
+
+def _first_zones(scene: Scene, model: Model, t: float) -> tuple[Model, Equilibrium | None, Zoning]:
+    """Zones, equilibrium if one is asked for, and what will move the zones."""
+    asked = scene.model
+    assert isinstance(asked, AdaptiveModel) and model.layout is not None
+    middle = 0.5 * (model.layout.base[:-1] + model.layout.base[1:])
+    given = np.zeros(middle.size, int)
+    for stretches, sign in ((asked.always_catenary, -1), (asked.always_rod, 1)):
+        for a, b in stretches or ():
+            given[(middle > a) & (middle < b)] = sign
+    manager = manager_for(model, asked.tolerance, asked.dwell, given)
+    equilibrium = None
+    if scene.initial.kind == "equilibrium":
+        model, equilibrium = first_zones(model, manager, t)
+        assert model.layout is not None
+        manager.follow(model.layout)
+    return model, equilibrium, Zoning(model, manager)
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

@@ -52,6 +52,10 @@ class Watch:
             if entry.event:
                 recorder.event(0.0, 0.0, model.length, entry.event, f"{entry.what}: {entry.why}")
 
+    def follow(self, model: Model) -> None:
+        """Watch the same line with other zones."""
+        self._model = model
+
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
         self._recorder.event(t, s, s, kind, text)

@@ -15,15 +15,16 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.ends import EndConditions
 from hybrid.model.ledger import Entry, ledger
+from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
-from hybrid.model.material import material
+from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes
 from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import corners, ends_and_frames, hung, initial_nodes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import FRICTION, SEABED
-from hybrid.scene.schema import Points, RodZone, Scene, Straight, ZonesModel
+from hybrid.scene.schema import AdaptiveModel, Points, RodZone, Scene, Straight, ZonesModel
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
@@ -49,6 +50,8 @@ class Model:
     slack: Literal["stop", "warn"]
     inextensible: bool
     attached: tuple[float, ...]  # m, arc lengths of floats, clumps and end bodies
+    cable: Material
+    layout: Layout | None = None  # of a line whose zones move
 
     @property
     def cells(self) -> int:
@@ -75,7 +78,7 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
             else ZonePlan("catenary", z.catenary, z.cells, z.ratio)
             for z in model.zones
         )
-    return (ZonePlan(model.kind, scene.length),)
+    return (ZonePlan("rod" if isinstance(model, AdaptiveModel) else model.kind, scene.length),)
 
 
 def build(scene: Scene) -> Model:
@@ -88,7 +91,11 @@ def build(scene: Scene) -> Model:
     plans = zone_plans(scene)
     cuts = sorted({*cable.cuts, *corners(scene)})
     mesh = scene.mesh
-    if mesh is not None and mesh.nodes is not None:
+    layout = None
+    if isinstance(scene.model, AdaptiveModel):
+        layout = _layout(scene, cable, cuts)
+        s, zones = layout.nodes, layout.zones
+    elif mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
         s, zones = place_nodes(plans, cuts, mesh.cells if mesh else None, mesh.ratio if mesh else None)
@@ -134,8 +141,29 @@ def build(scene: Scene) -> Model:
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
-        attached=tuple(cable.at.tolist()),
+        attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
     )  # fmt: skip
+
+
+# Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
+# over which a cable without tension bends under its weight; the most rod cells in a base cell.
+BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
+
+
+def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:
+    """Base cells, all rod."""
+    model, mesh = scene.model, scene.mesh
+    assert isinstance(model, AdaptiveModel)
+    whole = (ZonePlan("rod", scene.length),)
+    cells = mesh.cells if mesh and mesh.cells else BASE_CELLS
+    base, _ = place_nodes(whole, cuts, cells, mesh.ratio if mesh else None)
+    middle = 0.5 * (base[:-1] + base[1:])
+    of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
+    EI = cable.B[of, :2].min(axis=1)
+    weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
+    cell = np.full(middle.size, model.rod_cell) if model.rod_cell else ROD_CELL * np.cbrt(EI / weight)
+    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 2, MOST_PARTS).astype(int)
+    return Layout(base, parts, np.ones(middle.size, bool))
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:

@@ -38,6 +38,12 @@ class Surroundings:
         self.values, self._current_ramp, self._wave_ramp = values, current_ramp, wave_ramp
         self.at(np.inf)
 
+    def on(self, cells: int) -> Surroundings:
+        """The same sea around a line of another number of cells."""
+        blank = no_sea(cells)
+        values = self.values._replace(flow=blank.flow, axis=blank.axis, slip=blank.slip, slid=blank.slid)
+        return Surroundings(values, self._current_ramp, self._wave_ramp)
+
     def at(self, t: float) -> Sea:
         """The sea at t; t = infinity asks for what stays: the current fully grown, and no waves."""
         now = self.values.now

@@ -8,6 +8,7 @@ cells, moments and curvatures from the nodes, zone by zone.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -337,6 +338,7 @@ WORK = {
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
     "contact": "work of the damping of the seabed",
     "friction": "work of friction on the seabed",
+    "zones": "energy that zones put in or take out when they change",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
@@ -344,9 +346,12 @@ WORK = {
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
-    def __init__(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats, with_work: bool) -> None:
+    def __init__(
+        self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats, with_work: bool, kinds: set[str] | None = None
+    ) -> None:
+        """kinds: of zones that there may be; None: those that there are."""
         self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s)
-        has = {zone.kind for zone in zones} | ({"seabed"} if line.bits & SEABED else set())
+        has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
         self._first_energy: float | None = None
         self._with_work = with_work
@@ -358,6 +363,12 @@ class Observer:
         if with_work:
             fields += [Field(f"work/{name}", "J", text) for name, text in WORK.items()]
         self.fields = tuple(fields)
+
+    def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
+        """The same fields of a line whose zones have changed."""
+        other = copy(self)
+        other.line, other.sea, other.zones, other.grid = line, sea, tuple(zones), Grid(line.s, zones, self.grid.s)
+        return other
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:

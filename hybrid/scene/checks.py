@@ -14,7 +14,7 @@ from hybrid.scene import sea_checks, start_checks
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.table import Finding, Place
-from hybrid.scene.task import Mesh, Model, Output, RodModel, RodZone, ZonesModel
+from hybrid.scene.task import AdaptiveModel, Mesh, Model, Output, RodModel, RodZone, ZonesModel
 
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:

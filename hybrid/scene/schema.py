@@ -31,6 +31,7 @@ from hybrid.scene.sea import (
 )
 from hybrid.scene.table import Table, Text, Vector, refuse
 from hybrid.scene.task import (
+    AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
     Equilibrium,
@@ -47,7 +48,7 @@ from hybrid.scene.task import (
 )
 
 __all__ = [
-    "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
+    "AdaptiveModel", "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
     "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends", "Environment", "Equilibrium", "Float",
     "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial", "JonswapWaves", "Load", "Mesh", "Model", "Modules",
     "Motion", "Output", "Pinned", "Points", "PowerLawCurrent", "RegularWaves", "RodModel", "RodZone", "Scene",

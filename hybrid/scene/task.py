@@ -14,6 +14,7 @@ from hybrid.scene.table import (
     Finding,
     Kinds,
     NonNegative,
+    NonNegativePair,
     Number,
     Positive,
     Table,
@@ -180,16 +181,39 @@ class ZonesModel(Table):
     slack: Slack = Field(default="stop", description=_SLACK)
 
 
+Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1)]
+
+
+class AdaptiveModel(Table):
+    """Zones that follow the physics: rod where bending, torsion or slack ask for it, catenary elsewhere."""
+
+    kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
+    tolerance: Positive = Field(
+        default=1e-3,
+        le=0.1,
+        description="error of position that leaving bending out may make, as a part of the length of the cable [-]",
+    )
+    rod_cell: Positive | None = Field(
+        default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
+    )
+    dwell: Positive | None = Field(
+        default=None, description="time for which a rod must have been calm before it becomes catenary; absent: chosen [s]"
+    )
+    always_rod: Stretches | None = Field(
+        default=None, description="stretches [s_a, s_b] that are always rod [m]"
+    )
+    always_catenary: Stretches | None = Field(
+        default=None, description="stretches [s_a, s_b] that are always catenary [m]"
+    )
+
+
 Model = Annotated[
     Annotated[RodModel, Tag("<rod>")]
     | Annotated[CatenaryModel, Tag("<catenary>")]
-    | Annotated[ZonesModel, Tag("<zones>")],
+    | Annotated[ZonesModel, Tag("<zones>")]
+    | Annotated[AdaptiveModel, Tag("<adaptive>")],
     Discriminator(by_kind),
-    Kinds(
-        ("rod", "catenary", "zones"),
-        usual=("catenary", "rod"),
-        later=(("adaptive", "choose the zones yourself: kind: zones, with rods where the cable bends"),),
-    ),
+    Kinds(("rod", "catenary", "zones", "adaptive"), usual=("catenary", "rod")),
 ]
 
 

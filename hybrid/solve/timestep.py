@@ -28,7 +28,8 @@ HEAVY = 1e36
 # moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
 # buoyancy at the surface, contact with the seabed, friction on it
 POWERS = (
-    "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact", "friction"
+    "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact", "friction",
+    "zones"
 )  # fmt: skip
 
 
@@ -156,7 +157,7 @@ class Stepper:
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""
         f, n = self.told, self.line.h.size
-        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18], f[19], f[20]]
+        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18], f[19], f[20], 0.0]
         for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
             if ends.held[k]:
                 out[k] -= _dot(f[3 * k : 3 * k + 3], velocity[k])

@@ -1,0 +1,153 @@
+"""The domain manager: watches the criteria, proposes zones, and blends bending in and out.
+
+It proposes; the loop disposes.  What it holds besides the layout is small: how far bending has
+been blended in (`grown`), which rods are on their way out (`leaving`), since when they are calm.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.adapt.criteria import CRITERIA, GIVEN, weigh
+from hybrid.adapt.plan import Rules, planned
+from hybrid.model.layout import Layout
+from hybrid.model.material import Material
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+
+# The tension below which a stretch must be rod, in (EI w^2)^(1/3): there a cable bends under its weight as much as
+# its tension straightens it.
+FLOOR = 1.0
+# Rod on either side of what asks for it, in sqrt(EI/T).
+BUFFER = 2.0
+# Time over which bending comes and goes, in sqrt(m EI)/T, the time a wave of bending takes over sqrt(EI/T).
+BLENDING = 1.5
+# How far ahead a falling tension is seen, in dwell times.
+HORIZON = 0.5
+SHORTEST = 2.0  # base cells that make a zone
+
+
+class Change(NamedTuple):
+    """A proposal: what the base cells should be, and why."""
+
+    rod: np.ndarray
+    reasons: tuple[tuple[int, int, str, str], ...]  # first and last base cell (+1), kind of event, text
+
+
+class DomainManager:
+    """Watches one line.  lengths in m, times in s."""
+
+    def __init__(
+        self, cable: Material, layout: Layout, tolerance: float, dwell: float, given: np.ndarray, scale: float
+    ) -> None:
+        """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N."""
+        n = layout.rod.size
+        self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
+        self.scale = scale
+        self.ratios = np.zeros((len(CRITERIA), n))
+        self.grown, self.leaving = np.ones(n), np.zeros(n, bool)
+        self.calm_since = np.full(n, np.inf)
+        self.before = np.zeros(0)
+        self.follow(layout)
+
+    def follow(self, layout: Layout) -> None:
+        """Take over a layout: what the criteria need of its nodes."""
+        self.layout = layout
+        s = layout.nodes
+        middle = 0.5 * (s[:-1] + s[1:])
+        cable = self.cable
+        of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
+        pad = np.concatenate([[of[0]], of, [of[-1]]])
+        EI = cable.B[:, :2].mean(axis=1)
+        buoy = np.nan_to_num(cable.buoy)
+        weight = np.abs(cable.weight - buoy)
+        self.EI = np.maximum(EI[pad[:-1]], EI[pad[1:]])
+        self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
+        self.m = cable.mass[of]
+        self.kink = (EI[pad[:-1]] != EI[pad[1:]]).astype(np.int8)
+        self.kink[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = 1
+        self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
+        self.base_of_cell = layout.base_of_cell
+        self.before = np.zeros(0)
+
+    def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float) -> None:
+        """Bring the ratios up to date; dt: since the last time, 0 when there was none."""
+        fresh = self.before.size != state.T.size
+        before = state.T if fresh or dt == 0.0 else self.before
+        clamps = ends.frame[:, 2::3] * np.array([[line.element[0]], [line.element[-1]]])
+        ahead = HORIZON * self.dwell / dt if dt > 0.0 else 0.0
+        weigh(
+            line, sea, state.r, state.e, state.T, state.a1, before, ahead, self.EI, self.w, self.kink, self.floor,
+            self.tolerance, clamps, self.base_of_cell, self.ratios,
+        )  # fmt: skip
+        self.before = state.T.copy()
+        self.ratios[GIVEN] = self.given > 0
+
+    def review(self, t: float, state: State) -> Change | None:
+        """What should change now; None most of the time."""
+        rod = self.layout.rod
+        stays = rod & ~self.leaving
+        next_, self.calm_since = planned(
+            self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state)
+        )
+        next_ &= self.given >= 0
+        self.leaving = rod & ~next_
+        gone = self.leaving & (self.grown <= 0.0)
+        new = (rod & ~gone) | next_
+        if (new == rod).all():
+            return None
+        return Change(new, tuple(self._reasons(rod, new)))
+
+    def rules(self, state: State) -> Rules:
+        """The rules at the tensions of a state."""
+        first = self.layout.first[:-1]
+        T = np.minimum.reduceat(state.T, first)
+        EI, floor = self.EI[first], self.floor[first]
+        buffer = BUFFER * np.sqrt(EI / np.maximum(T, floor))
+        return Rules(buffer, SHORTEST * float(np.median(np.diff(self.layout.base))), self.dwell)
+
+    def insist(self, cells: np.ndarray) -> Change:
+        """Rods wanted at once, whatever the criteria say: for a step that failed."""
+        new = self.layout.rod.copy()
+        for j in np.unique(self.base_of_cell[cells]):
+            new[max(j - 1, 0) : j + 2] = True
+        new &= self.given >= 0
+        return Change(new, tuple(self._reasons(self.layout.rod, new, "a step that failed")))
+
+    def _reasons(self, rod: np.ndarray, new: np.ndarray, why: str = "") -> list[tuple[int, int, str, str]]:
+        out = []
+        for j in np.flatnonzero(rod != new):
+            if out and out[-1][1] == j and (out[-1][2] == "rod") == bool(new[j]):
+                out[-1] = (out[-1][0], int(j) + 1, out[-1][2], out[-1][3])
+                continue
+            if new[j]:
+                c = int(np.argmax(self.ratios[:, j]))
+                text = why or f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} of 1, here or within the buffer"
+                out.append((int(j), int(j) + 1, "rod", text))
+            else:
+                c = int(np.argmax(self.ratios[:, j] / [x.off for x in CRITERIA]))
+                out.append((int(j), int(j) + 1, "catenary", f"calm for {self.dwell:.3g} s; most: {CRITERIA[c].name} {self.ratios[c, j]:.3g}"))
+        return out
+
+    @property
+    def blending(self) -> bool:
+        """Whether bending is coming or going anywhere."""
+        rod = self.layout.rod
+        return bool((rod & (np.where(self.leaving, self.grown > 0.0, self.grown < 1.0))).any())
+
+    def blend(self, dt: float, state: State) -> Floats:
+        """Move on by dt; how much of its stiffness every node has (N+1,)."""
+        first = self.layout.first[:-1]
+        T = np.maximum(np.minimum.reduceat(state.T, first), self.floor[first])
+        tau = np.clip(BLENDING * np.sqrt(self.m[first] * self.EI[first]) / T, 2.0 * dt, self.dwell)
+        self.grown = np.clip(self.grown + np.where(self.leaving, -dt, dt) / tau, 0.0, 1.0)
+        return self.parts()
+
+    def parts(self) -> Floats:
+        """How much of its stiffness every node has (N+1,)."""
+        x = self.grown
+        smooth = x * x * (3.0 - 2.0 * x)
+        cells = smooth[self.base_of_cell]
+        out = np.minimum(np.append(cells, cells[-1]), np.append(cells[0], cells))
+        return np.asarray(out)

@@ -1,0 +1,207 @@
+"""Zones that move: carries out what the domain manager proposes on a model, its state and its books."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hybrid.adapt.manager import Change, DomainManager
+from hybrid.adapt.plan import spread, wanted
+from hybrid.adapt.remap import remap
+from hybrid.model.build import Model
+from hybrid.model.layout import Layout
+from hybrid.model.line import line_on
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.physics.loads import FRICTION, SEABED
+from hybrid.physics.seabed import stored
+from hybrid.solve.observe import observe
+from hybrid.solve.statics import Equilibrium, solve_statics
+
+# A stretch that has become chords, or arcs, is let go to its true length over this many dwell times.
+LETTING_GO = 1.0
+# Rounds of zones and equilibrium at the start: each only adds rod, so they end.
+MOST_ROUNDS = 10
+
+
+@dataclass
+class Relaxing:
+    """Cells on their way to their true length: what they lack (N,) m, and since when (N,) s."""
+
+    lack: Floats
+    since: Floats
+
+
+def manager_for(model: Model, tolerance: float, dwell: float | None, given: np.ndarray) -> DomainManager:
+    """The domain manager of a model; tolerance as a part of the length."""
+    assert model.layout is not None
+    wait = dwell if dwell is not None else 0.1 * model.time_scale
+    return DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale)
+
+
+def on_layout(model: Model, layout: Layout) -> Model:
+    """The same model with other zones; its start is not touched."""
+    more = model.line.bits & (SEABED | FRICTION)
+    line = line_on(model.cable, layout.nodes, layout.rod_cells, more)
+    return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
+
+
+def first_zones(model: Model, manager: DomainManager, t: float, **how: object) -> tuple[Model, Equilibrium]:
+    """Zones for an equilibrium, and the equilibrium: all rod first, then rod where the criteria ask for it."""
+    found = _equilibrium(model, t, model.start)
+    layout = model.layout
+    assert layout is not None
+    fine = layout.nodes
+    full = found.state
+    manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
+    rod = _asked(manager, full)
+    best = (model, found)
+    for _ in range(MOST_ROUNDS):
+        new = on_layout(model, layout._replace(rod=rod))
+        start = _picked(full, fine, new.line)
+        try:
+            answer = _equilibrium(new, t, start)
+        except Exception:
+            return best
+        manager.follow(new.layout)  # type: ignore[arg-type]
+        manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
+        more = rod | _asked(manager, answer.state)
+        if (more == rod).all():
+            return new, answer
+        rod = more
+    return best
+
+
+def _asked(manager: DomainManager, state: State) -> np.ndarray:
+    n = manager.layout.rod.size
+    asks = wanted(manager.ratios, np.zeros(n, bool)) | (manager.given > 0)
+    out = spread(asks, manager.layout.base, manager.rules(state).buffer)
+    return np.asarray(out & (manager.given >= 0))
+
+
+def _equilibrium(model: Model, t: float, start: State) -> Equilibrium:
+    return solve_statics(
+        model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
+        shape=model.start_shape,
+    )  # fmt: skip
+
+
+def _picked(state: State, s: Floats, line: Line) -> State:
+    """The state at the nodes of a coarser line, a subset of the nodes s."""
+    from hybrid.model.state import blank_state
+
+    at = np.searchsorted(s, line.s - 1e-9 * s[-1])
+    out = blank_state(line.h.size)
+    out.r[:] = state.r[at]
+    out.e[:] = np.diff(out.r, axis=0)
+    out.T[:] = state.T[at[:-1]]
+    d = out.e / np.linalg.norm(out.e, axis=1)[:, None]
+    a = state.a1[at[:-1]]
+    a = a - np.einsum("ij,ij->i", a, d)[:, None] * d
+    out.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
+    return out
+
+
+class Zoning:
+    """The zones of one motion."""
+
+    def __init__(self, model: Model, manager: DomainManager) -> None:
+        self.model, self.manager = model, manager
+        self.stiff = model.line.kb.copy()  # N m, with all bending
+        self.true = model.line.h.copy()
+        self.relaxing: Relaxing | None = None
+        self.switches = 0
+
+    def look(self, t: float, dt: float, ends: Ends, state: State) -> Change | None:
+        """Weigh the criteria after a step of dt."""
+        manager = self.manager
+        manager.weigh(self.model.line, self.model.sea.values, ends, state, dt)
+        if self._quiet(t):
+            return None
+        return manager.review(t, state)
+
+    def _quiet(self, t: float) -> bool:
+        """True when no plan is needed: no catenary asks for rod, and no rod is calm."""
+        manager = self.manager
+        rod, ratios = manager.layout.rod, manager.ratios
+        top = ratios.max(axis=0)
+        if (top[~rod] > 1.0).any() or manager.leaving.any():
+            return False
+        return bool(rod.all() and (top > 1.0).all()) if not rod.any() else not self._calm(rod, ratios)
+
+    def _calm(self, rod: np.ndarray, ratios: Floats) -> bool:
+        return True  # some rod may be calm: let the plan say
+
+    def settle(self, t: float, dt: float, ends: Ends, state: State) -> float:
+        """Blend bending and let lengths go; returns the energy (J) that this puts in."""
+        booked = 0.0
+        line = self.model.line
+        if self.manager.blending:
+            parts = self.manager.blend(dt, state)
+            before = _bending(line, ends, state)
+            line.kb[:] = parts[:, None] * self.stiff
+            booked += _bending(line, ends, state) - before
+        if self.relaxing is not None:
+            x = np.clip((t - self.relaxing.since) / (LETTING_GO * self.manager.dwell), 0.0, 1.0)
+            left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+            lengths = self.true - self.relaxing.lack * left
+            booked -= float(state.T @ (lengths - line.h))
+            line.h[:] = lengths
+            if not left.any():
+                self.relaxing = None
+        return booked
+
+    def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
+        """The model and the state with other zones, and the energy (J) that the switch puts in."""
+        old, manager, model = self.manager.layout, self.manager, self.model
+        new = old._replace(rod=change.rod)
+        was = _energy(model.line, sea, ends, state)
+        changed = on_layout(model, new)
+        target = changed.line
+        n = new.rod.size
+        kinks = np.zeros(n + 1, bool)
+        kinks[np.searchsorted(new.base, model.cable.at - 1e-9 * model.length)] = True
+        carried = remap(old, new, model.line, target, state, kinks, np.zeros(n))
+        fresh = new.rod & ~old.rod
+        manager.grown[fresh], manager.leaving[fresh] = 0.0, False
+        manager.grown[~new.rod], manager.leaving[~new.rod] = 1.0, False
+        manager.calm_since[fresh] = np.inf
+        manager.follow(new)
+        self.stiff, self.true = target.kb.copy(), target.h.copy()
+        target.kb[:] = manager.parts()[:, None] * self.stiff
+        target.h[:] = carried.lengths
+        since = np.full(target.h.size, t)
+        if self.relaxing is not None:  # what was on its way goes on
+            kept = np.repeat(old.rod == new.rod, new.counts)
+            since[kept] = self.relaxing.since[np.repeat(old.rod == new.rod, old.counts)]
+        lack = self.true - carried.lengths
+        self.relaxing = Relaxing(lack, since) if np.abs(lack).max() > 0.0 else None
+        if self.relaxing is not None and kept_lack(lack, since, t) is not None:
+            x = np.clip((t - since) / (LETTING_GO * manager.dwell), 0.0, 1.0)
+            left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+            self.relaxing.lack = np.where(left > 1e-12, lack / np.maximum(left, 1e-12), 0.0)
+        self.model = changed
+        self.switches += 1
+        return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
+
+
+def kept_lack(lack: Floats, since: Floats, t: float) -> Floats | None:
+    """What cells lack that began to relax before t; None when there are none."""
+    return lack if (since < t).any() else None
+
+
+def _observed(line: Line, ends: Ends, state: State) -> Floats:
+    n = line.h.size
+    M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
+    observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
+    return energy
+
+
+def _bending(line: Line, ends: Ends, state: State) -> float:
+    return float(_observed(line, ends, state)[1:3].sum())
+
+
+def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:
+    """All energy of a state, J."""
+    contact = stored(line, sea, state.r, state.v)[0] if line.bits & SEABED else 0.0
+    return float(_observed(line, ends, state).sum() - np.sum(line.force * state.r) + contact)
