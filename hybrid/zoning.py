@@ -26,10 +26,18 @@ MOST_ROUNDS = 10
 
 @dataclass
 class Relaxing:
-    """Cells on their way to their true length: what they lack (N,) m, and since when (N,) s."""
+    """Cells on their way to their true length: what they lacked (N,) m, at which rate (N,) m/s, when it began (N,) s."""
 
     lack: Floats
+    rate: Floats
     since: Floats
+
+    def at(self, t: float, duration: float) -> tuple[Floats, bool]:
+        """What they lack at t, and whether any still lacks something: a quintic from value and slope to rest."""
+        x = np.clip((t - self.since) / duration, 0.0, 1.0)
+        value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        slope = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
+        return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
 
 
 def manager_for(model: Model, tolerance: float, dwell: float | None, given: np.ndarray) -> DomainManager:
@@ -142,12 +150,11 @@ class Zoning:
             line.kb[:] = parts[:, None] * self.stiff
             booked += _bending(line, ends, state) - before
         if self.relaxing is not None:
-            x = np.clip((t - self.relaxing.since) / (LETTING_GO * self.manager.dwell), 0.0, 1.0)
-            left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-            lengths = self.true - self.relaxing.lack * left
+            lack, going = self.relaxing.at(t, LETTING_GO * self.manager.dwell)
+            lengths = self.true - lack
             booked -= float(state.T @ (lengths - line.h))
             line.h[:] = lengths
-            if not left.any():
+            if not going:
                 self.relaxing = None
         return booked
 
@@ -170,24 +177,19 @@ class Zoning:
         self.stiff, self.true = target.kb.copy(), target.h.copy()
         target.kb[:] = manager.parts()[:, None] * self.stiff
         target.h[:] = carried.lengths
-        since = np.full(target.h.size, t)
+        # new cells go on with the length, and the change of length, that their ends and tension imply
+        kept_now, kept_then = (np.repeat(old.rod == new.rod, x.counts) for x in (new, old))
+        d = carried.state.e / np.linalg.norm(carried.state.e, axis=1)[:, None]
+        rate = -np.einsum("ij,ij->i", d, np.diff(carried.state.v, axis=0)) / (1.0 + target.ck * carried.state.T)
+        lack, since = self.true - carried.lengths, np.full(target.h.size, t)
+        lack[kept_now], rate[kept_now], since[kept_now] = 0.0, 0.0, -np.inf
         if self.relaxing is not None:  # what was on its way goes on
-            kept = np.repeat(old.rod == new.rod, new.counts)
-            since[kept] = self.relaxing.since[np.repeat(old.rod == new.rod, old.counts)]
-        lack = self.true - carried.lengths
-        self.relaxing = Relaxing(lack, since) if np.abs(lack).max() > 0.0 else None
-        if self.relaxing is not None and kept_lack(lack, since, t) is not None:
-            x = np.clip((t - since) / (LETTING_GO * manager.dwell), 0.0, 1.0)
-            left = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-            self.relaxing.lack = np.where(left > 1e-12, lack / np.maximum(left, 1e-12), 0.0)
+            for mine, its in ((lack, self.relaxing.lack), (rate, self.relaxing.rate), (since, self.relaxing.since)):
+                mine[kept_now] = its[kept_then]
+        self.relaxing = Relaxing(lack, rate, since)
         self.model = changed
         self.switches += 1
         return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
-
-
-def kept_lack(lack: Floats, since: Floats, t: float) -> Floats | None:
-    """What cells lack that began to relax before t; None when there are none."""
-    return lack if (since < t).any() else None
 
 
 def _observed(line: Line, ends: Ends, state: State) -> Floats:
