@@ -1,7 +1,7 @@
 """What a run writes down: quantities on the fixed output grid, evaluated only when an output is due.
 
 Second order everywhere: positions by cubic Hermite interpolation of the nodes (one-sided
-at joints, where the tangent may kink), tensions and tangents from the middle of the
+at joints and at point loads in catenaries, where the tangent may kink), tensions and tangents from the middle of the
 cells, moments and curvatures from the nodes, zone by zone.
 """
 
@@ -10,6 +10,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -56,15 +57,24 @@ def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
     return at
 
 
-def stretches(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Zones with neighbours of the same kind made one: what joints, and nothing else, cut the line into."""
+def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
+    """What joints, and point loads in catenaries, cut the line into: neighbours of the same kind are made one first.
+
+    loads: arc lengths (m) of floats, clumps and the like; a catenary has a kink there.
+    """
     whole: list[Zone] = []
     for zone in zones:
         if whole and whole[-1].kind == zone.kind:
             whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
         else:
             whole.append(zone)
-    return tuple(whole)
+    parts: list[Zone] = []
+    for zone in whole:
+        near = 1e-9 * whole[-1].s_b
+        kinks = [x for x in loads if zone.kind == "catenary" and zone.s_a + near < x < zone.s_b - near]
+        bounds = [zone.s_a, *kinks, zone.s_b]
+        parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
+    return tuple(parts)
 
 
 class Grid:
@@ -77,7 +87,7 @@ class Grid:
     shows the side before it.
     """
 
-    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
+    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = ()) -> None:
         n = nodes_s.size
         cubic: list[tuple[int, int, float]] = []
         held: list[tuple[int, int, float]] = []
@@ -87,7 +97,8 @@ class Grid:
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         done = np.zeros(s.size, bool)
         self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the stretch's sides
-        for zone in stretches(zones):
+        self.parts = stretches(zones, loads)
+        for zone in self.parts:
             a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
             offset = len(self.side_nodes)
             self.spans.append((a, b, offset))
@@ -141,7 +152,7 @@ class View:
 
     @property
     def stored(self) -> float:
-        return float(stored(self.line, self.sea, self.state.r, self.state.v)[0])
+        return float(stored(self.line, self.sea, self.state.r))
 
     @property
     def contact(self) -> Floats:
@@ -210,7 +221,7 @@ class View:
         sharp = np.zeros(line.s.size)
         sharp[1:-1] = 2.0 * sine / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1])
         strain = self._observed[1]
-        for zone, (a, b, o) in zip(stretches(self.zones), self.grid.spans, strict=True):
+        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
             side = out[o : o + b - a + 1]
             if zone.kind == "rod":
                 k = strain[a : b + 1] / line.hn[a : b + 1, None]
@@ -344,8 +355,17 @@ WORK = {
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
-    def __init__(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats, with_work: bool) -> None:
-        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s)
+    def __init__(
+        self,
+        line: Line,
+        sea: Sea,
+        zones: Sequence[Zone],
+        s: Floats,
+        with_work: bool,
+        loads: Sequence[float] = (),
+    ) -> None:
+        """loads: arc lengths of point loads, m."""
+        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
         has = {zone.kind for zone in zones} | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
         self._first_energy: float | None = None
