@@ -97,7 +97,13 @@ def run(
     stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
     kinds = {"rod", "catenary"} if zoning else None
     observer = Observer(
-        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), True, kinds
+        model.line,
+        model.sea.values,
+        model.zones,
+        output_points(scene.output.points, model.length),
+        True,
+        model.attached,
+        kinds,
     )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
@@ -162,7 +168,12 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     model = build(scene)
     found = _equilibrium(scene, model, np.inf)
     observer = Observer(
-        model.line, model.sea.values, model.zones, output_points(scene.output.points, model.length), False
+        model.line,
+        model.sea.values,
+        model.zones,
+        output_points(scene.output.points, model.length),
+        False,
+        model.attached,
     )
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:

@@ -205,5 +205,5 @@ def _bending(line: Line, ends: Ends, state: State) -> float:
 
 def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:
     """All energy of a state, J."""
-    contact = stored(line, sea, state.r, state.v)[0] if line.bits & SEABED else 0.0
+    contact = stored(line, sea, state.r) if line.bits & SEABED else 0.0
     return float(_observed(line, ends, state).sum() - np.sum(line.force * state.r) + contact)

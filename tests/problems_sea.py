@@ -102,9 +102,9 @@ def resting_line(cells: int, stiffness: float, axial_stiffness: float | None = 2
 
 
 # A flexible line at rest has dT/dz = w - (force of the bed per length), so T = H + w (z + sunk w/k) above a soft bed: sunk =
-# 5/4 - k^2/w^2 (int of P over the 5/4 w/k that it sinks), P = p^2/(2 o) up to the onset o = w/(2 k), then p - o/2.
+# 1 - k^2/w^2 (int of P over the w/k + o/2 that it sinks), P = p^2/(2 o) up to the onset o = w/(2 k), then p - o/2.
 # (Without an onset it would be 1/2.)  That, as a deeper bed, is exact but for (slope at the bed)^3 H/w.
-SUNK = 1.25 - (1.25**2 / 2 - 0.5 * 1.25 / 2 + 0.5**2 / 6)
+SUNK = 1.0 - (1.25**2 / 2 - 0.5 * 1.25 / 2 + 0.5**2 / 6)
 
 
 def grounded_catenary(
@@ -147,7 +147,7 @@ def lift_off(eps: float, cells_per_lambda: int) -> tuple[Scene, float, float]:
     """
     H, w = LAYER_H, eps * LAYER_H
     k = H * LAYER_BED**4
-    rest, lies, near = 1.25 * w / k, 15.0, 15.0
+    rest, lies, near = w / k, 15.0, 15.0
     lifted = 5.0 / eps
     q = np.linspace(0.0, lifted, 401)
     t = np.maximum(q - 1.0, 0.0) * eps
@@ -194,7 +194,7 @@ def layer_exact(eps: float, far: float | None = None) -> tuple[float, float, flo
 
 def node_contact(result: hybrid.Result, stiffness: float, onset: float, bed: float = 0.0) -> Floats:
     """Force of a level, undamped bed on every node of the last output (whose points are the nodes), N."""
-    p, h = bed - result.position[-1][:, 2], np.diff(result.s)
+    p, h = bed + 0.5 * onset - result.position[-1][:, 2], np.diff(result.s)
     N = np.zeros(result.s.size)
     for c in np.flatnonzero(np.maximum(p[:-1], p[1:]) > 0.0):
         N[c] += contact(p[c], p[c + 1], 0.0, 0.0, h[c], stiffness, 0.0, onset)[0]
@@ -623,9 +623,9 @@ def dragged(cells: int, model: str, sideways: bool, start: str) -> tuple[Scene, 
 
     The pull is mu w L.  Along: round-off (every node slides under mu N, and the sum of all N is the weight); 1e-6.
     Sideways: held taut (0.25 % strain) it bows by less than 2 deg, so 0.1 % of mu w L; 0.2 % with what is left of its
-    swaying, which friction does not damp, so there is damping (whose pull is known).  Starts at the depth of rest, w/k + onset/2 with onset w/(2 k).
+    swaying, which friction does not damp, so there is damping (whose pull is known).  Starts at the depth of rest, w/k.
     """
-    depth = -1.25 * PRESS / BED_K
+    depth = -PRESS / BED_K
     far = 100.25 if sideways else 100.0
     points = [[0.0, 0.0, depth], [far, 0.0, depth]]
     motion = {"velocity": [0.0, 0.1, 0.0] if sideways else [0.1, 0.0, 0.0], "ramp": 5.0 if sideways else 2.0}
@@ -651,7 +651,7 @@ def on_a_slope(part: float, cells: int, model: str, across: bool, start: str, du
     mu = 0.5
     slope = math.tan(part * math.atan(mu))
     a = math.atan(slope)
-    depth = (PRESS * math.cos(a) + 0.25 * PRESS) / BED_K
+    depth = PRESS * math.cos(a) / BED_K
     first = depth * np.array([math.sin(a), 0.0, -math.cos(a)])
     d = np.array([0.0, 1.0, 0.0]) if across else np.array([math.cos(a), 0.0, math.sin(a)])
     what = sea_scene(
@@ -667,7 +667,7 @@ def dropped(stiffness: float, damping: float, step: float) -> Scene:
     """A rod of 10 m and 5 kg/m that falls flat from 0.5 m on a bed: in its 0.32 s of fall there are 32 steps of 10 ms.
 
     Overdamped beds (damping > 2 sqrt(k m)) and ones that hold what leaves them: it stays down and comes to rest at
-    w/k + onset/2, and no step may make energy of a blow that is shorter than itself.
+    w/k, and no step may make energy of a blow that is shorter than itself.
     """
     section = {"length": 10.0, "mass": 5.0, "diameter": 0.03, "bending_stiffness": 100.0}
     return sea_scene(

@@ -187,7 +187,7 @@ def test_sea_runs_as_a_rod_everywhere(name: str) -> None:
 def test_sea_runs_as_a_catenary_or_says_where_it_is_slack(name: str) -> None:
     scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model=catenary"])
     if name == "laying":  # the end on the bed pulls at nothing
-        with pytest.raises(hybrid.ComputationError, match="s = 0 m") as stopped:
+        with pytest.raises(hybrid.ComputationError, match="lies free on a seabed without friction") as stopped:
             hybrid.static(scene)
         assert stopped.value.outcome == hybrid.Outcome.SLACK and "make this stretch a rod zone" in str(stopped.value)
         return
@@ -275,7 +275,7 @@ def test_touchdown_is_that_of_a_catenary_at_rest_and_moves_with_the_fairlead() -
     assert round(H) == 14285
     assert result.tension[0, 0] == pytest.approx(H, rel=3e-3)
     assert result.tension[0, -1] == pytest.approx(H + w * depth, rel=3e-3)
-    assert ran_as("rod", "touchdown").tension[0, 0] == pytest.approx(H, rel=5e-4)  # more cells
+    assert ran_as("rod", "touchdown").tension[0, 0] == pytest.approx(H, rel=1e-3)  # more cells; the bed gives way
     rounded = math.sqrt(2 * w / 5e3 * H / w)  # where a parabola of curvature w/H is w/k above the line on the bed
     assert result.touchdown[0, 1] == pytest.approx(length - hanging(H) + rounded, abs=0.5)
     late = settled(result, 52.0)
@@ -350,10 +350,10 @@ def test_buoy_follows_an_irregular_sea() -> None:
     frequency, power = np.fft.rfftfreq(z.size, 0.25), np.abs(np.fft.rfft(z - z.mean())) ** 2
     assert frequency[power.argmax()] == pytest.approx(1 / 9.0, rel=0.15)
     buoy, chain = result.tension[late, -1], result.tension[late][:, result.s < 50]
-    assert (buoy.min(), buoy.max()) == pytest.approx((600, 1581), rel=0.02)
+    assert (buoy.min(), buoy.max()) == pytest.approx((548, 1466), rel=0.02)
     assert chain.min() == pytest.approx(-213, rel=0.3)
     end = result.touchdown[late, 1]
-    assert 32 < end.min() < 34 and 38 < end.max() < 39
+    assert 32 < end.min() < 34 and 38 < end.max() < 40
     assert not result.events
 
 

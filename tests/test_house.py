@@ -46,7 +46,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/touchdown": ("model",),
     "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/touchdown"),
     "watch": ("errors", "model", "solve", "results"),
-    "motion": ("errors", "watch", "scene", "model", "solve", "adapt", "results"),
+    "motion": ("errors", "watch", "scene", "physics", "model", "solve", "adapt", "results"),
     "simulate": (
         "errors",
         "scene",

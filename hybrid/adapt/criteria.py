@@ -103,9 +103,17 @@ def weigh(line, sea, r, e, T, a1, before, a, EI, w, kink, floor, tolerance, clam
         ratios[which, ja] = max(ratios[which, ja], ratio)
         ratios[which, jb] = max(ratios[which, jb], ratio)
         if line.bits & SEABED and 0 < i < n:
-            p = sea.offset - (sea.normal[0] * r[i, 0] + sea.normal[1] * r[i, 1] + sea.normal[2] * r[i, 2])
+            p = (
+                sea.offset
+                + 0.5 * sea.onset
+                - (sea.normal[0] * r[i, 0] + sea.normal[1] * r[i, 1] + sea.normal[2] * r[i, 2])
+            )
             k = i + 1 if p > 0.0 else i - 1
-            q = sea.offset - (sea.normal[0] * r[k, 0] + sea.normal[1] * r[k, 1] + sea.normal[2] * r[k, 2])
+            q = (
+                sea.offset
+                + 0.5 * sea.onset
+                - (sea.normal[0] * r[k, 0] + sea.normal[1] * r[k, 1] + sea.normal[2] * r[k, 2])
+            )
             if (p > 0.0) != (q > 0.0):
                 ratio = EI[i] * w[i] / (T1 * T1 * tolerance)
                 ratios[EDGE, ja] = max(ratios[EDGE, ja], ratio)

@@ -88,9 +88,7 @@ class DomainManager:
         """What should change now; None most of the time."""
         rod = self.layout.rod
         stays = rod & ~self.leaving
-        next_, self.calm_since = planned(
-            self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state)
-        )
+        next_, self.calm_since = planned(self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state))
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
         gone = self.leaving & (self.grown <= 0.0)
@@ -127,7 +125,14 @@ class DomainManager:
                 out.append((int(j), int(j) + 1, "rod", text))
             else:
                 c = int(np.argmax(self.ratios[:, j] / [x.off for x in CRITERIA]))
-                out.append((int(j), int(j) + 1, "catenary", f"calm for {self.dwell:.3g} s; most: {CRITERIA[c].name} {self.ratios[c, j]:.3g}"))
+                out.append(
+                    (
+                        int(j),
+                        int(j) + 1,
+                        "catenary",
+                        f"calm for {self.dwell:.3g} s; most: {CRITERIA[c].name} {self.ratios[c, j]:.3g}",
+                    )
+                )
         return out
 
     @property

@@ -24,7 +24,9 @@ class Remapped(NamedTuple):
     lengths: Floats
 
 
-def remap(old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats) -> Remapped:
+def remap(
+    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats
+) -> Remapped:
     """Carry a state from one layout to another of the same base.
 
     line, target: the old and the new line; kinks: (n+1,) bool, base nodes where the tangent may jump (point loads);

@@ -23,6 +23,7 @@ from hybrid.model.state import Floats
 from hybrid.physics.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.scene.schema import Clamped, Guided, Scene, Section
 
+SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height")
 
 
@@ -179,9 +180,10 @@ def _points(out: Material, scene: Scene) -> None:
         out.points["point_displaced"][i] += displaced
         if fluid.surface is None:
             out.lift[i] += gravity * displaced
-        elif displaced > 0.0:
+        else:
             out.points["point_buoy"][i] += gravity * displaced
-            out.points["point_height"][i] = max(out.points["point_height"][i], body.height_in(rho, gravity))
+            height = body.height_in(rho, gravity) or 2.0 * np.sqrt(body.drag_area / np.pi) or SMALLEST_BODY
+            out.points["point_height"][i] = max(out.points["point_height"][i], height)
     asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
     if any(out.points[name].any() for name in asked):
         out.bits |= BODIES

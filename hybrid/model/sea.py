@@ -25,8 +25,8 @@ ONSET = 0.5
 # Elastic travel of friction as a part of the diameter: far below what anyone measures on a seabed.
 SLIP_LENGTH = 0.01
 # Heights at which a power law is tabulated, and how they crowd towards its foot, where it is steep:
-# linear interpolation is then right to 1e-5 of the largest speed, but within 1e-6 of the depth of the foot.
-POWER_LAW_HEIGHTS, CROWDING = 400, 4
+# linear interpolation of the usual seventh root is then right to 1e-5 of the largest speed.
+POWER_LAW_HEIGHTS, CROWDING = 800, 8
 # Frequencies of an irregular sea, in peak frequencies: outside lies less than 0.2 % of its energy.
 LOWEST, HIGHEST = 0.3, 6.0
 
@@ -140,7 +140,7 @@ def current_table(scene: Scene) -> tuple[Floats, Floats]:
 def components(waves: RegularWaves | JonswapWaves, depth: float, gravity: float) -> Floats:
     """Wave components (W, 6): amplitude, frequency, kx, ky, phase, k (m, 1/s, 1/m, 1/m, rad, 1/m).
 
-    An irregular sea gets components of equal energy, each at the median of its share of the JONSWAP
+    An irregular sea gets components of equal energy, each at the root mean square of its share of the JONSWAP
     spectrum (Hasselmann et al. 1973), with phases drawn from the seed: no frequency is a multiple of
     another, so the sea does not repeat itself, and its variance is that of the spectrum exactly.
     """
@@ -166,8 +166,14 @@ def jonswap(omega: Floats, peak: float, gamma: float) -> Floats:
 
 
 def frequencies(peak: float, gamma: float, n: int) -> Floats:
-    """Medians of n parts of equal energy of a JONSWAP spectrum, 1/s."""
+    """Root mean squares of n parts of equal energy of a JONSWAP spectrum, 1/s.
+
+    The variance of the sea and that of its rate are then those of the spectrum.
+    """
     omega = peak * np.geomspace(LOWEST, HIGHEST, 20_001)
     S = jonswap(omega, peak, gamma)
-    energy = np.concatenate([[0.0], np.cumsum(0.5 * (S[1:] + S[:-1]) * np.diff(omega))])
-    return np.interp((np.arange(n) + 0.5) / n * energy[-1], energy, omega)
+    energy, rate = (
+        np.concatenate([[0.0], np.cumsum(0.5 * (y[1:] + y[:-1]) * np.diff(omega))]) for y in (S, omega**2 * S)
+    )
+    parts = np.interp(np.arange(n + 1) / n * energy[-1], energy, rate)
+    return np.asarray(np.sqrt(np.diff(parts) * n / energy[-1]))

@@ -64,8 +64,8 @@ class Ends(NamedTuple):
 class Sea(NamedTuple):
     """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
 
-    The last three are work arrays: `flow` is filled by `physics.water.stir`, `axis` and `slip` at the start of a
-    step, `slid` by the march.
+    The last five are work arrays: `flow` is filled by `physics.water.stir`, `axis` and `slip` at the start of a
+    step, `slid` and `bed` by the march.
     """
 
     z: Floats  # (K,) m, increasing: heights of the current profile
@@ -85,6 +85,7 @@ class Sea(NamedTuple):
     axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
     slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
     slid: Floats  # (N+1, 3) m, at its end
+    bed: Floats  # (N+1, 3) N, force of the seabed on the nodes
 
 
 class State(NamedTuple):
@@ -101,6 +102,7 @@ class State(NamedTuple):
     wa: Floats  # (N,) 1/s2, algorithmic spin acceleration
     wd: Floats  # (N,) 1/s2, true spin acceleration
     slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
+    bed: Floats  # (N+1, 3) N, force of the seabed
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -111,7 +113,7 @@ def blank_state(n_cells: int) -> State:
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
     w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
-    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node))
+    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node))
 
 
 def no_sea(n_cells: int) -> Sea:
@@ -120,5 +122,5 @@ def no_sea(n_cells: int) -> Sea:
     return Sea(
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]),
         np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
-        np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node),
+        np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
     )  # fmt: skip

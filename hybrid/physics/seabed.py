@@ -4,9 +4,10 @@ A cell that touches presses on the bed with the force per length
 
     q = k P(p) + c P'(p) dp/dt, never below 0,   P = p^2/(2 o) for 0 < p < o,  p - o/2 beyond
 
-of the penetration p of its centreline, o the onset.  It is integrated along the chord with
-the shape functions of the nodes, piece by piece between the points where p is 0 or o, so that
-two Gauss points a piece are exact: the force is a smooth function of the configuration while
+of the penetration p of its centreline, counted from half an onset o above the bed: the onset then
+rounds the corner of the linear law, which is right at and beyond that depth.  It is integrated along the chord with
+the shape functions of the nodes, piece by piece between the points where p is 0 or o or q
+becomes 0, so that two Gauss points a piece are exact: the force is a smooth function of the configuration while
 touchdown travels through a cell, and without damping it has a potential.
 
     symbol   meaning                                                shape  unit   frame
@@ -51,12 +52,33 @@ def pieces(p0, p1, o):
     return min(max(z, 0.0), 1.0), min(max(y, 0.0), 1.0)
 
 
+@inner
+def released(a, b, p0, p1, v0, v1, k, c, o):
+    """Where between a and b, within one piece, damping would begin (or cease) to pull, else b: q is 0 from or up to there.
+
+    Within a piece q is p, or 1, times a linear function, whose zero this is.
+    """
+    slope, shift = (0.5, 0.0) if p0 + 0.5 * (a + b) * (p1 - p0) < o else (1.0, 0.5 * o)
+    fa = k * (slope * (p0 + a * (p1 - p0)) - shift) + c * (v0 + a * (v1 - v0))
+    fb = k * (slope * (p0 + b * (p1 - p0)) - shift) + c * (v0 + b * (v1 - v0))
+    return a - fa / (fb - fa) * (b - a) if fa * fb < 0.0 else b
+
+
+@inner
+def cut(p0, p1, v0, v1, k, c, o):
+    """The parts of the way between the nodes over which q is a polynomial."""
+    xb, xd = pieces(p0, p1, o)
+    xa = released(0.0, xb, p0, p1, v0, v1, k, c, o)
+    xc = released(xb, xd, p0, p1, v0, v1, k, c, o)
+    xe = released(xd, 1.0, p0, p1, v0, v1, k, c, o)
+    return ((0.0, xa), (xa, xb), (xb, xc), (xc, xd), (xd, xe), (xe, 1.0))
+
+
 @kernel
 def contact(p0, p1, v0, v1, h, k, c, o):
     """Force N on the node at p0, and its derivatives by p0, p1, v0, v1.  Called where one of p0, p1 is positive."""
-    xb, xc = pieces(p0, p1, o)
     N = N0 = N1 = V0 = V1 = 0.0
-    for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
+    for a, b in cut(p0, p1, v0, v1, k, c, o):
         w = 0.5 * h * (b - a)
         if w <= 0.0:
             continue
@@ -73,35 +95,27 @@ def contact(p0, p1, v0, v1, h, k, c, o):
 
 
 @kernel
-def stored(line, sea, r, v):
-    """Energy (J) that the bed has stored under the line, and the power (W) that its damping takes out."""
-    energy = power = 0.0
-    n, k, c, o = sea.normal, sea.stiffness, sea.damping, sea.onset
+def stored(line, sea, r):
+    """Energy (J) that the bed has stored under the line."""
+    energy = 0.0
+    n, k, o = sea.normal, sea.stiffness, sea.onset
     for i in range(line.h.shape[0]):
-        p0 = sea.offset - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
-        p1 = sea.offset - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
+        p0 = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+        p1 = sea.offset + 0.5 * o - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
         if p0 <= 0.0 and p1 <= 0.0:
             continue
-        v0 = -(n[0] * v[i, 0] + n[1] * v[i, 1] + n[2] * v[i, 2])
-        v1 = -(n[0] * v[i + 1, 0] + n[1] * v[i + 1, 1] + n[2] * v[i + 1, 2])
         xb, xc = pieces(p0, p1, o)
         for a, b in ((0.0, xb), (xb, xc), (xc, 1.0)):
             w = 0.5 * line.h[i] * (b - a)
             if w <= 0.0:
                 continue
             for g in (G1, G2):
-                x = a + g * (b - a)
-                p, s = p0 + x * (p1 - p0), v0 + x * (v1 - v0)
-                if p <= 0.0:
-                    continue
-                q, _, _ = pressure(x, p0, p1, v0, v1, k, c, o)
+                p = p0 + (a + g * (b - a)) * (p1 - p0)
                 if p >= o:
                     energy += w * k * (0.5 * p * (p - o) + o * o / 6.0)
-                    power += w * (q - k * (p - 0.5 * o)) * s
-                else:
+                elif p > 0.0:
                     energy += w * k * p * p * p / (6.0 * o)
-                    power += w * (q - 0.5 * k * p * p / o) * s
-    return energy, power
+    return energy
 
 
 @inner

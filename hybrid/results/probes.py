@@ -1,7 +1,7 @@
 """What a run writes down: quantities on the fixed output grid, evaluated only when an output is due.
 
 Second order everywhere: positions by cubic Hermite interpolation of the nodes (one-sided
-at joints, where the tangent may kink), tensions and tangents from the middle of the
+at joints and at point loads in catenaries, where the tangent may kink), tensions and tangents from the middle of the
 cells, moments and curvatures from the nodes, zone by zone.
 """
 
@@ -11,6 +11,7 @@ from collections.abc import Callable, Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -57,15 +58,24 @@ def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
     return at
 
 
-def stretches(zones: Sequence[Zone]) -> tuple[Zone, ...]:
-    """Zones with neighbours of the same kind made one: what joints, and nothing else, cut the line into."""
+def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
+    """What joints, and point loads in catenaries, cut the line into: neighbours of the same kind are made one first.
+
+    loads: arc lengths (m) of floats, clumps and the like; a catenary has a kink there.
+    """
     whole: list[Zone] = []
     for zone in zones:
         if whole and whole[-1].kind == zone.kind:
             whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
         else:
             whole.append(zone)
-    return tuple(whole)
+    parts: list[Zone] = []
+    for zone in whole:
+        near = 1e-9 * whole[-1].s_b
+        kinks = [x for x in loads if zone.kind == "catenary" and zone.s_a + near < x < zone.s_b - near]
+        bounds = [zone.s_a, *kinks, zone.s_b]
+        parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
+    return tuple(parts)
 
 
 class Grid:
@@ -78,7 +88,7 @@ class Grid:
     shows the side before it.
     """
 
-    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats) -> None:
+    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = ()) -> None:
         n = nodes_s.size
         cubic: list[tuple[int, int, float]] = []
         held: list[tuple[int, int, float]] = []
@@ -88,7 +98,8 @@ class Grid:
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         done = np.zeros(s.size, bool)
         self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the stretch's sides
-        for zone in stretches(zones):
+        self.parts = stretches(zones, loads)
+        for zone in self.parts:
             a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
             offset = len(self.side_nodes)
             self.spans.append((a, b, offset))
@@ -142,7 +153,7 @@ class View:
 
     @property
     def stored(self) -> float:
-        return float(stored(self.line, self.sea, self.state.r, self.state.v)[0])
+        return float(stored(self.line, self.sea, self.state.r))
 
     @property
     def contact(self) -> Floats:
@@ -211,7 +222,7 @@ class View:
         sharp = np.zeros(line.s.size)
         sharp[1:-1] = 2.0 * sine / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1])
         strain = self._observed[1]
-        for zone, (a, b, o) in zip(stretches(self.zones), self.grid.spans, strict=True):
+        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
             side = out[o : o + b - a + 1]
             if zone.kind == "rod":
                 k = strain[a : b + 1] / line.hn[a : b + 1, None]
@@ -347,10 +358,18 @@ class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
     def __init__(
-        self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats, with_work: bool, kinds: set[str] | None = None
+        self,
+        line: Line,
+        sea: Sea,
+        zones: Sequence[Zone],
+        s: Floats,
+        with_work: bool,
+        loads: Sequence[float] = (),
+        kinds: set[str] | None = None,
     ) -> None:
-        """kinds: of zones that there may be; None: those that there are."""
-        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s)
+        """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are."""
+        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
+        self._loads = tuple(loads)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
         self._first_energy: float | None = None
@@ -367,7 +386,12 @@ class Observer:
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
         """The same fields of a line whose zones have changed."""
         other = copy(self)
-        other.line, other.sea, other.zones, other.grid = line, sea, tuple(zones), Grid(line.s, zones, self.grid.s)
+        other.line, other.sea, other.zones, other.grid = (
+            line,
+            sea,
+            tuple(zones),
+            Grid(line.s, zones, self.grid.s, self._loads),
+        )
         return other
 
     @property

@@ -18,8 +18,8 @@ class Touchdown(NamedTuple):
 
 
 def penetration(sea: Sea, r: Floats) -> Floats:
-    """How deep points (n, 3) lie in the seabed, m; negative above it."""
-    return np.asarray(sea.offset - r @ sea.normal)
+    """How deep points (n, 3) lie below where contact begins, m: half an onset above the seabed; negative above that."""
+    return np.asarray(sea.offset + 0.5 * sea.onset - r @ sea.normal)
 
 
 def touchdown(line: Line, sea: Sea, state: State) -> Touchdown:

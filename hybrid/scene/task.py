@@ -197,11 +197,10 @@ class AdaptiveModel(Table):
         default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
     )
     dwell: Positive | None = Field(
-        default=None, description="time for which a rod must have been calm before it becomes catenary; absent: chosen [s]"
+        default=None,
+        description="time for which a rod must have been calm before it becomes catenary; absent: chosen [s]",
     )
-    always_rod: Stretches | None = Field(
-        default=None, description="stretches [s_a, s_b] that are always rod [m]"
-    )
+    always_rod: Stretches | None = Field(default=None, description="stretches [s_a, s_b] that are always rod [m]")
     always_catenary: Stretches | None = Field(
         default=None, description="stretches [s_a, s_b] that are always catenary [m]"
     )

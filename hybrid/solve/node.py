@@ -113,7 +113,7 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
 def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
     """Contact and friction at node i: F, D, GL, GR."""
     n = (sea.normal[0], sea.normal[1], sea.normal[2])
-    p, vi = sea.offset - dot(n, x), get3(v, i)
+    p, vi = sea.offset + 0.5 * sea.onset - dot(n, x), get3(v, i)
     pd = -dot(n, vi)
     N = DN = NL = NR = 0.0  # force along n; its derivatives by the penetration of node i, and by those beside it
     touched = 0.0
@@ -142,9 +142,9 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
             sea.slip[i, 2] + u[i, 2] - w * n[2],
         )
         f, g, D, part = friction(q, N, get3(sea.axis, i), n, sea.friction[0], sea.friction[1], sea.slip_length)
-        report[20] += dot(f, vi)
         F, slope, q = add(F, f), add(n, g), scale(part, q)
     sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = q
+    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
     # penetrations: dp_i = -n.dr_i, dp_{i-1} = -n.(dr_i - de), dp_{i+1} = -n.(dr_i + de)
     S = outer(slope, n)
     return F, madd(D, mscale(-(DN + NL + NR), S)), mscale(NL, S), mscale(-NR, S)

@@ -21,6 +21,8 @@ REACH = 0.1  # of the length: largest shift of a node in one iteration
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
 # length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
 ANCHOR, NEUTRAL = 1e-12, 1e-9
+# An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
+BALANCED, BALANCING = 1e-6, 4
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -150,19 +152,26 @@ class _Solver:
         new = start.copy()
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
             still[:] = 0.0
-        u = np.zeros_like(new.r)
-        if line.bits & FRICTION:
-            lay(self.sea, new.e, new.slip)
         most = MOST_TURNING if turning else MOST_ITERATIONS
-        outcome, iterations, _, where = newton(
-            line, sea or self.sea, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-            0.0, self.anchor, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
-            self.report, self.rows,
-        )  # fmt: skip
-        self.total += iterations
-        new.r[:] += u
-        new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
-        new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
+        for _ in range(BALANCING):
+            u = np.zeros_like(new.r)
+            if line.bits & FRICTION:
+                lay(self.sea, new.e, new.slip)
+            outcome, iterations, _, where = newton(
+                line, sea or self.sea, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
+                0.0, self.anchor, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
+                self.report, self.rows,
+            )  # fmt: skip
+            self.total += iterations
+            new.r[:] += u
+            new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
+            new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
+            if outcome != Outcome.OK or line is not self.line or sea is not None:
+                break
+            # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
+            if self.prove(ends, new) <= BALANCED * (float(np.abs(new.T).max()) + self.scale):
+                break
+            outcome, where = Outcome.NOT_CONVERGED, int(self.report[16])
         if outcome == Outcome.OK:
             tension, cell = lowest(line, new.T)
             if not tension > self.floor:

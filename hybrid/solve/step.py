@@ -337,6 +337,13 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
         report[22], report[23], report[24], report[25] = sharpest(line, ends, new.e, new.T, new.a1)
         report[26], report[27] = lowest(line, new.T)
         if line.bits & SEABED:
-            _, power = stored(line, sea, new.r, new.v)
-            report[19] = -power
+            for i in range(n + 1):  # force times way: bounded by the energy of a blow, however short the step is not
+                b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
+                     0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
+                ui = get3(u, i)
+                along = dot(sea.normal, ui) * dot(sea.normal, b)
+                report[19] += along
+                report[20] += dot(b, ui) - along
+                new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+            report[28] = stored(line, sea, new.r)
     return outcome, iterations, left, where

@@ -50,7 +50,7 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
 
     sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
     """
-    p = sea.offset - r @ sea.normal
+    p = sea.offset + 0.5 * sea.onset - r @ sea.normal
     N = np.zeros(r.shape[0])
     for near, far in ((slice(0, -1), slice(1, None)), (slice(1, None), slice(0, -1))):
         for c, (a, b) in enumerate(zip(p[near], p[far], strict=True)):
@@ -150,14 +150,15 @@ class Stepper:
             0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         if self.line.bits & SEABED:
-            self.report[19] = -stored(self.line, sea, state.r, state.v)[1]
+            self.report[28] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
         self.told = self.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
-        """Power (W) into the cable by each of POWERS, at the last configuration the march saw."""
+        """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""
         f, n = self.told, self.line.h.size
-        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18], f[19], f[20], 0.0]
+        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18]]
         for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
             if ends.held[k]:
                 out[k] -= _dot(f[3 * k : 3 * k + 3], velocity[k])

@@ -560,7 +560,7 @@ def test_contact_has_a_potential(case):
 
 
 def test_rest_on_the_bed():
-    """A level cable of weight w lies w/k + onset/2 deep when that is beyond the onset."""
+    """A level cable of weight w lies w/k below the bed, half an onset less than counted from where contact begins."""
     k, o, w, h = 2e4, 1e-2, 200.0, 3.0
     p = w / k + o / 2
     assert p > o
