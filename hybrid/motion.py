@@ -83,7 +83,7 @@ class Motion:
             if taken.outcome == Outcome.OK:
                 self._accept(taken, end, repeats, wasted)
                 wasted = 0
-            elif self.zoning is not None and self._rescued(taken, rescues):
+            elif self.zoning is not None and taken.outcome == Outcome.SLACK and self._rescued(taken, rescues):
                 rescues += 1
                 wasted += taken.iterations
             elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
@@ -187,7 +187,8 @@ class Motion:
         self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)
         self.watch.follow(self.model)
         self._stale = True
-        self._ignite()
+        self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
+        self._stored = self.stepper.told[28]
         self.power = self._powers()
 
     def _bring_ends_in(self) -> None:

@@ -76,7 +76,7 @@ class DomainManager:
         fresh = self.before.size != state.T.size
         before = state.T if fresh or dt == 0.0 else self.before
         clamps = ends.frame[:, 2::3] * np.array([[line.element[0]], [line.element[-1]]])
-        ahead = HORIZON * self.dwell / dt if dt > 0.0 else 0.0
+        ahead = min(HORIZON * self.dwell / dt, 2.0) if dt > 0.0 else 0.0
         weigh(
             line, sea, state.r, state.e, state.T, state.a1, before, ahead, self.EI, self.w, self.kink, self.floor,
             self.tolerance, clamps, self.base_of_cell, self.ratios,

@@ -39,7 +39,7 @@ def remap(
     # what stays, to the last bit
     kept_old = np.concatenate([np.arange(now[j], now[j + 1]) for j in np.flatnonzero(~changed)] or [np.zeros(0, int)])
     kept_new = np.concatenate([np.arange(then[j], then[j + 1]) for j in np.flatnonzero(~changed)] or [np.zeros(0, int)])
-    for a, b in ((state.r, out.r), (state.v, out.v), (state.slip, out.slip)):
+    for a, b in zip(_nodal(state), _nodal(out), strict=True):
         b[place], b[-1] = a[now[:-1]], a[-1]
         b[kept_new] = a[kept_old]
     for a, b in ((state.e, out.e), (state.T, out.T), (state.a1, out.a1), (state.w, out.w)):
@@ -50,20 +50,25 @@ def remap(
     middles, new_middles = 0.5 * (line.s[:-1] + line.s[1:]), 0.5 * (target.s[:-1] + target.s[1:])
     out.T[new_cells] = np.interp(new_middles[new_cells], middles, state.T)
     # new nodes on a cubic
-    r_slopes, v_slopes = (_slopes(x, line.s, now, kinks) for x in (state.r, state.v))
+    smooth = [(a, b, _slopes(a, line.s, now, kinks)) for a, b in zip(_nodal(state)[:4], _nodal(out)[:4], strict=True)]
     for j in np.flatnonzero(changed & new.rod):
         inner = np.arange(then[j] + 1, then[j + 1])
         H = new.base[j + 1] - new.base[j]
         x = (target.s[inner] - new.base[j]) / H
-        for values, slopes, nodes in ((out.r, r_slopes, state.r), (out.v, v_slopes, state.v)):
+        for nodes, values, slopes in smooth:
             values[inner] = _hermite(x, nodes[now[j]], nodes[now[j + 1]], H * slopes[1][j], H * slopes[0][j + 1])
         out.slip[inner] = (1 - x)[:, None] * state.slip[now[j]] + x[:, None] * state.slip[now[j + 1]]
     chords = np.diff(out.r, axis=0)
     out.e[new_cells] = chords[new_cells]
-    _momentum(old, new, line, target, state, out, changed)
+    _momentum(new, line, target, state, out, changed)
     _frames(new, changed, out, target, twist)
     lengths = line_lengths(out, target, new_cells, line, kept_old, kept_new)
     return Remapped(out, lengths)
+
+
+def _nodal(state: State) -> tuple[Floats, ...]:
+    """What lives on nodes: first what is smooth."""
+    return state.r, state.v, state.a, state.vd, state.slip
 
 
 def line_lengths(
@@ -106,27 +111,22 @@ def _hermite(x: Floats, a: Floats, b: Floats, ma: Floats, mb: Floats) -> Floats:
     )
 
 
-def _momentum(
-    old: Layout, new: Layout, line: Line, target: Line, state: State, out: State, changed: np.ndarray
-) -> None:
-    """Make the linear momentum of every changed stretch what it was, by one shift of velocity for its nodes."""
-    n = changed.size
+def _momentum(new: Layout, line: Line, target: Line, state: State, out: State, changed: np.ndarray) -> None:
+    """Make the linear momentum what it was: one shift of velocity for the inner nodes of every changed stretch.
+
+    Nodes at the edge of a stretch are left alone, or cells beyond it would be pulled at their length; what is
+    then missing (a stretch without inner nodes) is a shift of the whole line.
+    """
+    missing = line.mass @ state.v - target.mass @ out.v
+    inner = np.zeros(target.mass.size, bool)
     bounds = edges(changed)
     for a, b in zip(bounds[:-1], bounds[1:], strict=True):
-        if not changed[a]:
-            continue
-        was = _half_sum(line, state, old.first[a], old.first[b])
-        now = _half_sum(target, out, new.first[a], new.first[b])
-        first, last = int(new.first[a]) + (a == 0), int(new.first[b]) + 1 - (b == n)  # ends may be held: leave them
-        nodes = np.arange(first, last)
-        if nodes.size:
-            out.v[nodes] += (was - now) / target.mass[nodes].sum()
-
-
-def _half_sum(line: Line, state: State, first: int, last: int) -> Floats:
-    """Momentum of the nodes from first to last with all of their mass; what neighbours add is the same before and after."""
-    nodes = slice(int(first), int(last) + 1)
-    return np.asarray(line.mass[nodes] @ state.v[nodes])
+        if changed[a]:
+            inner[int(new.first[a]) + 1 : int(new.first[b])] = True
+    if inner.any():
+        out.v[inner] += missing / target.mass[inner].sum()
+    else:
+        out.v[1:-1] += missing / target.mass[1:-1].sum()
 
 
 def _frames(new: Layout, changed: np.ndarray, out: State, target: Line, twist: Floats) -> None:

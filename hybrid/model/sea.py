@@ -41,7 +41,7 @@ class Surroundings:
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
         blank = no_sea(cells)
-        values = self.values._replace(flow=blank.flow, axis=blank.axis, slip=blank.slip, slid=blank.slid)
+        values = self.values._replace(flow=blank.flow, axis=blank.axis, slip=blank.slip, slid=blank.slid, bed=blank.bed)
         return Surroundings(values, self._current_ramp, self._wave_ramp)
 
     def at(self, t: float) -> Sea:

@@ -74,7 +74,7 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
 
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
-    if isinstance(model, RodModel):
+    if isinstance(model, RodModel | AdaptiveModel):
         return f"the whole cable is a rod (model), cable.sections[{i}] included"
     if not isinstance(model, ZonesModel):
         return ""

@@ -155,6 +155,22 @@ class Stepper:
         self.told = self.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
 
+    def feel(self, sea: Sea, ends: Ends, state: State) -> None:
+        """The forces and the report of a state as it is, for the books of the step that follows."""
+        self.u[:] = 0.0
+        if self.line.bits & WAVES:
+            stir(sea, state.r, self.u)
+        if self.line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
+        march(
+            self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
+        )  # fmt: skip
+        if self.line.bits & SEABED:
+            self.report[28] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
+        self.told = self.report.tolist()
+
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""
         f, n = self.told, self.line.h.size
