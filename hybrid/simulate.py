@@ -215,7 +215,7 @@ def _first_zones(scene: Scene, model: Model, t: float) -> tuple[Model, Equilibri
     for stretches, sign in ((asked.always_catenary, -1), (asked.always_rod, 1)):
         for a, b in stretches or ():
             given[(middle > a) & (middle < b)] = sign
-    manager = manager_for(model, asked.tolerance, asked.dwell, given)
+    manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0)
     equilibrium = None
     if scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t)

@@ -20,6 +20,8 @@ from hybrid.solve.statics import Equilibrium, solve_statics
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many dwell times.
 LETTING_GO = 1.0
+# Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
+DWELL, LEAST_DWELL = 0.25, 20
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
 
@@ -40,10 +42,12 @@ class Relaxing:
         return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
 
 
-def manager_for(model: Model, tolerance: float, dwell: float | None, given: np.ndarray) -> DomainManager:
-    """The domain manager of a model; tolerance as a part of the length."""
+def manager_for(
+    model: Model, tolerance: float, dwell: float | None, given: np.ndarray, step: float
+) -> DomainManager:
+    """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
     assert model.layout is not None
-    wait = dwell if dwell is not None else 0.1 * model.time_scale
+    wait = dwell if dwell is not None else max(DWELL * model.time_scale, LEAST_DWELL * step)
     return DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale)
 
 
@@ -81,9 +85,11 @@ def first_zones(model: Model, manager: DomainManager, t: float, **how: object) -
 
 
 def _asked(manager: DomainManager, state: State) -> np.ndarray:
+    """Base cells that ask to be rod, after `weigh`, which then begins anew."""
     n = manager.layout.rod.size
     asks = wanted(manager.ratios, np.zeros(n, bool)) | (manager.given > 0)
     out = spread(asks, manager.layout.base, manager.rules(state).buffer)
+    manager.ratios[:] = 0.0
     return np.asarray(out & (manager.given >= 0))
 
 
@@ -124,27 +130,13 @@ class Zoning:
         """Weigh the criteria after a step of dt."""
         manager = self.manager
         manager.weigh(self.model.line, self.model.sea.values, ends, state, dt)
-        if self._quiet(t):
-            return None
-        return manager.review(t, state)
-
-    def _quiet(self, t: float) -> bool:
-        """True when no plan is needed: no catenary asks for rod, and no rod is calm."""
-        manager = self.manager
-        rod, ratios = manager.layout.rod, manager.ratios
-        top = ratios.max(axis=0)
-        if (top[~rod] > 1.0).any() or manager.leaving.any():
-            return False
-        return bool(rod.all() and (top > 1.0).all()) if not rod.any() else not self._calm(rod, ratios)
-
-    def _calm(self, rod: np.ndarray, ratios: Floats) -> bool:
-        return True  # some rod may be calm: let the plan say
+        return manager.review(t, state) if manager.due(t) else None
 
     def settle(self, t: float, dt: float, ends: Ends, state: State) -> float:
         """Blend bending and let lengths go; returns the energy (J) that this puts in."""
         booked = 0.0
         line = self.model.line
-        if self.manager.blending:
+        if self.manager.going or self.manager.coming:
             parts = self.manager.blend(dt, state)
             before = _bending(line, ends, state)
             line.kb[:] = parts[:, None] * self.stiff

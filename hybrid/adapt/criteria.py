@@ -57,16 +57,15 @@ def get3(A, i):
 
 @kernel
 def weigh(line, sea, r, e, T, a1, before, a, EI, w, kink, floor, tolerance, clamps, base_of_cell, ratios):
-    """Fill ratios (criteria, base cells) for a state: the largest of every criterion in each base cell.
+    """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
+
+    Returns the largest ratio among base cells that are catenary.
 
     before, a: tensions a step ago (N,), and horizon over step, for the tension ahead; EI, w, kink, floor: (N+1,)
     bending stiffness, weight per length, 1 where a point load or a jump of section sits, tension floor;
     clamps: (2, 3) tangents of clamped ends, zero where there is none.
     """
     n = e.shape[0]
-    for c in range(6):
-        for j in range(ratios.shape[1]):
-            ratios[c, j] = 0.0
     d0, _, _ = chord((e[0, 0], e[0, 1], e[0, 2]))
     for i in range(n + 1):
         ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
@@ -124,3 +123,10 @@ def weigh(line, sea, r, e, T, a1, before, a, EI, w, kink, floor, tolerance, clam
             ratio = torque * torque / (4.0 * EI[i] * T1 * TWISTED)
             ratios[TORSION, ja] = max(ratios[TORSION, ja], ratio)
             ratios[TORSION, jb] = max(ratios[TORSION, jb], ratio)
+    loudest = 0.0
+    for i in range(n):
+        if not line.spin[i]:
+            j = base_of_cell[i]
+            for c in range(6):
+                loudest = max(loudest, ratios[c, j])
+    return loudest

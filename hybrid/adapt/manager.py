@@ -6,13 +6,14 @@ been blended in (`grown`), which rods are on their way out (`leaving`), since wh
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.adapt.criteria import CRITERIA, GIVEN, weigh
 from hybrid.adapt.plan import Rules, planned
-from hybrid.model.layout import Layout
+from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 
@@ -25,6 +26,8 @@ BUFFER = 2.0
 BLENDING = 1.5
 # How far ahead a falling tension is seen, in dwell times.
 HORIZON = 0.5
+REVIEWS = 8  # in a dwell time, when nothing asks: what happens in between is remembered
+NO_CLAMPS = np.zeros((2, 3))
 SHORTEST = 2.0  # base cells that make a zone
 
 
@@ -49,6 +52,7 @@ class DomainManager:
         self.grown, self.leaving = np.ones(n), np.zeros(n, bool)
         self.calm_since = np.full(n, np.inf)
         self.before = np.zeros(0)
+        self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.follow(layout)
 
     def follow(self, layout: Layout) -> None:
@@ -69,33 +73,44 @@ class DomainManager:
         self.kink[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = 1
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
         self.base_of_cell = layout.base_of_cell
+        self.coming = bool((layout.rod & (self.grown < 1.0)).any())
         self.before = np.zeros(0)
 
     def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float) -> None:
-        """Bring the ratios up to date; dt: since the last time, 0 when there was none."""
-        fresh = self.before.size != state.T.size
-        before = state.T if fresh or dt == 0.0 else self.before
-        clamps = ends.frame[:, 2::3] * np.array([[line.element[0]], [line.element[-1]]])
+        """Raise the ratios since the last review to those of a state; dt: since the last time, 0 when there was none."""
+        before = state.T if self.before.size != state.T.size or dt == 0.0 else self.before
+        clamps = NO_CLAMPS
+        if line.element[0] or line.element[-1]:
+            clamps = ends.frame[:, 2::3] * np.array([[line.element[0]], [line.element[-1]]])
         ahead = min(HORIZON * self.dwell / dt, 2.0) if dt > 0.0 else 0.0
-        weigh(
+        self.loudest = weigh(
             line, sea, state.r, state.e, state.T, state.a1, before, ahead, self.EI, self.w, self.kink, self.floor,
             self.tolerance, clamps, self.base_of_cell, self.ratios,
         )  # fmt: skip
-        self.before = state.T.copy()
-        self.ratios[GIVEN] = self.given > 0
+        if self.before.size == state.T.size:
+            self.before[:] = state.T
+        else:
+            self.before = state.T.copy()
+
+    def due(self, t: float) -> bool:
+        """Whether a review is due: a catenary asks, a rod is on its way out, or some time has passed."""
+        return self.loudest > 1.0 or self.going or t >= self.next_review
 
     def review(self, t: float, state: State) -> Change | None:
-        """What should change now; None most of the time."""
+        """What should change now, after the ratios since the last review; None most of the time."""
         rod = self.layout.rod
+        self.ratios[GIVEN] = self.given > 0
         stays = rod & ~self.leaving
         next_, self.calm_since = planned(self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state))
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
+        self.going = bool(self.leaving.any())
+        self.next_review = t + self.dwell / REVIEWS
         gone = self.leaving & (self.grown <= 0.0)
         new = (rod & ~gone) | next_
-        if (new == rod).all():
-            return None
-        return Change(new, tuple(self._reasons(rod, new)))
+        change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)))
+        self.ratios[:] = 0.0
+        return change
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
@@ -114,32 +129,27 @@ class DomainManager:
         return Change(new, tuple(self._reasons(self.layout.rod, new, "a step that failed")))
 
     def _reasons(self, rod: np.ndarray, new: np.ndarray, why: str = "") -> list[tuple[int, int, str, str]]:
+        """Runs of base cells that change, and for each what asks for it, or had held it until now."""
         out = []
-        for j in np.flatnonzero(rod != new):
-            if out and out[-1][1] == j and (out[-1][2] == "rod") == bool(new[j]):
-                out[-1] = (out[-1][0], int(j) + 1, out[-1][2], out[-1][3])
+        base, off = self.layout.base, np.array([x.off for x in CRITERIA])
+        loud = self.ratios.max(axis=0)
+        for a, b in pairwise(edges(np.where(rod == new, 0, np.where(new, 1, -1)))):
+            if rod[a] == new[a]:
                 continue
-            if new[j]:
-                c = int(np.argmax(self.ratios[:, j]))
-                text = why or f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} of 1, here or within the buffer"
-                out.append((int(j), int(j) + 1, "rod", text))
+            if new[a]:
+                asks = np.flatnonzero(loud > 1.0)
+                text = why
+                if not why and asks.size:
+                    j = asks[np.argmin(np.abs(asks - 0.5 * (a + b - 1)))]
+                    c = int(np.argmax(self.ratios[:, j]))
+                    text = f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} > 1 at s = {base[j]:.4g} to {base[j + 1]:.4g} m"
+                out.append((a, b, "rod", text or "closes a gap"))
             else:
-                c = int(np.argmax(self.ratios[:, j] / [x.off for x in CRITERIA]))
-                out.append(
-                    (
-                        int(j),
-                        int(j) + 1,
-                        "catenary",
-                        f"calm for {self.dwell:.3g} s; most: {CRITERIA[c].name} {self.ratios[c, j]:.3g}",
-                    )
-                )
+                j = a + int(np.argmax((self.ratios[:, a:b] / off[:, None]).max(axis=0)))
+                c = int(np.argmax(self.ratios[:, j] / off))
+                text = f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} < {off[c]:g} and all else calm for {self.dwell:.3g} s"
+                out.append((a, b, "catenary", text))
         return out
-
-    @property
-    def blending(self) -> bool:
-        """Whether bending is coming or going anywhere."""
-        rod = self.layout.rod
-        return bool((rod & (np.where(self.leaving, self.grown > 0.0, self.grown < 1.0))).any())
 
     def blend(self, dt: float, state: State) -> Floats:
         """Move on by dt; how much of its stiffness every node has (N+1,)."""
@@ -147,6 +157,7 @@ class DomainManager:
         T = np.maximum(np.minimum.reduceat(state.T, first), self.floor[first])
         tau = np.clip(BLENDING * np.sqrt(self.m[first] * self.EI[first]) / T, 2.0 * dt, self.dwell)
         self.grown = np.clip(self.grown + np.where(self.leaving, -dt, dt) / tau, 0.0, 1.0)
+        self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
         return self.parts()
 
     def parts(self) -> Floats:
