@@ -77,6 +77,8 @@ class Motion:
         while self.t < until:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
             ends = self.model.ends.at(end)
+            if self.zoning is not None:
+                self.zoning.prepare(end)
             taken = self.stepper.step(
                 self.model.sea.at(end), ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf
             )
@@ -152,7 +154,7 @@ class Motion:
             self.watch.tension(end, self.state)
         if self.zoning is not None:
             ends = self.model.ends.values
-            self.work[-1] += self.zoning.settle(end, dt, ends, self.state)
+            self.work[-1] += self.zoning.settle(dt, ends, self.spare, self.state)
             change = self.zoning.look(end, dt, ends, self.state)
             if change is not None:
                 self._switch(change)

@@ -54,7 +54,7 @@ def manager_for(
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     more = model.line.bits & (SEABED | FRICTION)
-    line = line_on(model.cable, layout.nodes, layout.rod_cells, more)
+    line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
@@ -123,7 +123,9 @@ class Zoning:
         self.model, self.manager = model, manager
         self.stiff = model.line.kb.copy()  # N m, with all bending
         self.true = model.line.h.copy()
+        self.lengths = self.true.copy()  # m, at the end of the last step
         self.relaxing: Relaxing | None = None
+        self.letting_go = False
         self.switches = 0
 
     def look(self, t: float, dt: float, ends: Ends, state: State) -> Change | None:
@@ -132,22 +134,26 @@ class Zoning:
         manager.weigh(self.model.line, self.model.sea.values, ends, state, dt)
         return manager.review(t, state) if manager.due(t) else None
 
-    def settle(self, t: float, dt: float, ends: Ends, state: State) -> float:
-        """Blend bending and let lengths go; returns the energy (J) that this puts in."""
+    def prepare(self, end: float) -> None:
+        """Give cells on their way to their true length the one they have at the end of the step that comes."""
+        if self.relaxing is not None:
+            lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.dwell)
+            self.model.line.h[:] = self.true - lack
+
+    def settle(self, dt: float, ends: Ends, before: State, state: State) -> float:
+        """After a step from `before` to `state`: the energy (J) of lengths let go in it, and of bending blended now."""
         booked = 0.0
         line = self.model.line
+        if self.relaxing is not None:
+            booked -= 0.5 * float((before.T + state.T) @ (line.h - self.lengths))
+            self.lengths[:] = line.h
+            if not self.letting_go:
+                self.relaxing = None
         if self.manager.going or self.manager.coming:
             parts = self.manager.blend(dt, state)
-            before = _bending(line, ends, state)
+            was = _bending(line, ends, state)
             line.kb[:] = parts[:, None] * self.stiff
-            booked += _bending(line, ends, state) - before
-        if self.relaxing is not None:
-            lack, going = self.relaxing.at(t, LETTING_GO * self.manager.dwell)
-            lengths = self.true - lack
-            booked -= float(state.T @ (lengths - line.h))
-            line.h[:] = lengths
-            if not going:
-                self.relaxing = None
+            booked += _bending(line, ends, state) - was
         return booked
 
     def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
@@ -169,6 +175,7 @@ class Zoning:
         self.stiff, self.true = target.kb.copy(), target.h.copy()
         target.kb[:] = manager.parts()[:, None] * self.stiff
         target.h[:] = carried.lengths
+        self.lengths = carried.lengths.copy()
         # new cells go on with the length, and the change of length, that their ends and tension imply
         kept_now, kept_then = (np.repeat(old.rod == new.rod, x.counts) for x in (new, old))
         d = carried.state.e / np.linalg.norm(carried.state.e, axis=1)[:, None]

@@ -9,10 +9,12 @@ from hybrid.model.state import Floats, Line
 from hybrid.physics.loads import BODIES, ROTARY
 
 
-def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0) -> Line:
+def line_on(
+    material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True
+) -> Line:
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
-    more_bits: forces that the surroundings ask for.
+    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
     """
     h = np.diff(s)
     n = h.size
@@ -20,7 +22,7 @@ def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0) 
     of = np.clip(np.searchsorted(material.bounds, middle) - 1, 0, material.mass.size - 1)
     bits = material.bits | more_bits
     rotary = polar = np.full(n, np.nan)
-    if rod.any() and (material.polar[of] > 0.0).any():
+    if sections_turn and rod.any() and (material.polar[of] > 0.0).any():
         bits |= ROTARY
         rotary, polar = h * rod * material.rotary[of], h * rod * material.polar[of]
     point = {name: np.full(n + 1, 0.0 if name == "point_mass" or bits & BODIES else np.nan) for name in material.points}

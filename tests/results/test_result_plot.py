@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.results import plot
+from hybrid.results import look, panels, plot, views
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
 
@@ -191,7 +191,7 @@ def test_a_catenary_shows_its_curvature_in_place_of_a_moment() -> None:
 
 def test_a_passing_spike_does_not_press_the_rest_to_the_ground() -> None:
     ax = Figure().subplots()
-    plot.plot_profiles(ax, made(sag, curvature=5.0), "curvature")
+    panels.plot_profiles(ax, made(sag, curvature=5.0), "curvature")
     assert 2e-3 < ax.get_ylim()[1] < 0.01 and ax.get_ylim()[0] > -0.01
     assert [t.get_text() for t in ax.texts] == ["peak 5 1/m at s = 97.5 m"]
 
@@ -207,11 +207,11 @@ def swinging(s: np.ndarray, t: float) -> Sequence[Any]:
 
 
 def test_earlier_shapes_show_the_motion() -> None:
-    times = plot._telling_times(made(relaxing, nt=401))
+    times = views.telling_times(made(relaxing, nt=401))
     assert len(times) == 9 and times[0] == 0.0 and times.max() < 1.5
     left = np.sort(np.exp(-3.0 * times))
     assert np.diff(left).max() < 0.26  # nothing much is left out; even times miss 98 % of it
-    times = plot._telling_times(made(swinging, nt=181))
+    times = views.telling_times(made(swinging, nt=181))
     phase = np.sort(np.sin(2.0 * np.pi * 0.9 * times))
     assert phase[0] < -0.98 and phase[-1] > 0.98 and np.diff(phase).max() < 0.51
     still = plot.plot_summary(made(lambda s, t: (s, 0.0, 0.0)))
@@ -220,7 +220,7 @@ def test_earlier_shapes_show_the_motion() -> None:
 
 def test_the_area_that_was_swept_is_shaded() -> None:
     ax = Figure().subplots()
-    plot.plot_shape(ax, made(swinging, nt=181), times=[])
+    panels.plot_shape(ax, made(swinging, nt=181), times=[])
     (area,) = ax.collections
     tips = np.array([path.vertices[40] for path in area.get_paths()])
     assert np.ptp(tips[:, 0]) == pytest.approx(2 * 100.0 * np.sin(0.5), rel=0.02)
@@ -352,11 +352,11 @@ def test_a_cable_that_lifts_off_and_comes_back_leaves_a_gap() -> None:
         return -40.0 + 0.01 * np.maximum(s - 20.0, 0.0) ** 2
 
     result = made(lambda s, t: (s, 0.0, height(s) + 3.0 * (2.0 < t < 6.0)), nt=41, bed=FLAT)
-    plot.plot_touchdown(ax, result)
+    panels.plot_touchdown(ax, result)
     (line,) = ax.lines
     assert np.array_equal(np.isnan(line.get_ydata()), (result.times > 2.0) & (result.times < 6.0))
     both = Figure().subplots()
-    plot.plot_touchdown(both, made(lambda s, t: (s, 0.0, height(abs(s - 50.0))), bed=FLAT))
+    panels.plot_touchdown(both, made(lambda s, t: (s, 0.0, height(abs(s - 50.0))), bed=FLAT))
     assert [line.get_label() for line in both.lines] == ["first contact", "last contact"]
 
 
@@ -409,7 +409,7 @@ def test_zones_of_one_kind_are_one() -> None:
 
 def test_what_stands_still_is_a_straight_line_of_histories() -> None:
     ax = Figure().subplots()
-    plot.plot_history(ax, made(lambda s, t: (s, 0.0, 1e-10 * np.sin(t))), "position", [50.0], component=2)
+    panels.plot_history(ax, made(lambda s, t: (s, 0.0, 1e-10 * np.sin(t))), "position", [50.0], component=2)
     assert ax.get_ylim() == pytest.approx((-0.1, 0.1)) and ax.get_ylabel() == "Δz (mm)"
 
 
@@ -454,13 +454,13 @@ def test_what_is_across_a_span_is_compared_with_its_sag_not_with_its_length() ->
     assert (above.get_ylabel(), above.get_title("left")) == ("y (m)", "shape from above, y × 20")
     assert "position y" in texts(figure) and "position z" not in texts(figure)
     still = Figure().subplots()
-    plot.plot_shape(still, made(blown))
+    panels.plot_shape(still, made(blown))
     assert still.get_legend_handles_labels()[1] == ["catenary", "rod", "joint", "start", "end"]  # no range over time
     slight = made(lambda s, t: (blown(s, t)[0], 0.05 * blown(s, t)[1], blown(s, t)[2]))
-    assert len(plot._views(slight)) == 1
+    assert len(views.views_of(slight)) == 1
     turned = made(lambda s, t: (0.6 * s - blown(s, t)[1], 0.6 * s + blown(s, t)[1], blown(s, t)[2]))
-    assert [v.up_label for v in plot._views(turned)] == ["z", "across"]  # from above it is a line at 45 degrees
-    assert plot._views(turned)[0].across_label == "horizontal, 45° from x"
+    assert [v.up_label for v in views.views_of(turned)] == ["z", "across"]  # from above it is a line at 45 degrees
+    assert views.views_of(turned)[0].across_label == "horizontal, 45° from x"
 
 
 @pytest.mark.parametrize(
@@ -474,7 +474,7 @@ def test_what_is_across_a_span_is_compared_with_its_sag_not_with_its_length() ->
     ],
 )
 def test_a_held_end_is_not_followed(position: Callable[[np.ndarray, float], Sequence[Any]], followed: Any) -> None:
-    assert plot._history_points(made(position), None).tolist() == followed
+    assert views.history_points(made(position), None).tolist() == followed
 
 
 def assert_tidy(figure: Figure) -> None:
@@ -555,10 +555,10 @@ def test_parts_draw_on_axes_of_the_user() -> None:
     result = made(sag)
     figure = Figure(layout="constrained")
     a, b, c, d = figure.subplots(2, 2).ravel()
-    plot.plot_shape(a, result, times=[0.0, 2.5], view="yz")
-    plot.plot_profiles(b, result, "curvature", output=0)
-    plot.plot_history(c, result, "position", [0.0, 33.0])
-    plot.plot_history(d, result, "position", [33.0], component=2)
+    panels.plot_shape(a, result, times=[0.0, 2.5], view="yz")
+    panels.plot_profiles(b, result, "curvature", output=0)
+    panels.plot_history(c, result, "position", [0.0, 33.0])
+    panels.plot_history(d, result, "position", [33.0], component=2)
     assert a.get_xlabel() == "y (m)" and len(_earlier(a)) == 2
     assert b.get_ylabel() == "curvature (1/km)"
     assert c.lines[1].get_ydata() == pytest.approx(np.linalg.norm(result.at(s=33.0)["position"], axis=-1))
@@ -586,13 +586,13 @@ def test_parts_draw_on_axes_of_the_user() -> None:
     ],
 )
 def test_units_get_sensible_prefixes(unit: str, peak: float, shown: str, factor: float) -> None:
-    assert plot._prefix(unit, peak) == (pytest.approx(factor), shown)
+    assert look.prefix(unit, peak) == (pytest.approx(factor), shown)
 
 
 def test_round_off_does_not_fill_a_panel() -> None:
     ax = Figure().subplots()
     result = made(sag, tension=1000.0)
-    plot.plot_profiles(ax, result, "torque")
+    panels.plot_profiles(ax, result, "torque")
     assert ax.get_ylim() == (-1.0, 1.0)
 
 
@@ -609,11 +609,11 @@ def test_nonsense_is_refused(tmp_path: Path) -> None:
             plot.plot_summary(result, path)
     ax = Figure().subplots()
     with pytest.raises(ResultError, match="'xx' is not a plane"):
-        plot.plot_shape(ax, result, view="xx")
+        panels.plot_shape(ax, result, view="xx")
     with pytest.raises(ResultError, match="does not depend on s"):
-        plot.plot_history(ax, result, "t", [0.0])
+        panels.plot_history(ax, result, "t", [0.0])
     with pytest.raises(ResultError, match="did you mean tension"):
-        plot.plot_history(ax, result, "tenson", [0.0])
+        panels.plot_history(ax, result, "tenson", [0.0])
 
 
 def test_plots_read_files_and_nothing_else() -> None:

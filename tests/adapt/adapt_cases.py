@@ -1,0 +1,192 @@
+"""Cables, layouts, shapes and states for the tests of zones that move.
+
+Shapes are functions of arc length with unit speed, so that nodes on them are exact; states on
+them need not be in balance: remapping and criteria ask for none.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from problems import Scene, free, pinned, scene, straight
+
+from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.remap import Remapped, remap
+from hybrid.model.layout import Layout
+from hybrid.model.line import line_on
+from hybrid.model.material import Material, material
+from hybrid.model.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
+
+Shape = Callable[[Floats], Floats]
+X, Y, Z = np.eye(3)
+GRAVITY = 10.0  # m/s2, of every cable here: the weight per length is ten times the mass
+AXIAL = 1e5  # N
+
+
+def cable(length: float = 10.0, *, start: Any = None, end: Any = None, **more: Any) -> Material:
+    """A cable of 1 kg/m, EI = 2, GJ = 1.5, EA = 1e5; `more`: keys of the section, `attachments` or `sections`."""
+    section = {
+        "length": length, "mass": 1.0, "bending_stiffness": 2.0, "torsional_stiffness": 1.5, "axial_stiffness": AXIAL,
+    }  # fmt: skip
+    tables: dict[str, Any] = {"initial": straight(1, 0, 0)}
+    attachments = more.pop("attachments", None)
+    pieces = [section | x for x in more.pop("sections", ({},))]
+    what = scene(section, start or pinned(), end or free(), gravity=GRAVITY, **tables).model_dump(exclude_none=True)
+    what["cable"] = {"sections": [x | more for x in pieces]} | ({"attachments": attachments} if attachments else {})
+    return material(Scene.model_validate(what))
+
+
+def layout(base: Sequence[float] | Floats, parts: int | Sequence[int], rod: Sequence[bool] | str) -> Layout:
+    """Base nodes (m), rod cells per base cell, and what they are: "RC" or flags."""
+    base = np.asarray(base, float)
+    flags = np.array([x == "R" for x in rod] if isinstance(rod, str) else rod, bool)
+    return Layout(base, np.full(base.size - 1, parts) if isinstance(parts, int) else np.asarray(parts), flags)
+
+
+def even(n: int, rod: str, length: float = 10.0, parts: int = 4) -> Layout:
+    return layout(np.linspace(0, length, n + 1), parts, rod)
+
+
+def on(what: Material, zones: Layout, bits: int = 0) -> Line:
+    return line_on(what, zones.nodes, zones.rod_cells, bits)
+
+
+def state_on(line: Line, shape: Shape, tension: Shape | float = 50.0, velocity: Shape | None = None) -> State:
+    """Nodes on a shape; velocity, accelerations and spin of the same kind; frames without twist."""
+    out = blank_state(line.h.size)
+    middle = 0.5 * (line.s[:-1] + line.s[1:])
+    out.r[:] = shape(line.s)
+    out.e[:] = np.diff(out.r, axis=0)
+    out.T[:] = tension(middle) if callable(tension) else tension
+    if velocity is not None:
+        out.v[:], out.a[:], out.vd[:] = velocity(line.s), velocity(line.s + 1.0), velocity(line.s + 2.0)
+        rod = line.spin == 1
+        out.w[rod], out.wa[rod], out.wd[rod] = (velocity(middle[rod] + k)[:, 0] for k in range(3))
+    out.a1[:] = untwisted(out.e)
+    return out
+
+
+def untwisted(e: Floats, first: Floats | None = None) -> Floats:
+    """First directors (N, 3) carried along chords e by the smallest rotations, each as a matrix."""
+    d = e / np.linalg.norm(e, axis=1)[:, None]
+    a = first if first is not None else np.eye(3)[int(np.argmin(np.abs(d[0])))]
+    a = a - (a @ d[0]) * d[0]
+    out = [a / np.linalg.norm(a)]
+    for t, u in zip(d[:-1], d[1:], strict=True):
+        x, y, z = np.cross(t, u)
+        K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+        out.append((np.eye(3) + K + K @ K / (1.0 + t @ u)) @ out[-1])
+    return np.array(out)
+
+
+# --- shapes: arc length -> points, with their tangents and curvature ---------------------------------
+
+
+def hanging(a: float = 4.0, at: float = 3.0) -> tuple[Shape, Shape, Shape]:
+    """A catenary with its lowest point at s = at: shape, tangent, curvature a/(a^2 + s^2)."""
+
+    def shape(s: Floats) -> Floats:
+        return np.column_stack([a * np.arcsinh((s - at) / a), 0 * s, np.hypot(a, s - at)])
+
+    def tangent(s: Floats) -> Floats:
+        return np.column_stack([a / np.hypot(a, s - at), 0 * s, (s - at) / np.hypot(a, s - at)])
+
+    return shape, tangent, lambda s: a / (a * a + (s - at) ** 2)
+
+
+def helix(R: float = 2.0, b: float = 1.0) -> tuple[Shape, Shape, Shape]:
+    """A helix of radius R and pitch 2 pi b: shape, tangent, curvature R/(R^2 + b^2)."""
+    c = np.hypot(R, b)
+
+    def shape(s: Floats) -> Floats:
+        return np.column_stack([R * np.cos(s / c), R * np.sin(s / c), b * s / c])
+
+    def tangent(s: Floats) -> Floats:
+        return np.column_stack([-R * np.sin(s / c), R * np.cos(s / c), b + 0 * s]) / c
+
+    return shape, tangent, lambda s: R / c**2 + 0 * s
+
+
+def polygon(h: Floats, turns: Floats) -> Shape:
+    """A plane polygon of cells h (N,) m that turns by turns (N-1,) rad from each to the next."""
+    angle = np.concatenate([[0.0], np.cumsum(turns)])
+    e = h[:, None] * np.column_stack([np.cos(angle), 0 * angle, np.sin(angle)])
+    r = np.vstack([np.zeros(3), np.cumsum(e, axis=0)])
+    return lambda s: r
+
+
+def along(direction: Sequence[float] = (1, 0, 0)) -> Shape:
+    d = np.asarray(direction, float) / np.linalg.norm(direction)
+    return lambda s: s[:, None] * d
+
+
+def drifting(s: Floats) -> Floats:
+    """A smooth velocity."""
+    return np.column_stack([np.sin(0.7 * s) + 1.0, np.cos(0.5 * s), 0.3 * np.sin(0.3 * s + 1.0)])
+
+
+# --- remapping -----------------------------------------------------------------------------------------
+
+
+def carried(
+    what: Material, old: Layout, rod: Sequence[bool] | str, state: State, line: Line | None = None
+) -> tuple[Layout, Line, Remapped]:
+    """A state on other zones of the same base."""
+    new = layout(old.base, old.parts.tolist(), rod)
+    target = on(what, new)
+    kinks = np.zeros(old.rod.size + 1, bool)
+    kinks[np.searchsorted(old.base, what.at - 1e-9 * old.base[-1])] = True
+    return new, target, remap(old, new, line or on(what, old), target, state, kinks, np.zeros(old.rod.size))
+
+
+def moved(line: Line, state: State) -> Floats:
+    """Linear momentum (3,)."""
+    return line.mass @ state.v
+
+
+def chords(state: State) -> Floats:
+    return state.e / np.linalg.norm(state.e, axis=1)[:, None]
+
+
+def turns(d: Floats) -> Floats:
+    """Angles (N-1,) between neighbouring chords, accurate for small ones."""
+    return np.arctan2(np.linalg.norm(np.cross(d[:-1], d[1:]), axis=1), np.einsum("ij,ij->i", d[:-1], d[1:]))
+
+
+def twists(state: State) -> Floats:
+    """Twist (N-1,) rad from each cell to the next, by parallel transport."""
+    d, a = chords(state), state.a1
+    out = []
+    for t, u, p, q in zip(d[:-1], d[1:], a[:-1], a[1:], strict=True):
+        carried_ = p - (p @ u) / (1 + t @ u) * (t + u)
+        out.append(np.arctan2(np.cross(carried_, q) @ u, carried_ @ q))
+    return np.array(out)
+
+
+# --- criteria ------------------------------------------------------------------------------------------
+
+
+def still(frame: Floats | None = None) -> Ends:
+    """Ends that are held; frame: (2, 3, 3) columns a1, a2, tangent."""
+    frame = np.stack([np.column_stack([Y, Z, X])] * 2) if frame is None else frame
+    zero = np.zeros((2, 3))
+    return Ends(np.ones(2, np.int8), zero, frame.reshape(2, 9), zero, zero, zero)
+
+
+def weighed(
+    what: Material, zones: Layout, state: State, *, tolerance: float = 1e-2, ends: Ends | None = None,
+    sea: Sea | None = None, bits: int = 0, before: State | None = None, dt: float = 0.0, dwell: float = 0.5,
+    scale: float = 1.0, line: Line | None = None,
+) -> Floats:  # fmt: skip
+    """The ratios (criteria, base cells) of a state; before: the state a step dt ago."""
+    manager = DomainManager(what, zones, tolerance, dwell, np.zeros(zones.rod.size, int), scale)
+    line = line or on(what, zones, bits)
+    sea, ends = sea or no_sea(line.h.size), ends or still()
+    if before is not None:
+        manager.weigh(line, sea, ends, before, 0.0)
+        manager.ratios[:] = 0.0
+    manager.weigh(line, sea, ends, state, dt)
+    return manager.ratios.copy()
