@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
+    from hybrid.results.zoneplot import plot_zones
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.simulate import run, static
@@ -38,6 +39,7 @@ _HOME = {
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
+    "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
@@ -57,6 +59,7 @@ __all__ = [
     "parse_scene",
     "plan",
     "plot",
+    "plot_zones",
     "run",
     "scene_text",
     "static",

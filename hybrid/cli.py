@@ -59,7 +59,7 @@ def _output(help: str) -> Any:
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene to read.", show_default=False)]
 RunFile = Annotated[Path | None, _output("Result; else SCENE.h5, in this folder.")]
 StaticFile = Annotated[Path | None, _output("Result; else SCENE.static.h5, here.")]
-Picture = Annotated[Path | None, _output("PNG, PDF, SVG ..; else RUN.png beside RUN.h5.")]
+Picture = Annotated[Path | None, _output("PNG, PDF, SVG ..; else RUN.png, RUN.zones.png.")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
 ]
@@ -147,12 +147,19 @@ def plot(
     history: Annotated[
         Any, typer.Option(metavar="S,S,..", parser=_numbers, help="Arc lengths to follow over time (m).")
     ] = None,
+    zones: Annotated[bool, _flag("--zones", help="Draw zones along s over time instead.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Draw a result: shapes, profiles along the cable, histories."""
+    """Draw a result: shapes, profiles along the cable, histories; or its zones over time."""
+    if zones and (times or history):
+        raise typer.BadParameter("--times and --history choose what a page without --zones shows")
     with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
-        picture = _draw(opened, output or result.with_suffix(".png"), times=times, history=history)
+        if zones:
+            picture = output or result.with_suffix(".zones.png")
+            hybrid.plot_zones(opened, picture)
+        else:
+            picture = _draw(opened, output or result.with_suffix(".png"), times=times, history=history)
         n = len(opened.times)
         over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
         say.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)

@@ -28,6 +28,8 @@ BLENDING = 1.5
 HORIZON = 0.5
 REVIEWS = 8  # in a dwell time, when nothing asks: what happens in between is remembered
 NO_CLAMPS = np.zeros((2, 3))
+# A rod begins with this part of its stiffness: with none its cells could spin freely.
+FIRST = 1e-3
 SHORTEST = 2.0  # base cells that make a zone
 
 
@@ -163,7 +165,7 @@ class DomainManager:
     def parts(self) -> Floats:
         """How much of its stiffness every node has (N+1,)."""
         x = self.grown
-        smooth = x * x * (3.0 - 2.0 * x)
+        smooth = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)
         cells = smooth[self.base_of_cell]
         out = np.minimum(np.append(cells, cells[-1]), np.append(cells[0], cells))
         return np.asarray(out)

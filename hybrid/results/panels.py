@@ -36,6 +36,7 @@ from hybrid.results.views import (
     View,
     bed_in,
     extent_in,
+    free_edges,
     magnification,
     telling_times,
     view_named,
@@ -181,9 +182,7 @@ def plot_history(
 def plot_touchdown(ax: Axes, result: Result) -> None:
     """Between which arc lengths the cable lies on the seabed, over time: sand; nothing while it hangs free."""
     edges, s = result["touchdown"], result.s
-    known = np.isfinite(edges).all(axis=1)
-    held = np.abs(edges[known] - s[[0, -1]]).max(axis=0, initial=0.0) < 0.005 * (s[-1] - s[0])  # lies to its very end
-    for k in (0, 1) if held.all() else np.flatnonzero(~held):
+    for k in free_edges(result):
         ax.plot(result.times, edges[:, k], color=BED, linewidth=1.3, zorder=3, label=("first", "last")[k] + " contact")
     style(ax, "touchdown over time", "t (s)", "s (m)")
     ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # as the histories beside it

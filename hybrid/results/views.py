@@ -84,6 +84,16 @@ def touches_bed(result: Result) -> bool:
     return "contact" in result and "touchdown" in result and bool(np.isfinite(result["touchdown"]).any())
 
 
+def free_edges(result: Result) -> list[int]:
+    """First and last contact with a seabed, 0 and 1: those that there ever are, and not only where the cable ends."""
+    edges, s = result["touchdown"] if "touchdown" in result else np.full((0, 2), np.nan), result.s
+    known = np.isfinite(edges).all(axis=1)
+    if not known.any():
+        return []
+    held = np.abs(edges[known] - s[[0, -1]]).max(axis=0) < 0.005 * (s[-1] - s[0])  # lies to its very end
+    return [0, 1] if held.all() else [int(k) for k in np.flatnonzero(~held)]
+
+
 def bed_in(view: View, result: Result) -> tuple[float, float] | None:
     """The seabed in an upright view, where the cable lies: height at the origin, and rise per metre across."""
     if "seabed" not in result or not view.upright:

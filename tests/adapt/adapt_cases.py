@@ -10,7 +10,6 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from problems import Scene, free, pinned, scene, straight
 
 from hybrid.adapt.manager import DomainManager

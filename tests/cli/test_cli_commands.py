@@ -129,6 +129,16 @@ def test_plot_takes_its_format_from_the_name(call: Call) -> None:
     assert said.code == 0 and Path("wire.svg").read_text().startswith("<?xml")
 
 
+def test_plot_zones_has_a_file_of_its_own(call: Call) -> None:
+    call("run", "wire.yaml")
+    said = call("plot", "wire.h5", "--zones")
+    assert said.code == 0 and said.out.endswith("t = 0 to 0.05 s -> wire.zones.png\n")
+    assert Path("wire.zones.png").read_bytes().startswith(b"\x89PNG") and not Path("wire.png").exists()
+    (done,) = call("plot", "wire.h5", "--zones", "-o", "zones.svg", "--json").lines
+    assert done["file"] == "zones.svg" and Path("zones.svg").read_text().startswith("<?xml")
+    assert call("plot", "wire.h5", "--zones", "-q") == (0, "", "")
+
+
 def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
     # 10^12 steps would not end; and the ledger is the same.
     said = call("plan", "wire.yaml", "--set", "time.duration=1e9", "--set", "time.step=1e-3")
@@ -216,6 +226,10 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("run",), "SCENE.yaml"),
         (("rum",), "Did you mean 'run'?"),
         (("plot", "wire.h5", "--times", "0,x"), "no list of numbers"),
+        (("plot", "absent.h5", "--zones"), "there is no file"),
+        (("plot", "wire.yaml", "--zones"), "cannot be read as a result"),
+        (("plot", "wire.h5", "--zones", "--times", "0"), "without --zones"),
+        (("plot", "wire.h5", "--zones", "--history", "1"), "without --zones"),
     ],
 )
 def test_input_that_is_refused(call: Call, arguments: tuple[str, ...], words: str) -> None:

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 
 import hybrid
 from hybrid.errors import ResultError
-from hybrid.results import look, panels, plot, views
+from hybrid.results import look, panels, plot, views, zoneplot
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
 
@@ -616,16 +616,17 @@ def test_nonsense_is_refused(tmp_path: Path) -> None:
         panels.plot_history(ax, result, "tenson", [0.0])
 
 
-def test_plots_read_files_and_nothing_else() -> None:
-    tree = ast.parse(Path(plot.__file__).read_text())
+@pytest.mark.parametrize("module", [look, views, panels, plot, zoneplot])
+def test_plots_read_files_and_nothing_else(module: Any) -> None:
+    tree = ast.parse(Path(module.__file__).read_text())
     own = {n.module for n in ast.walk(tree) if isinstance(n, ast.ImportFrom) and (n.module or "").startswith("hybrid")}
-    assert own == {"hybrid.errors", "hybrid.results.read"}
+    assert own <= {"hybrid.errors", *(f"hybrid.results.{name}" for name in ("read", "look", "views", "panels"))}
 
 
 def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
     code = (
-        "import sys, hybrid.results.plot as p; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
-        "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw();"
+        "import sys, hybrid.results.plot as p, hybrid.results.zoneplot as z; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
+        "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw(); z.plot_zones(made(sag));"
         "assert 'matplotlib.pyplot' not in sys.modules and 'matplotlib' in sys.modules"
     )
     env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}

@@ -1,0 +1,390 @@
+"""Criteria: every ratio against a calculation by hand, on states made for it; and what no ratio may depend on.
+
+    bend     EI kappa/T over the tolerance                    clamp, point   sqrt(EI/T) x angle over the tolerance
+    slack    (EI w^2)^(1/3) over the tension, now or ahead    edge           EI w/T^2 over the tolerance
+    torsion  M^2/(4 EI T) over a half
+
+The angle between two chords is measured by 2 sin(angle/2), the distance of their unit vectors.
+Round-off: it is a difference of numbers near 1, so 1e-16/angle^2 of the ratio: 1e-12 for 0.01 rad.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
+
+from hybrid.adapt.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
+from hybrid.adapt.manager import FLOOR, HORIZON, DomainManager
+from hybrid.adapt.plan import wanted
+from hybrid.model.state import no_sea
+from hybrid.physics.loads import SEABED
+
+EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
+FLOORED = FLOOR * (EI * W**2) ** (1 / 3)  # N
+TOL = 1e-2  # m
+ROUND = 1e-11
+
+
+def of_nodes(ratio, zones):
+    """The largest of a ratio at nodes (N+1,) in each base cell, its two ends included."""
+    first = zones.first
+    return np.array([ratio[a : b + 1].max() for a, b in zip(first[:-1], first[1:], strict=True)])
+
+
+def least(T):
+    """The smaller tension of the two cells at every node."""
+    return np.minimum(np.append(T, T[-1]), np.append(T[0], T))
+
+
+def test_there_is_a_criterion_for_every_number():
+    names = [x.name for x in CRITERIA]
+    assert [names[k] for k in (BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN)] == [
+        "bend", "slack", "clamp", "point", "edge", "torsion", "given",
+    ]  # fmt: skip
+    assert all(0.0 < x.off < 1.0 for x in CRITERIA)
+
+
+# --- by hand --------------------------------------------------------------------------------------------
+
+
+def test_straight_and_taut_asks_for_nothing_but_its_tension():
+    zones = even(10, "C" * 10)
+    state = state_on(on(cable(), zones), along((1, 2, 2)), 50.0)
+    ratios = weighed(cable(), zones, state)
+    assert ratios[SLACK] == pytest.approx(FLOORED / 50.0, rel=ROUND)
+    assert np.abs(np.delete(ratios, SLACK, axis=0)).max() < 1e-4  # an angle of 1e-8 rad, round-off of a cosine
+
+
+def test_bend_of_an_arc():
+    """On a circle of 5 m: EI/(R T tolerance), but for the turn between two chords, which is h/R and not 2 sin(h/2R)."""
+    R, n = 5.0, 50
+    zones = even(n, "C" * n)
+    line = on(cable(), zones)
+    state = state_on(line, lambda s: R * np.column_stack([np.sin(s / R), 0 * s, 1 - np.cos(s / R)]), 50.0)
+    h = 10.0 / n
+    exact = EI / (R * 50.0 * TOL)
+    assert weighed(cable(), zones, state, tolerance=TOL)[BEND] == pytest.approx(
+        exact * 2 * np.sin(h / (2 * R)) / (h / R), rel=ROUND
+    )
+    assert exact * (h / R) ** 2 / 24 < 1e-4 * exact  # what is between that and the smooth arc
+
+
+@pytest.mark.parametrize("flags", ["CCCCCCCC", "CCRRRCCC", "RRRRRRRR"])
+def test_bend_node_by_node(flags):
+    """Any turns, any tensions, uneven cells: the sharpest and the smaller tension count; a base cell sees both its ends."""
+    base = np.concatenate([[0.0], np.cumsum([1.0, 0.5, 1.5, 1.0, 1.0, 2.0, 0.7, 1.3])])
+    zones = layout(base, 3, flags)
+    what = cable(float(base[-1]))
+    line = on(what, zones)
+    rng = np.random.default_rng(3)
+    angle, T = rng.uniform(0.01, 0.2, line.h.size - 1), rng.uniform(30, 60, line.h.size)
+    state = state_on(line, polygon(line.h, angle), 50.0)
+    state.T[:] = T
+    ratio = np.zeros(line.s.size)
+    ratio[1:-1] = EI * 2 * np.sin(angle / 2) / line.hn[1:-1] / least(T)[1:-1] / TOL
+    assert weighed(what, zones, state, tolerance=TOL)[BEND] == pytest.approx(of_nodes(ratio, zones), rel=ROUND)
+
+
+def test_bend_counts_no_tension_below_the_floor():
+    """Where a cable is slack, EI kappa/T says nothing: the floor stands for the tension."""
+    zones = even(10, "C" * 10)
+    line = on(cable(), zones)
+    state = state_on(line, polygon(line.h, np.full(9, 0.05)), 0.1 * FLOORED)
+    ratio = weighed(cable(), zones, state, tolerance=TOL)
+    assert ratio[BEND] == pytest.approx(EI * 2 * np.sin(0.025) / 1.0 / FLOORED / TOL, rel=ROUND)
+    assert ratio[SLACK] == pytest.approx(10.0, rel=ROUND)
+
+
+def test_slack_is_the_floor_over_the_smaller_tension():
+    zones = even(10, "CCCRRCCCCC")
+    line = on(cable(), zones)
+    state = state_on(line, along(), lambda s: 100.0 - 8.0 * s)
+    ratio = weighed(cable(), zones, state)[SLACK]
+    assert ratio == pytest.approx(of_nodes(FLOORED / least(state.T), zones), rel=ROUND)
+
+
+@pytest.mark.parametrize("tension", [0.0, -1e-3, -50.0])
+def test_no_tension_asks_always(tension):
+    zones = even(10, "C" * 10)
+    state = state_on(on(cable(), zones), along(), 50.0)
+    state.T[6] = tension
+    asks = weighed(cable(), zones, state)[SLACK] > 1.0
+    assert asks.tolist() == [j in (5, 6, 7) for j in range(10)]
+
+
+@pytest.mark.parametrize("dt, steps", [(0.2, None), (0.5, None), (0.01, 2.0)])
+def test_falling_tension_is_seen_ahead(dt, steps):
+    """T + (horizon/dt)(T - T before); the horizon is half a dwell time, but at most two steps."""
+    dwell, zones = 0.5, even(10, "C" * 10)
+    line = on(cable(), zones)
+    before, now = (state_on(line, along(), T) for T in (40.0, 36.0))
+    now.T[7:] = 41.0  # this part rises: no better than it is
+    ratio = weighed(cable(), zones, now, before=before, dt=dt, dwell=dwell)[SLACK]
+    a = min(HORIZON * dwell / dt, 2.0)
+    assert steps is None or a == steps
+    assert ratio[:6] == pytest.approx(FLOORED / (36.0 - 4.0 * a), rel=ROUND)
+    assert ratio[8:] == pytest.approx(FLOORED / 41.0, rel=ROUND)
+
+
+def test_tension_that_will_be_gone_asks_now():
+    zones = even(10, "C" * 10)
+    line = on(cable(), zones)
+    before, now = (state_on(line, along(), T) for T in (60.0, 21.0))
+    ratio = weighed(cable(), zones, now, before=before, dt=0.2, dwell=0.5)[SLACK]
+    assert (ratio > 1.0).all()  # 21 - 1.25 x 39 < 0
+
+
+def clamp(angle, end=0):
+    """Ends whose tangent at one end is turned by an angle from x in the plane x, z."""
+    t = np.cos(angle) * X + np.sin(angle) * Z
+    frames = np.stack([np.column_stack([Y, Z, X])] * 2)
+    frames[end] = np.column_stack([Y, np.cross(t, Y), t])
+    return still(frames)
+
+
+def clamped_cable(end):
+    ends = [{"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0)}, {"kind": "free"}]
+    if end:
+        ends = [{"kind": "pinned", "position": (0, 0, 0)}, {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)}]
+    return cable(start=ends[0], end=ends[1])
+
+
+@pytest.mark.parametrize("kind", ["rod", "catenary"])
+@pytest.mark.parametrize("end", [0, 1])
+def test_clamp_angle(end, kind):
+    """A taut cable leaves a clamp at 0.2 rad: sqrt(EI/T) 2 sin(0.1)/tolerance in the cell beside it, 0 elsewhere.
+
+    Whether it is a rod there or a catenary: a catenary must ask to become a rod when the clamp turns.
+    """
+    what, zones = clamped_cable(end), even(10, ("R" if kind == "rod" else "C") * 10)
+    state = state_on(on(what, zones), along(), 50.0)
+    ratio = weighed(what, zones, state, ends=clamp(0.2, end), tolerance=TOL)[CLAMP]
+    expected = np.zeros(10)
+    expected[-end] = np.sqrt(EI / 50.0) * 2 * np.sin(0.1) / TOL
+    assert ratio == pytest.approx(expected, rel=ROUND, abs=1e-5)
+
+
+def test_a_pinned_end_is_no_clamp():
+    zones = even(10, "R" * 10)
+    state = state_on(on(cable(), zones), along(), 50.0)
+    assert not weighed(cable(), zones, state, ends=clamp(0.2))[CLAMP].any()
+
+
+def test_kink_at_a_point_load():
+    what, zones = cable(attachments=[{"kind": "clump", "at": 4.0, "mass": 2.0}]), even(10, "C" * 10)
+    line = on(what, zones)
+    angle = np.full(9, 0.02)
+    angle[3] = 0.3
+    state = state_on(line, polygon(line.h, angle), 50.0)
+    ratio = weighed(what, zones, state, tolerance=TOL)
+    expected = np.zeros(10)
+    expected[3:5] = np.sqrt(EI / 50.0) * 2 * np.sin(0.15) / TOL
+    assert ratio[POINT] == pytest.approx(expected, rel=ROUND)
+    # at the clump itself there is no curvature to speak of: bend is that of the nodes beside it
+    assert ratio[BEND] == pytest.approx(EI * 2 * np.sin(0.01) / 50.0 / TOL, rel=ROUND)
+
+
+def test_jump_of_stiffness():
+    """Where two sections meet, the larger EI and the turn there count, as at a kink; elsewhere each its own."""
+    what = cable(sections=[{"length": 6.0}, {"length": 4.0, "bending_stiffness": 8.0}])
+    zones = even(10, "C" * 10)
+    line = on(what, zones)
+    state = state_on(line, polygon(line.h, np.full(9, 0.04)), 50.0)
+    ratio = weighed(what, zones, state, tolerance=TOL)
+    expected = np.zeros(10)
+    expected[5:7] = np.sqrt(8.0 / 50.0) * 2 * np.sin(0.02) / TOL
+    assert ratio[POINT] == pytest.approx(expected, rel=ROUND)
+    bend = 2 * np.sin(0.02) / 50.0 / TOL * np.array([2.0] * 6 + [8.0] * 4)
+    assert ratio[BEND] == pytest.approx(bend, rel=ROUND)
+    slack = np.cbrt(np.array([2.0] * 5 + [8.0] * 5) * W**2) / 50.0  # the node in between has the stiffer floor
+    assert ratio[SLACK] == pytest.approx(slack, rel=ROUND)
+
+
+def bed(line, normal=Z, offset=0.0, onset=0.0):
+    return no_sea(line.h.size)._replace(normal=np.asarray(normal, float), offset=offset, onset=onset, stiffness=1e3)
+
+
+@pytest.mark.parametrize("begins", ["at the start", "at the end", "in the middle"])
+def test_edge_of_contact(begins):
+    """Between the last node on the bed and the first above it: EI w/T^2 in that cell, whichever side the bed is on."""
+    zones = even(12, "C" * 12)
+    what = cable()
+    line = on(what, zones, SEABED)
+    touches = {
+        "at the start": np.arange(13) < 5, "at the end": np.arange(13) >= 5,
+        "in the middle": (np.arange(13) > 3) & (np.arange(13) < 9),
+    }[begins]  # fmt: skip
+    state = state_on(line, along(), 50.0)
+    state.r[:, 2] = np.where(touches, -0.01, 0.01)
+    ratio = weighed(what, zones, state, tolerance=TOL, sea=bed(line), bits=SEABED)[EDGE]
+    crossed = np.flatnonzero(touches[:-1] != touches[1:])
+    assert ratio[crossed] == pytest.approx(EI * W / 50.0**2 / TOL, rel=ROUND)
+    near = np.unique(np.concatenate([crossed - 1, crossed, crossed + 1]))
+    assert not np.delete(ratio, near).any()
+
+
+def test_contact_begins_half_an_onset_above_the_bed():
+    zones, what = even(12, "C" * 12), cable()
+    line = on(what, zones, SEABED)
+    state = state_on(line, along(), 50.0)
+    for z, seen in ((0.04, True), (0.06, False)):
+        state.r[:6, 2], state.r[6:, 2] = z, 1.0
+        assert weighed(what, zones, state, sea=bed(line, onset=0.1), bits=SEABED)[EDGE].any() == seen
+
+
+@pytest.mark.parametrize("twist", [0.3, -0.3])
+def test_torque_of_a_twisted_rod(twist):
+    """A straight rod twisted by 0.3 rad/m between its cells: M = GJ twist, and M^2/(4 EI T)/0.5."""
+    zones, what = even(10, "CCRRRRRRCC"), cable()
+    line = on(what, zones)
+    state = state_on(line, along((1, 1, 0)), 50.0)
+    angle = twist * 0.5 * (line.s[1:] + line.s[:-1])
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    state.a1[:] = np.cos(angle)[:, None] * state.a1 + np.sin(angle)[:, None] * np.cross(d, state.a1)
+    ratio = weighed(what, zones, state)[TORSION]
+    expected = np.where(zones.rod, (GJ * twist) ** 2 / (4 * EI * 50.0) / 0.5, 0.0)
+    assert ratio == pytest.approx(expected, rel=ROUND)
+
+
+def test_twist_without_stress_is_no_torque():
+    zones, what = even(10, "R" * 10), cable(intrinsic_curvature=(0.0, 0.0, 0.4))
+    line = on(what, zones)
+    state = state_on(line, along(), 50.0)
+    angle = 0.4 * 0.5 * (line.s[1:] + line.s[:-1])
+    state.a1[:] = np.cos(angle)[:, None] * state.a1 + np.sin(angle)[:, None] * np.cross(X, state.a1)
+    assert weighed(what, zones, state)[TORSION].max() < 1e-20
+
+
+# --- what no ratio may depend on ------------------------------------------------------------------------
+
+
+def whole_case(seed, reverse=False):
+    """A state that has something of everything: a bed under a part, a clump, two sections, clamps, twist, bends."""
+    rng = np.random.default_rng(seed)
+    n = 14
+    flags = rng.random(n) < 0.5
+    flags[[0, -1]] = True  # a rod at both clamps
+    base = np.concatenate([[0.0], np.cumsum(rng.uniform(0.5, 1.0, n))])
+    base *= 10.0 / base[-1]
+    base[6], base[9] = 4.0 + 0.2 * rng.random(), 6.5
+    base.sort()
+    parts = rng.integers(2, 5, n)
+    sections = [{"length": 6.5}, {"length": 3.5, "bending_stiffness": 6.0}]
+    at = float(base[6])
+    ends = [{"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0)},
+            {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)}]  # fmt: skip
+    if reverse:
+        sections, at = sections[::-1], 10.0 - at
+    what = cable(
+        start=ends[0], end=ends[1], sections=sections, attachments=[{"kind": "clump", "at": at, "mass": 2.0}]
+    )
+    zones = layout(base, parts.tolist(), flags)
+    if reverse:
+        zones = layout(10.0 - base[::-1], parts[::-1].tolist(), flags[::-1])
+    forward = layout(base, parts.tolist(), flags)
+    N = int(forward.counts.sum())
+    d = X + 0.3 * rng.uniform(-1, 1, (N, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    e = np.diff(forward.nodes)[:, None] * d
+    r = np.vstack([np.zeros(3), np.cumsum(e, axis=0)])
+    spin = np.cumsum(rng.uniform(-0.3, 0.3, N))
+    a1 = untwisted(e)
+    a1 = np.cos(spin)[:, None] * a1 + np.sin(spin)[:, None] * np.cross(d, a1)
+    T, before = rng.uniform(5, 50, N), rng.uniform(5, 50, N)
+    tangents = X + 0.2 * rng.uniform(-1, 1, (2, 3))
+    tangents /= np.linalg.norm(tangents, axis=1)[:, None]
+    offset = float(np.median(r[:, 2]))
+    if reverse:
+        r, e, a1, T, before, tangents = r[::-1], -e[::-1], a1[::-1], T[::-1], before[::-1], -tangents[::-1]
+    return what, zones, r, e, a1, T, before, tangents, offset
+
+
+def ratios_of(case, turn=None, shift=None):
+    what, zones, r, e, a1, T, before, tangents, offset = case
+    turn, shift = np.eye(3) if turn is None else turn, np.zeros(3) if shift is None else shift
+    line = on(what, zones, SEABED)
+    states = []
+    for tension in (before, T):
+        state = state_on(line, along(), 1.0)
+        state.r[:], state.e[:], state.a1[:], state.T[:] = r @ turn.T + shift, e @ turn.T, a1 @ turn.T, tension
+        states.append(state)
+    frames = np.zeros((2, 3, 3))
+    frames[:, :, 2] = tangents @ turn.T
+    sea = bed(line, turn @ Z, offset + float(turn @ Z @ shift), 1e-3)
+    return weighed(
+        what, zones, states[1], before=states[0], dt=0.3, ends=still(frames), sea=sea, bits=SEABED, tolerance=TOL
+    )
+
+
+SEEDS = range(8)
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_turned_and_moved(seed):
+    """The whole scene turned and moved, the plane of the bed with it: the same ratios.  Round-off over angle^2."""
+    case = whole_case(seed)
+    turn, _ = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    turn *= np.sign(np.linalg.det(turn))
+    was = ratios_of(case)
+    assert (was[[BEND, SLACK, CLAMP, POINT, EDGE, TORSION]].max(axis=1) > 0).all()
+    assert ratios_of(case, turn, np.array([30.0, -20.0, 7.0])) == pytest.approx(was, rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["bend", "slack", "clamp", "point", "edge", "torsion"])
+def test_the_ends_swapped(name):
+    """The same cable counted from its other end: the same ratios, in reverse order."""
+    k = [x.name for x in CRITERIA].index(name)
+    for seed in SEEDS:
+        was, swapped = ratios_of(whole_case(seed)), ratios_of(whole_case(seed, reverse=True))
+        assert swapped[k, ::-1] == pytest.approx(was[k], rel=1e-9), seed
+
+
+@pytest.mark.parametrize("seed", SEEDS)
+def test_a_longer_cable_of_the_same_shape(seed):
+    """All lengths doubled, with EI, forces and weight scaled to match (EI/T as length^2): ratios are numbers, so they stay.
+
+    bend, clamp and point are lengths over the tolerance: with the tolerance doubled too, nothing changes.
+    """
+    n = 10
+    rng = np.random.default_rng(seed)
+    angle, T = rng.uniform(0.02, 0.2, n - 1), rng.uniform(5, 50, n)
+    out = []
+    for k in (1.0, 2.0):
+        what = cable(10.0 * k, bending_stiffness=EI * k**2, mass=1.0 / k)
+        zones = even(n, "C" * n, 10.0 * k)
+        state = state_on(on(what, zones), polygon(np.full(n, k), angle), 1.0)
+        state.T[:] = T
+        out.append(weighed(what, zones, state, tolerance=TOL * k))
+    assert out[1] == pytest.approx(out[0], rel=1e-9)
+
+
+# --- NaN, givens ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("where", ["T", "e", "a1"])
+def test_a_state_that_is_not_a_number_is_never_calm(where):
+    """A base cell with a NaN in it has a ratio that is NaN or above 1: max() and min() must not hide it."""
+    zones, what = even(10, "R" * 10, parts=2), cable()
+    state = state_on(on(what, zones), along(), 50.0)
+    getattr(state, where)[9] = np.nan
+    assert not (weighed(what, zones, state)[:, 4] <= 1.0).all()
+
+
+@pytest.mark.parametrize("rod", [True, False])
+def test_a_ratio_that_is_not_a_number_asks_for_rod(rod):
+    for k in range(len(CRITERIA)):
+        ratios = np.zeros((len(CRITERIA), 3))
+        ratios[k, 1] = np.nan
+        assert wanted(ratios, np.full(3, rod)).tolist() == [False, True, False], CRITERIA[k].name
+
+
+def test_always_catenary_wins():
+    """What the scene says is catenary stays so, however slack; all else becomes rod."""
+    zones, what = even(12, "C" * 12), cable()
+    state = state_on(on(what, zones), along(), 1e-3 * FLOORED)  # slack everywhere
+    given = np.array([0, 0, 0, 1, 1, 1, -1, -1, -1, 0, 0, 0])
+    manager = DomainManager(what, zones, TOL, 0.5, given, 1.0)
+    manager.weigh(on(what, zones), no_sea(12), still(), state, 0.0)
+    change = manager.review(0.0, state)
+    assert change is not None and change.rod.tolist() == (given >= 0).tolist()

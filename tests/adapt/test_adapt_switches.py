@@ -1,0 +1,139 @@
+"""What a switch costs: energy, and the pull at the ends.
+
+The all-rod and the all-catenary run of each scene are smooth (both are run here); what a run with zones that move adds
+to them is its own doing.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from adapt_scenes import CELL, DWELL, LENGTH, of_kind, output_at, ran, slackening
+
+import hybrid
+
+BUSY = ["slack", "bend", "point", "edge"]
+PULLS = ("pull_start", "pull_end")
+
+
+def switches(result: hybrid.Result) -> list[float]:
+    return sorted({e.t for e in result.events if e.kind in ("split", "merge")})
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_there_are_switches(name):
+    """These scenes are a test: zones come and go."""
+    assert of_kind(ran(name), "split") and of_kind(ran(name), "merge")
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_energy_is_booked(name):
+    """What zones put in or take out is in work/zones; what is left for the scheme is small.
+
+    Bound: what the scheme has in the same scene with fixed zones (of order dt^2), and 10 % of what the zones have
+    booked, in and out: half of what a switch puts in may ring, and rho_inf = 0.5 damps what rings in a few steps.
+    """
+    result = ran(name)
+    booked = np.abs(np.diff(result["work/zones"])).sum()
+    own = max(np.abs(ran(name, kind)["work/scheme"]).max() for kind in ("rod", "catenary"))
+    assert booked > 0.0
+    assert np.abs(result["work/scheme"]).max() <= 2 * own + 0.1 * booked
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_no_switch_leaves_a_step_in_the_scheme(name):
+    """Over the step of a switch, the scheme's energy changes by less than 5 % of what all zones have booked."""
+    result = ran(name)
+    booked = np.abs(np.diff(result["work/zones"])).sum()
+    for t in switches(result):
+        k = output_at(result, t)
+        assert abs(result["work/scheme"][k] - result["work/scheme"][k - 1]) < 0.05 * booked, t
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_zones_book_only_when_they_change(name):
+    """work/zones stands still but for switches, and two dwell times after: blending takes one, letting go one."""
+    result = ran(name)
+    times = np.array(switches(result))
+    quiet = np.array([not ((t - times >= -0.021) & (t - times <= 2 * DWELL + 0.05)).any() for t in result.times[1:]])
+    blending_out = np.array([((times - t >= 0.0) & (times - t <= DWELL + 0.03)).any() for t in result.times[1:]])
+    change = np.abs(np.diff(result["work/zones"]))
+    assert change[quiet & ~blending_out].max(initial=0.0) <= 1e-12
+
+
+def pulls(name: str, pull: str) -> np.ndarray:
+    """The pull at an end at every step, and those of the rod and of the catenary of full length at the same times (3, nt).
+
+    Steps may have been halved, so these are interpolated.
+    """
+    t = ran(name).steps["t"]
+    others = [np.interp(t, ran(name, x).steps["t"], ran(name, x).steps[pull]) for x in ("rod", "catenary")]
+    return np.array([ran(name).steps[pull], *others])
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_ends_feel_no_jump(name):
+    """From the step of a switch to the next, the pull at the ends changes as that of the rod or the catenary does.
+
+    To 2 % of its mean: the change a switch may make.
+    """
+    bad = {}
+    t = ran(name).steps["t"]
+    for pull in PULLS:
+        x = pulls(name, pull)
+        for when in switches(ran(name)):
+            k = min(int(np.argmin(np.abs(t - when))), t.size - 2)
+            one, *others = x[:, k + 1] - x[:, k]
+            jump = min(abs(one - other) for other in others) / x[1].mean()
+            if jump > 0.02:
+                bad[f"{pull} at {when:.4g} s"] = f"{100 * jump:.1f} %"
+    assert not bad
+
+
+@pytest.mark.parametrize("name", BUSY)
+def test_ends_do_not_ring(name):
+    """At all times the pull at the ends lies between those of the rod and of the catenary, to 3 % of its mean.
+
+    To 8 % at a corner in a taut cable: rod and catenary are 8 % apart there, and swing out of step.
+    Nothing rings when only nodes come and go; what rings is bending that comes faster than the cable can follow.
+    """
+    for pull in PULLS:
+        one, rod, catenary = pulls(name, pull)
+        off = np.maximum(one - np.maximum(rod, catenary), np.minimum(rod, catenary) - one)
+        worst = off.max() / rod.mean()
+        assert worst <= (0.08 if name == "point" else 0.03), f"{pull}: {100 * worst:.1f} %"
+
+
+@pytest.mark.parametrize("stiffness", [1e6, None], ids=["stiff", "inextensible"])
+def test_no_axial_stiffness_rings(stiffness):
+    """An inextensible cable, and one whose axial waves take a step or two: the pull stays within 2 % of the rod's."""
+    runs = [
+        hybrid.run(slackening(model=model, axial_stiffness=stiffness)) for model in ({}, {"always_rod": [[0, LENGTH]]})
+    ]
+    for pull in PULLS:
+        rod = np.interp(runs[0].steps["t"], runs[1].steps["t"], runs[1].steps[pull])  # steps may have been halved
+        one = runs[0].steps[pull]
+        assert np.abs(one - rod).max() <= 0.02 * rod.mean(), f"{pull}: {100 * np.abs(one - rod).max() / rod.mean():.1f} %"
+
+
+@pytest.mark.parametrize("step", [0.02, 0.01])
+def test_smaller_steps_ring_no_more(step):
+    """A switch is no blow: at half the step the largest change of the pull from one step to the next is no larger."""
+    result = hybrid.run(slackening(step=step))
+    change = np.abs(np.diff(result.steps["pull_end"])).max() / result.steps["pull_end"].mean()
+    assert change <= 0.02
+
+
+def test_what_switches_does_not_move():
+    """Base nodes outside the stretch that changes do not notice it: positions at the switch go on as before.
+
+    Second differences of positions at base nodes are accelerations; over a switch they stay those of the motion,
+    which are below 20 m/s2, times dt^2.
+    """
+    result = ran("slack")
+    r = result.position[:, ::2]
+    for t in switches(result):
+        k = output_at(result, t)
+        if k + 1 < len(result.times):
+            jump = np.linalg.norm(r[k + 1] - 2 * r[k] + r[k - 1], axis=1)
+            assert jump.max() < 20.0 * 0.02**2, (t, int(jump.argmax()) * CELL)
