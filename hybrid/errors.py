@@ -89,11 +89,13 @@ EVENTS_BY_WEIGHT = (
     "unresolved twist",
     "unresolved bend",
     "stretched",
+    "deep in the seabed",
     "implausible",
     "loses energy",
     "ignored",
     "undamped",
     "not judged",
+    "friction left out",
     "turned in",
 )
 
@@ -126,7 +128,7 @@ _REMEDY = {
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
     Outcome.DROWNED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
-    Outcome.UNSTABLE: "start from another shape (initial.direction), or run the motion with damping",
+    Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }
 
 
@@ -149,7 +151,9 @@ class ComputationError(HybridError):
             lines.append(f"    detail:   {detail}")
         remedy = outcome.remedy
         if t is None and outcome in (Outcome.NOT_CONVERGED, Outcome.TURNED_TOO_FAR, Outcome.NOT_FINITE):
-            remedy = "start from another shape (initial.direction), or run the motion with damping to rest"
+            remedy = (
+                "start from another shape (initial.points, initial.direction), or run the motion with damping to rest"
+            )
         lines.append(f"    try:      {remedy}")
         if snapshot is not None:
             lines.append(f"    snapshot: {snapshot}")

@@ -89,7 +89,7 @@ class Motion:
             self._forget_blow(until - begin)
 
     def _forget_blow(self, dt: float) -> None:
-        """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a whole step."""
+        """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a step."""
         state = self.state
         if np.abs(state.a).max() * dt > np.abs(state.v).max():
             for x in (state.a, state.vd, state.wa, state.wd):
@@ -101,6 +101,7 @@ class Motion:
         values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work))
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
+        self.watch.mesh(self.t, self.state)
         self.watch.rest(self.t, ends, values, self.state)
         self._look(self.watch.energy(self.t, values, np.array(self.work), self.state))
 

@@ -37,6 +37,18 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
                     f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
                     f"and a flexible line without tension has no shape: make it a rod there"
                 )
+    fluid = scene.environment.fluid
+    still = fluid is None or not fluid.flows()
+    if bed is not None and bed.slope is None and len(held) == 1 and still and not all(rod_ends):
+        loads = [getattr(end, key, None) for end in (scene.ends.start, scene.ends.end) for key in ("force", "thrust")]
+        level = [getattr(x, "value", x)[:2] for x in loads if x is not None]
+        if not any(any(x) for x in level):
+            found.append(
+                "nothing pulls the line along the seabed: what lies there has no tension, and a flexible line without "
+                "tension has no shape: make it a rod there, or give a current"
+            )
+    if bed is not None and not held and not all(rod_ends):
+        found.append("nothing holds the cable: on the bed it has no tension, and a flexible line then has no shape")
     if bed is not None and not held and bed.slope is not None:
         slope = math.hypot(*bed.slope)
         least = min(bed.friction.axial, bed.friction.lateral) if bed.friction else 0.0

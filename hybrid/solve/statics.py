@@ -50,6 +50,7 @@ class Equilibrium:
     residual: float
     report: Floats
     slack: int  # a catenary cell without tension, or -1
+    rubbed: bool  # True when friction took part
     judged: bool  # False when its stability could not be judged (an end moment)
 
     @property
@@ -311,11 +312,11 @@ def _nudged(solver: _Solver, state: State) -> State:
     return pushed
 
 
-def _settled(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int, State]:
+def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str, Outcome, int, State]:
     """Where friction alone keeps a line: let it settle from its start, with friction, then Newton from there."""
     rest = start.copy()
     Stepper(solver.line, solver.length, solver.scale).hold_on(solver.sea, ends, rest)
-    return "settled on the seabed with friction", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
+    return f"settled with friction from {shape}", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
 
 
 def _roads(solver: _Solver, ends: Ends, start: State, shape: str) -> Iterator[tuple[str, Outcome, int, State]]:
@@ -345,12 +346,13 @@ def solve_statics(
     floor: float | None = None,
     take_slack: bool = False,
     shape: str = "the starting shape",
+    settle: bool = False,
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
     length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
     (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
-    start is, for people.
+    start is, for people; settle: let it come to rest with friction from the start, and try nothing else.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -364,14 +366,14 @@ def solve_statics(
     solver = _Solver(smooth, sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
-    for how, outcome, where, state in _roads(solver, ends, start, shape):
+    for how, outcome, where, state in () if settle and line.bits & FRICTION else _roads(solver, ends, start, shape):
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
         failed.append((outcome, where, state))
     if line.bits & FRICTION:
         solver = _Solver(rough, sea, length, scale, floor)
-        how, outcome, where, state = _settled(solver, ends, start)
+        how, outcome, where, state = _settled(solver, ends, start, shape)
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
@@ -390,5 +392,6 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     residual = solver.prove(ends, state)
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
+    rubbed = bool(solver.line.bits & FRICTION)
     judged = is_judged(solver.line, ends, solver.length) or not solver.line.element.any()
-    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), judged)
+    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), rubbed, judged)
