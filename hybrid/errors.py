@@ -71,6 +71,7 @@ class Outcome(IntEnum):
     GAINS_ENERGY = 7
     TWISTED_TOO_FAR = 8
     DROWNED = 9
+    BURIED = 10
 
     @property
     def cause(self) -> str:
@@ -116,6 +117,7 @@ _CAUSE = {
     Outcome.DROWNED: "the line is too long for literal shooting: growth along it has drowned the answer",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
+    Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
 }
 
 _REMEDY = {
@@ -128,6 +130,7 @@ _REMEDY = {
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
     Outcome.DROWNED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
+    Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }
 

@@ -188,7 +188,7 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     try:
         return solve_statics(
             model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-            model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape,
+            model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape, others=model.other_starts,
             settle=getattr(scene.initial, "friction", "") == "settled",
         )  # fmt: skip
     except ComputationError as failed:

@@ -244,7 +244,7 @@ def test_rov_is_kept_quiet_by_the_float() -> None:
     assert ship == pytest.approx(2.0, abs=0.01)
     assert float_ == pytest.approx(0.29, rel=0.05)
     assert vehicle == pytest.approx(0.005, abs=0.002)
-    assert result.tension.min() > 80 and not result.events
+    assert result.tension.min() > 30 and not result.events  # just below the float, where its lift is gone
     top = result.tension[settled(result, 84.0), 0]
     assert (top.min(), top.max()) == pytest.approx((157, 246), rel=0.02)
 

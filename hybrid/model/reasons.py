@@ -32,7 +32,9 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
             )
     if bed is not None and weight > 0.0:
         for name, end, rod in zip(("start", "end"), (scene.ends.start, scene.ends.end), rod_ends, strict=True):
-            if not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
+            x, y, z = next(iter(held.values()), (0.0, 0.0, 0.0))
+            reaches = z - bed.height(x, y) < scene.length
+            if reaches and not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
                 found.append(
                     f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
                     f"and a flexible line without tension has no shape: make it a rod there"
