@@ -71,6 +71,7 @@ class Outcome(IntEnum):
     GAINS_ENERGY = 7
     TWISTED_TOO_FAR = 8
     DROWNED = 9
+    BURIED = 10
 
     @property
     def cause(self) -> str:
@@ -89,11 +90,13 @@ EVENTS_BY_WEIGHT = (
     "unresolved twist",
     "unresolved bend",
     "stretched",
+    "deep in the seabed",
     "implausible",
     "loses energy",
     "ignored",
     "undamped",
     "not judged",
+    "friction left out",
     "turned in",
 )
 
@@ -114,6 +117,7 @@ _CAUSE = {
     Outcome.DROWNED: "the line is too long for literal shooting: growth along it has drowned the answer",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
+    Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
 }
 
 _REMEDY = {
@@ -126,7 +130,8 @@ _REMEDY = {
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
     Outcome.DROWNED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
-    Outcome.UNSTABLE: "start from another shape (initial.direction), or run the motion with damping",
+    Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
+    Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }
 
 
@@ -149,7 +154,9 @@ class ComputationError(HybridError):
             lines.append(f"    detail:   {detail}")
         remedy = outcome.remedy
         if t is None and outcome in (Outcome.NOT_CONVERGED, Outcome.TURNED_TOO_FAR, Outcome.NOT_FINITE):
-            remedy = "start from another shape (initial.direction), or run the motion with damping to rest"
+            remedy = (
+                "start from another shape (initial.points, initial.direction), or run the motion with damping to rest"
+            )
         lines.append(f"    try:      {remedy}")
         if snapshot is not None:
             lines.append(f"    snapshot: {snapshot}")

@@ -51,6 +51,7 @@ class Motion:
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.cpu = clock.process_time()
         self.work = [0.0] * len(POWERS)
+        self._loaded = [any(abs(x - s) < 1e-9 * model.length for x in model.attached) for s in (0.0, model.length)]
         self._stored = 0.0  # J, in the seabed
         if equilibrium is None:
             self.state = model.start.copy()
@@ -99,11 +100,10 @@ class Motion:
             self._forget_blow(until - begin)
 
     def _forget_blow(self, dt: float) -> None:
-        """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a whole step."""
+        """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a step."""
         state = self.state
-        if np.abs(state.a).max() * dt > np.abs(state.v).max():
-            for x in (state.a, state.vd, state.wa, state.wd):
-                x[:] = 0.0
+        hit = state.bed.any(axis=1) & (np.abs(state.a).max(axis=1) * dt > np.abs(state.v).max())
+        state.a[hit], state.vd[hit] = 0.0, 0.0
 
     def save(self) -> None:
         """Write an output."""
@@ -114,6 +114,7 @@ class Motion:
         values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work))
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
+        self.watch.mesh(self.t, self.state)
         self.watch.rest(self.t, ends, values, self.state)
         self._look(self.watch.energy(self.t, values, np.array(self.work), self.state))
 
@@ -211,7 +212,7 @@ class Motion:
 
     def _pull(self, k: int) -> float:
         ends = self.model.ends.values
-        if not ends.held[k] and self.model.line.point_mass[-k] > 0.0:
+        if self._loaded[k]:
             return abs(float(self.state.T[-k]))
         x, y, z = self.stepper.told[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
         return sqrt(x * x + y * y + z * z)

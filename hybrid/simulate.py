@@ -181,6 +181,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         watch = Watch(recorder, model)
         watch.equilibrium(found)
         watch.strain(0.0, found.state)
+        watch.mesh(0.0, found.state)
         stop = watch.still(ends, found.state)
         if stop is not None:
             raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
@@ -194,7 +195,8 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     try:
         return solve_statics(
             model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-            model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape,
+            model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape, others=model.other_starts,
+            settle=getattr(scene.initial, "friction", "") == "settled",
         )  # fmt: skip
     except ComputationError as failed:
         reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))

@@ -14,12 +14,15 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.model.build import Model
 from hybrid.model.state import Ends, Floats, State
+from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.results.record import Recorder
 from hybrid.solve.statics import Equilibrium, is_stable
 from hybrid.solve.step import lowest, sharpest
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
+# Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
+SUNK = 0.01
 # Twist of an element (rad) that could just as well be its opposite: the log strain ends at pi.
 LARGEST_TWIST = 2.8
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
@@ -45,6 +48,7 @@ class Watch:
         self._bend = self._twist = UNRESOLVED
         self._strain = STRETCHED
         self._slack = model.slack_floor
+        self._fold, self._sunk = UNRESOLVED, SUNK * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = False
         self._put_in = self._potential = self._alive = 0.0  # J
@@ -66,6 +70,10 @@ class Watch:
             s, tension = float(self._model.line.s[found.slack]), float(found.state.T[found.slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, found.slack, "slack", f"{text}: it stands like a strut, which no cable does")
+        if self._model.line.bits & FRICTION and not found.rubbed:
+            text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
+            where = f"{text} for one that lies where it was laid"
+            self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
         if not found.judged:
             text = "the stability of this equilibrium is not judged, because an end moment is not conservative"
             self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
@@ -114,6 +122,26 @@ class Watch:
             text = f"the cable is stretched by {part:.3g} %: is it long enough, and axial_stiffness in N?"
             self.note(t, cell, "stretched", text)
             self._strain = 2.0 * float(strain[cell])
+
+    def mesh(self, t: float, state: State) -> None:
+        """Folds that a catenary's cells do not resolve, and a seabed in which the line drowns."""
+        line, d = self._model.line, state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
+        turn = np.where(flexible, np.arccos(np.clip(np.einsum("ij,ij->i", d[:-1], d[1:]), -1.0, 1.0)), 0.0)
+        if turn.size and turn.max() > self._fold:
+            node = int(np.argmax(turn)) + 1
+            text = f"the catenary turns by {np.degrees(turn[node - 1]):.0f} deg from one cell to the next at s = "
+            fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
+            self.note(t, node, "unresolved bend", text + fix)
+            self._fold = 1.5 * float(turn[node - 1])
+        if line.bits & SEABED:
+            sea = self._model.sea.values
+            depth = sea.offset - state.r @ sea.normal
+            node = int(np.argmax(depth))
+            if depth[node] > self._sunk:
+                text = f"the line lies {depth[node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
+                self.note(t, node, "deep in the seabed", f"{text}: is its stiffness in N/m per m of cable?")
+                self._sunk = 3.0 * float(depth[node])
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""

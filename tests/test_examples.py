@@ -244,7 +244,7 @@ def test_rov_is_kept_quiet_by_the_float() -> None:
     assert ship == pytest.approx(2.0, abs=0.01)
     assert float_ == pytest.approx(0.29, rel=0.05)
     assert vehicle == pytest.approx(0.005, abs=0.002)
-    assert result.tension.min() > 80 and not result.events
+    assert result.tension.min() > 30 and not result.events  # just below the float, where its lift is gone
     top = result.tension[settled(result, 84.0), 0]
     assert (top.min(), top.max()) == pytest.approx((157, 246), rel=0.02)
 
@@ -354,7 +354,7 @@ def test_buoy_follows_an_irregular_sea() -> None:
     assert chain.min() == pytest.approx(-213, rel=0.3)
     end = result.touchdown[late, 1]
     assert 32 < end.min() < 34 and 38 < end.max() < 40
-    assert not result.events
+    assert [event.kind for event in result.events] == ["friction left out"]
 
 
 def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -49,7 +49,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/record": ("errors", "results/read"),
     "results/touchdown": ("model",),
     "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/touchdown"),
-    "watch": ("errors", "model", "solve", "results"),
+    "watch": ("errors", "physics", "model", "solve", "results"),
     "motion": ("errors", "watch", "scene", "physics", "model", "solve", "adapt", "results"),
     "simulate": (
         "errors",

@@ -26,6 +26,8 @@ MOST_ITERATIONS = 100
 SLACK = 0.5
 # Rounds of finding out how much of a line lies on the seabed: each changes it by a cell or none, but the first.
 LAYING = 20
+# A slight pull along x where nothing pulls level, as a part of all loads.
+SLIGHT = 1e-3
 # Bisections of the lift of a floating body: to 1e-9 of it.
 FLOATING = 30
 
@@ -138,6 +140,8 @@ def moored(
     """As `trail`, with a body at the free end that floats at `surface` (m) on as much of its `lift` (N) as it needs."""
     free = -1 if held == 0 else 0
     low, high, best = 0.0, 1.0, None
+    if not np.abs(loads[:, :2]).max() > 0.0:  # still water: any heading will do, so that what lies on the bed has one
+        loads = loads + (SLIGHT * float(np.abs(loads).sum()) / loads.shape[0]) * np.array([1.0, 0.0, 0.0])
     for _ in range(FLOATING):
         part = 1.0 if best is None else 0.5 * (low + high)
         lifted = loads.copy()

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
 
 from hybrid.model.mesh import Zone
+from hybrid.model.properties import weight
+from hybrid.model.sea import current_table
 from hybrid.model.state import Line
 from hybrid.physics.loads import FORCES
 from hybrid.scene.schema import Scene
@@ -24,6 +26,33 @@ class Entry:
     on: bool
     why: str
     event: str = ""  # kind of event that a result gets for it: "ignored", "implausible"
+
+
+# Fluids, kg/m^3: gases, and liquids from oil to heavy brine.  Seabed friction and currents that nobody has met.
+GASES, LIQUIDS, ROUGHEST, FASTEST = (0.05, 10.0), (500.0, 2500.0), 2.0, 5.0
+# A cable whose axial stiffness is less than this many times its weight is hardly one.
+SOFTEST = 5.0
+
+
+def _implausible(scene: Scene) -> Iterator[tuple[str, str]]:
+    """What and why: numbers that are more likely in another unit."""
+    fluid, bed = scene.environment.fluid, scene.environment.seabed
+    if fluid is not None:
+        if not any(low <= fluid.density <= high for low, high in (GASES, LIQUIDS)):
+            yield f"a fluid of {fluid.density:g} kg/m^3", "environment.fluid.density: is it in kg/m^3?"
+        _, current = current_table(scene)
+        fastest = float((current**2).sum(axis=1).max()) ** 0.5
+        if fluid.density >= LIQUIDS[0] and fastest > FASTEST:
+            yield f"a current of {fastest:g} m/s", "environment.fluid.current: is it in m/s?"
+    if bed is not None and bed.friction is not None and max(bed.friction.axial, bed.friction.lateral) > ROUGHEST:
+        yield (
+            f"friction of {max(bed.friction.axial, bed.friction.lateral):g}",
+            "environment.seabed.friction is a part of 1",
+        )
+    for i, x in enumerate(scene.cable.sections):
+        if x.axial_stiffness is not None and x.axial_stiffness < SOFTEST * abs(weight(x, scene)) * scene.length:
+            text = f"cable.sections[{i}].axial_stiffness: is it in N?"
+            yield f"a cable that stretches by more than {1 / SOFTEST:.0%} under its own weight", text
 
 
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
@@ -64,6 +93,7 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                     f"assumed (solid round section): {which} gives none",
                 )
             )
+    entries += [Entry(what, True, why, event="implausible") for what, why in _implausible(scene)]
     for i, section in enumerate(scene.cable.sections):
         if section.diameter:
             density = section.mass / (0.25 * pi * section.diameter**2)

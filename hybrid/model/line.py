@@ -33,6 +33,10 @@ def line_on(
     force = np.zeros((n + 1, 3))
     force[:, 2] = -_to_nodes(h * material.weight[of])
     force[place, 2] += material.lift
+    footing = np.full(n + 1, np.nan)
+    if material.footing.size or more_bits:
+        footing[:] = 0.0
+        footing[place[: material.footing.size]] = material.footing
     element, kb, k0, hn = _elements(material, h, rod, of)
     half = 0.5 * h
     return Line(
@@ -42,7 +46,7 @@ def line_on(
         added_n=half * material.added_n[of], added_t=half * material.added_t[of],
         damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
         buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
-        bits=bits, **point,
+        footing=footing, bits=bits, **point,
     )  # fmt: skip
 
 

@@ -16,6 +16,7 @@ from hybrid.model.properties import (
     damping,
     merged_sections,
     modules_of,
+    pressing,
     rotary_inertia,
     torsional_stiffness,
 )
@@ -24,7 +25,7 @@ from hybrid.physics.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, S
 from hybrid.scene.schema import Clamped, Guided, Scene, Section
 
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
-POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height")
+POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright")
 
 
 @dataclass
@@ -53,6 +54,7 @@ class Material:
     held_twist: tuple[bool, bool]  # and resists twist
     at: Floats  # (P,) m, where points are
     lift: Floats  # (P,) N, constant force upwards of each
+    footing: Floats  # (P,) m, cable that presses on the seabed as much as each; empty without a seabed
     points: dict[str, Floats] = field(default_factory=dict)  # POINT -> (P,)
 
     @property
@@ -104,7 +106,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
         held_tangent=(isinstance(pair[0], Clamped | Guided), isinstance(pair[1], Clamped | Guided)),
         held_twist=(_resists_twist(pair[0]), _resists_twist(pair[1])),
-        at=np.zeros(0), lift=np.zeros(0), points={name: np.zeros(0) for name in POINT},
+        at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
     if any(damping(x).mass for x in of):
         out.bits |= MASS_DAMPING
@@ -184,6 +186,10 @@ def _points(out: Material, scene: Scene) -> None:
             out.points["point_buoy"][i] += gravity * displaced
             height = body.height_in(rho, gravity) or 2.0 * np.sqrt(body.drag_area / np.pi) or SMALLEST_BODY
             out.points["point_height"][i] = max(out.points["point_height"][i], height)
+            out.points["point_upright"][i] = float(body.shape == "cylinder")
+    if scene.environment.seabed is not None:
+        sinks = -(out.lift + out.points["point_buoy"])
+        out.footing = np.maximum(sinks, 0.0) / pressing(scene)
     asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
     if any(out.points[name].any() for name in asked):
         out.bits |= BODIES

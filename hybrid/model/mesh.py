@@ -136,7 +136,7 @@ def given_nodes(
                     Complaint(
                         "mesh.nodes",
                         f"nearest node to {x:g} m is {s[i]:g} m",
-                        f"a node at {x:g} m, where a zone or a section begins",
+                        f"a node at {x:g} m, where a zone, a section, modules or an attachment begin",
                         f"add {x:g} to the list",
                     )
                 ]

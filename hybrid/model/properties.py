@@ -64,6 +64,13 @@ def weight(section: Section, scene: Scene) -> float:
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
+def pressing(scene: Scene) -> float:
+    """The least weight per length (N/m) that a cable of the scene puts on its bed; its dry weight if it would float."""
+    heavy = [w for w in (weight(x, scene) for x in scene.cable.sections) if w > 0.0]
+    dry = [x.mass * (scene.environment.gravity or 1.0) for x in scene.cable.sections]
+    return min(heavy or dry)
+
+
 def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Body]]:
     """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
     for x in scene.cable.attachments:

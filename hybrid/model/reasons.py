@@ -32,11 +32,25 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
             )
     if bed is not None and weight > 0.0:
         for name, end, rod in zip(("start", "end"), (scene.ends.start, scene.ends.end), rod_ends, strict=True):
-            if not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
+            x, y, z = next(iter(held.values()), (0.0, 0.0, 0.0))
+            reaches = z - bed.height(x, y) < scene.length
+            if reaches and not rod and isinstance(end, Free) and end.force is None and held and not bed.friction:
                 found.append(
                     f"the {name} lies free on a seabed without friction: nothing keeps the cable there taut, "
                     f"and a flexible line without tension has no shape: make it a rod there"
                 )
+    fluid = scene.environment.fluid
+    still = fluid is None or not fluid.flows()
+    if bed is not None and bed.slope is None and len(held) == 1 and still and not all(rod_ends):
+        loads = [getattr(end, key, None) for end in (scene.ends.start, scene.ends.end) for key in ("force", "thrust")]
+        level = [getattr(x, "value", x)[:2] for x in loads if x is not None]
+        if not any(any(x) for x in level):
+            found.append(
+                "nothing pulls the line along the seabed: what lies there has no tension, and a flexible line without "
+                "tension has no shape: make it a rod there, or give a current"
+            )
+    if bed is not None and not held and not all(rod_ends):
+        found.append("nothing holds the cable: on the bed it has no tension, and a flexible line then has no shape")
     if bed is not None and not held and bed.slope is not None:
         slope = math.hypot(*bed.slope)
         least = min(bed.friction.axial, bed.friction.lateral) if bed.friction else 0.0

@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from hybrid.model.ends import rise
-from hybrid.model.properties import weight
+from hybrid.model.properties import pressing
 from hybrid.model.state import Floats, Sea, no_sea
 from hybrid.scene.schema import (
     CurrentProfile,
@@ -97,13 +97,6 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
 def rubs(bed: Seabed | None) -> bool:
     """Whether a seabed has friction."""
     return bed is not None and bed.friction is not None and (bed.friction.axial > 0.0 or bed.friction.lateral > 0.0)
-
-
-def pressing(scene: Scene) -> float:
-    """The least weight per length (N/m) that a cable of the scene puts on its bed; its dry weight if it would float."""
-    heavy = [w for w in (weight(x, scene) for x in scene.cable.sections) if w > 0.0]
-    dry = [x.mass * (scene.environment.gravity or 1.0) for x in scene.cable.sections]
-    return min(heavy or dry)
 
 
 def slip_length(scene: Scene, bed: Seabed) -> float:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Literal
 
 import numpy as np
@@ -16,6 +17,7 @@ from hybrid.physics.loads import BODIES, DRAG, FLOW, SURFACE
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Points, Scene, Straight
 
+SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 
 
@@ -44,10 +46,34 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     else:
         tangent = getattr(scene.ends.start, "tangent", None) or getattr(scene.ends.end, "tangent", None)
         hanging = -1.0 if down == bool(start) else 1.0
-        direction = np.array(tangent if tangent else (0.0, 0.0, hanging), float)
+        place, bed = start or end or (0.0, 0.0, 0.0), scene.environment.seabed
+        lies = bed is not None and down and place[2] - bed.height(place[0], place[1]) < 1e-3 * length
+        if tangent:
+            direction = np.array(tangent, float)
+        else:  # what is held on the bed lies on it, level
+            direction = _along_bed(scene) if lies else np.array([0.0, 0.0, hanging])
     direction /= np.linalg.norm(direction)
     first = np.array(start, float) if start else np.array(end, float) - length * direction
     return first + s[:, None] * direction, "a straight line"
+
+
+def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+    """Shapes to start from where an elastic catenary leads nowhere: an arc and the straight span of two held ends."""
+    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    if start and end:
+        first, span = np.array(start, float), np.subtract(end, start)
+        yield "an arc", _arc(first, np.array(end, float), s, -1.0 if net_weight(scene) >= 0.0 else 1.0)
+        if float(np.linalg.norm(span)) > SHORTEST_SPAN * scene.length:
+            yield "the straight span", first + (s / s[-1])[:, None] * span
+
+
+def _along_bed(scene: Scene) -> Floats:
+    """A direction in the plane of the seabed, across its slope."""
+    bed = scene.environment.seabed
+    rise = bed.slope if bed is not None and bed.slope is not None else (0.0, 0.0)
+    if not any(rise):
+        return np.array([1.0, 0.0, 0.0])
+    return np.array([-rise[1], rise[0], 0.0])
 
 
 def along_polyline(points: Floats, s: Floats) -> Floats:

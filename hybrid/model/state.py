@@ -47,6 +47,8 @@ class Line(NamedTuple):
     point_buoy: Floats  # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
     point_displaced: Floats  # (N+1,) kg, water displaced by a body at the node
     point_height: Floats  # (N+1,) m, over which a body passes through the surface
+    point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
+    footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
     bits: int  # which optional forces are on (physics.loads)
 
 

@@ -99,6 +99,13 @@ def stored(line, sea, r):
     """Energy (J) that the bed has stored under the line."""
     energy = 0.0
     n, k, o = sea.normal, sea.stiffness, sea.onset
+    for i in range(line.footing.shape[0]):
+        if line.footing[i] > 0.0:
+            p = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+            if p >= o:
+                energy += line.footing[i] * k * (0.5 * p * (p - o) + o * o / 6.0)
+            elif p > 0.0:
+                energy += line.footing[i] * k * p * p * p / (6.0 * o)
     for i in range(line.h.shape[0]):
         p0 = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
         p1 = sea.offset + 0.5 * o - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])

@@ -1,7 +1,7 @@
 """What a run writes down: quantities on the fixed output grid, evaluated only when an output is due.
 
 Second order everywhere: positions by cubic Hermite interpolation of the nodes (one-sided
-at joints and at point loads in catenaries, where the tangent may kink), tensions and tangents from the middle of the
+at joints and at point loads, where the tangent may kink), tensions and tangents from the middle of the
 cells, moments and curvatures from the nodes, zone by zone.
 """
 
@@ -59,9 +59,9 @@ def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
 
 
 def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
-    """What joints, and point loads in catenaries, cut the line into: neighbours of the same kind are made one first.
+    """What joints, and point loads, cut the line into: neighbours of the same kind are made one first.
 
-    loads: arc lengths (m) of floats, clumps and the like; a catenary has a kink there.
+    loads: arc lengths (m) of floats, clumps and the like: tension jumps there, and a catenary has a kink.
     """
     whole: list[Zone] = []
     for zone in zones:
@@ -72,7 +72,7 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
     parts: list[Zone] = []
     for zone in whole:
         near = 1e-9 * whole[-1].s_b
-        kinks = [x for x in loads if zone.kind == "catenary" and zone.s_a + near < x < zone.s_b - near]
+        kinks = [x for x in loads if zone.s_a + near < x < zone.s_b - near]
         bounds = [zone.s_a, *kinks, zone.s_b]
         parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
     return tuple(parts)
@@ -98,6 +98,7 @@ class Grid:
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         done = np.zeros(s.size, bool)
         self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the stretch's sides
+        self.loads = tuple(loads)
         self.parts = stretches(zones, loads)
         for zone in self.parts:
             a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
@@ -173,7 +174,11 @@ class View:
             if self.line.element[first]:  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
-            ends.append(float(force @ t) / float(np.linalg.norm(t)))
+            at_end = self.line.s[first]
+            if any(abs(x - at_end) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
+                ends.append(self._end_tension(k))
+            else:
+                ends.append(float(force @ t) / float(np.linalg.norm(t)))
         return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
 
     @cached_property
@@ -276,12 +281,16 @@ class View:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
         if self.ends.held[k]:
             return -self.report[3 * k : 3 * k + 3]
-        first, second, out = (0, 1, -1.0) if k == 0 else (-1, -2, 1.0)
-        if self.line.point_mass[first] == 0.0:
+        first, out = (0, -1.0) if k == 0 else (-1, 1.0)
+        if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
             return self.ends.force[k].copy()
-        T, h, d = self.state.T, self.line.h, self.d  # the tension of the cable, extrapolated to its end
-        pull = T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0]
-        return np.asarray(out * pull * d[first])
+        return np.asarray(out * self._end_tension(k) * self.d[first])
+
+    def _end_tension(self, k: int) -> float:
+        """Tension of the cable at end k, extrapolated from its last cells."""
+        first, second = (0, 1) if k == 0 else (-1, -2)
+        T, h = self.state.T, self.line.h
+        return float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0])
 
 
 @dataclass(frozen=True)

@@ -20,6 +20,8 @@ from hybrid.scene.table import (
 )
 
 HEIGHT = "vertical extent, for the part under water at the surface; absent: that of a sphere of its volume [m]"
+Shape = Literal["sphere", "cylinder"]
+SHAPE = "how the part under water grows with the draught x of the height: sphere (3 x^2 - 2 x^3), upright cylinder (x)"
 DRAG_AREA = "drag coefficient x frontal area [m^2]"
 ADDED_MASS = "mass of the fluid that moves with it [kg]"
 
@@ -52,6 +54,7 @@ class Float(Table):
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3] in a fluid of `density` [kg/m^3] under `gravity` [m/s^2]."""
@@ -77,6 +80,7 @@ class Clump(Table):
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""

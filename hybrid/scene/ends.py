@@ -10,7 +10,7 @@ from typing import Annotated, Literal
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, sphere_diameter
+from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
 from hybrid.scene.table import (
     Direction,
     Finding,
@@ -249,6 +249,7 @@ class Body(Table):
     mass: Positive = Field(description="mass, in air [kg]")
     volume: NonNegative = Field(default=0.0, description="displaced volume [m^3]")
     height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")

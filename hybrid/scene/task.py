@@ -91,6 +91,12 @@ class Equilibrium(Table):
         "inertial frame [m]",
     )
 
+    friction: Literal["left_out", "settled"] = Field(
+        default="left_out",
+        description="on a seabed with friction: left_out (the equilibrium without it, where there is one, which is "
+        "one with it as well), or settled (the line comes to rest from its first shape with friction, and stays near)",
+    )
+
     @model_validator(mode="after")
     def _one_guess(self) -> Equilibrium:
         if self.points is not None:

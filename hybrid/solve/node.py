@@ -22,7 +22,7 @@ from hybrid.physics.loads import (
     half_cell_drag,
 )
 from hybrid.physics.rotations import add, dot, madd, mat_vec, mscale, outer, scale, sub
-from hybrid.physics.seabed import contact, friction
+from hybrid.physics.seabed import contact, friction, pressure
 from hybrid.physics.water import current_at, wetted, wetted_stretch
 
 WATER = DRAG | ADDED_MASS | SURFACE | WAVES | BODIES
@@ -100,7 +100,10 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
         f = (f[0], f[1], f[2] + line.point_buoy[i])
         pushed += line.point_buoy[i] * vi[2]
         iH = 1.0 / line.point_height[i]
-        wet, _, slope = wetted((eta - z) * iH + 0.5)
+        x = (eta - z) * iH + 0.5
+        wet, _, slope = wetted(x)
+        if line.point_upright[i]:
+            wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
         D = madd(mscale(wet, D), mscale(-slope * iH, outer(f, UP)))
         f = scale(wet, f)
     report[12] -= wet * drag
@@ -131,6 +134,9 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
             f, f0, f1, g0, g1 = contact(p, po, pd, -dot(n, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset)
             N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
             touched += h
+    if line.footing[i] > 0.0 and p > 0.0:
+        f, f0, g0 = pressure(0.0, p, p, pd, pd, sea.stiffness, sea.damping, sea.onset)
+        N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
     F, slope, q = scale(N, n), n, (0.0, 0.0, 0.0)
     D = Z9
     report[21] += N

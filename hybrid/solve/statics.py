@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +23,9 @@ REACH = 0.1  # of the length: largest shift of a node in one iteration
 ANCHOR, NEUTRAL = 1e-12, 1e-9
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
 BALANCED, BALANCING = 1e-6, 4
+# A line that has gone this many lengths from its start has drifted; one that lies this part of its length, and this
+# many onsets of contact, under the bed has gone through it.
+DRIFTED, BURIED, BURIED_ONSETS = 10.0, 0.02, 100.0
 MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at a time: 8 pi are 40 turns of that size
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
@@ -50,6 +53,7 @@ class Equilibrium:
     residual: float
     report: Floats
     slack: int  # a catenary cell without tension, or -1
+    rubbed: bool  # True when friction took part
     judged: bool  # False when its stability could not be judged (an end moment)
 
     @property
@@ -176,18 +180,28 @@ class _Solver:
             tension, cell = lowest(line, new.T)
             if not tension > self.floor:
                 outcome, where = Outcome.SLACK, cell
+        if outcome == Outcome.OK and line is self.line and sea is None:
+            far = np.abs(new.r - start.r).max(axis=1)
+            if far.max() > DRIFTED * self.length:  # what no bond holds is held by the anchor's springs alone
+                outcome, where = Outcome.SINGULAR, int(np.argmax(far))
+            elif line.bits & SEABED:
+                deep = self.sea.offset - new.r @ self.sea.normal
+                if deep.max() > max(BURIED * self.length, BURIED_ONSETS * self.sea.onset):
+                    outcome, where = Outcome.BURIED, int(np.argmax(deep))
         judged = line is self.line and sea is None and is_judged(line, ends, self.length)
         if outcome == Outcome.OK and judged and not self.stable(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
 
     def prove(self, ends: Ends, state: State) -> float:
-        """Largest force out of balance at a node, N."""
-        march(
+        """Largest force out of balance at a node, N; infinity when it cannot be told."""
+        if self.line.bits & FRICTION:
+            lay(self.sea, state.e, state.slip)
+        bad = march(
             self.line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
-            state.w, state.wd, 0.0, 0.0, self.gaps, self.W, self.X, self.report, self.rows,
+            state.w, state.wd, 0.0, self.anchor, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
-        return float(self.report[15])
+        return float(self.report[15]) if bad < 0 else float("inf")
 
 
 def _loaded(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
@@ -311,21 +325,30 @@ def _nudged(solver: _Solver, state: State) -> State:
     return pushed
 
 
-def _settled(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, int, State]:
+def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str, Outcome, int, State]:
     """Where friction alone keeps a line: let it settle from its start, with friction, then Newton from there."""
     rest = start.copy()
     Stepper(solver.line, solver.length, solver.scale).hold_on(solver.sea, ends, rest)
-    return "settled on the seabed with friction", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
+    return f"settled with friction from {shape}", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
 
 
-def _roads(solver: _Solver, ends: Ends, start: State, shape: str) -> Iterator[tuple[str, Outcome, int, State]]:
+def _roads(
+    solver: _Solver, ends: Ends, start: State, shape: str, others: Sequence[tuple[str, State]]
+) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     first = (f"Newton from {shape}", *solver.newton(solver.line, ends, start))
     yield first
     if solver.line.bits & (SEABED | FLOW):
         yield _eased(solver, ends, start)
-    soft = _hardened(solver, ends, start)
+    for name, other in others:
+        yield f"Newton from {name}", *solver.newton(solver.line, ends, other)
+    soft = _hardened(
+        solver, ends, others[0][1] if others and first[1] in (Outcome.NOT_FINITE, Outcome.SINGULAR) else start
+    )
     yield soft
+    for name, other in others:
+        how, outcome, where, state = _hardened(solver, ends, other)
+        yield f"{how}, from {name}", outcome, where, state
     yield from _loaded(solver, ends, start)
     settled = ("damped motion to rest, then Newton", *solver.newton(solver.line, ends, _relax(solver, ends, start)))
     yield settled
@@ -345,12 +368,15 @@ def solve_statics(
     floor: float | None = None,
     take_slack: bool = False,
     shape: str = "the starting shape",
+    settle: bool = False,
+    others: Sequence[tuple[str, State]] = (),
 ) -> Equilibrium:
     """Equilibrium of a line from a starting shape, however poor.
 
     length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
     (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
-    start is, for people.
+    start is, for people; settle: let it come to rest with friction from the start, and try nothing else;
+    others: further starts with their names.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -364,19 +390,26 @@ def solve_statics(
     solver = _Solver(smooth, sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
-    for how, outcome, where, state in _roads(solver, ends, start, shape):
+    settle = bool(line.bits & FRICTION) and (settle or not ends.held.any())
+    roads = iter(()) if settle else _roads(solver, ends, start, shape, others)
+    for how, outcome, where, state in roads:
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
         failed.append((outcome, where, state))
     if line.bits & FRICTION:
         solver = _Solver(rough, sea, length, scale, floor)
-        how, outcome, where, state = _settled(solver, ends, start)
+        how, outcome, where, state = _settled(solver, ends, start, shape)
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
         failed.append((outcome, where, state))
-    for worst in (Outcome.SLACK, Outcome.UNSTABLE, failed[0][0]):  # what says most about the line comes first
+    for worst in (
+        Outcome.SLACK,
+        Outcome.UNSTABLE,
+        Outcome.BURIED,
+        failed[0][0],
+    ):  # what says most about the line comes first
         for outcome, where, state in failed:
             if outcome == worst == Outcome.SLACK and take_slack:
                 return _found(solver, ends, state, path)
@@ -390,5 +423,6 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     residual = solver.prove(ends, state)
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
+    rubbed = bool(solver.line.bits & FRICTION)
     judged = is_judged(solver.line, ends, solver.length) or not solver.line.element.any()
-    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), judged)
+    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), rubbed, judged)

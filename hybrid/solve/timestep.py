@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import FRICTION, SEABED, WAVES
-from hybrid.physics.seabed import contact, stored
+from hybrid.physics.seabed import contact, pressure, stored
 from hybrid.physics.water import stir
 from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
@@ -56,6 +56,8 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
         for c, (a, b) in enumerate(zip(p[near], p[far], strict=True)):
             if a > 0.0 or b > 0.0:
                 N[near][c] += contact(a, b, 0.0, 0.0, line.h[c], sea.stiffness, sea.damping, sea.onset)[0]
+    for i in np.flatnonzero((line.footing > 0.0) & (p > 0.0)):
+        N[i] += line.footing[i] * pressure(0.0, p[i], p[i], 0.0, 0.0, sea.stiffness, sea.damping, sea.onset)[0]
     side = np.cross(sea.normal, sea.axis)
     parts = []
     for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):

@@ -133,8 +133,8 @@ ends:
       travel: {by: [10.0, 0.0, -2.0], over: 30.0, begin: 5.0}
       follow: waves
       ramp: 16.0
-  end: {kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}
-initial: {kind: equilibrium, guess: catenary}
+  end: {kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}
+initial: {kind: equilibrium, guess: catenary, friction: settled}
 model: {kind: catenary}
 time: {duration: 60.0, step: 0.05}
 """

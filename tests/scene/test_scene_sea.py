@@ -89,12 +89,13 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
                 mass=100.0,
                 volume=0.09,
                 height=0.5,
+                shape="cylinder",
                 drag_area=0.4,
                 added_mass=40.0,
                 thrust=(20.0, 0.0, 0.0),
             ),
         ),
-        initial=Equilibrium(guess="catenary"),
+        initial=Equilibrium(guess="catenary", friction="settled"),
         model=CatenaryModel(),
         time={"duration": 60.0, "step": 0.05},
     )
@@ -214,7 +215,7 @@ def test_wavenumber_at_its_limits() -> None:
 
 # --- refusals ----------------------------------------------------------------------------------
 
-BODY = "{kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}"
+BODY = "{kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}"
 POWER = "{kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, turn: 30.0, ramp: 5.0}"
 JONSWAP = "{kind: jonswap, height: 3.0, period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}"
 REGULAR = "{kind: regular, height: 2.0, period: 7.0, direction: 30.0, phase: 90.0, depth: 60.0}"

@@ -62,7 +62,8 @@ def random_case(seed, element, bits, held=(0, 0)):
         element=element, spin=spin, kb=p(N + 1, 3), k0=0.2 * g.normal(size=(N + 1, 3)), hn=hn, rotary=p(N),
         polar=p(N), drag_n=p(N), drag_t=p(N), added_n=p(N), added_t=p(N), damp=p(N + 1), tau=0.2 * p(N),
         buoy=p(N), displaced=p(N), diameter=3.0 * p(N), point_mass=p(N + 1), point_drag=p(N + 1), point_added=p(N + 1),
-        point_buoy=p(N + 1), point_displaced=p(N + 1), point_height=4.0 * p(N + 1), bits=bits,
+        point_buoy=p(N + 1), point_displaced=p(N + 1), point_height=4.0 * p(N + 1), point_upright=np.arange(N + 1) % 2.0,
+        footing=p(N + 1), bits=bits,
     )  # fmt: skip
     sea = random_sea(g)
     frames = [np.linalg.qr(g.normal(size=(3, 3)))[0] for _ in range(2)]
