@@ -166,7 +166,7 @@ class Motion:
         if rescues > MOST_RESCUES:
             return False
         if taken.outcome == Outcome.SLACK:
-            cells = np.flatnonzero((self.model.line.spin == 0) & (self.spare.T <= self.model.slack_floor))
+            cells = np.flatnonzero((self.model.line.spin == 0) & (self.model.slack_floor >= self.spare.T))
         else:
             cells = np.array([min(max(taken.where, 0), self.model.cells - 1)])
         change = self.zoning.manager.insist(cells)

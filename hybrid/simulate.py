@@ -166,7 +166,12 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
-    found = _equilibrium(scene, model, np.inf)
+    if model.layout is not None:
+        model, equilibrium, _ = _first_zones(scene, model, np.inf, at_rest=True)
+        assert equilibrium is not None
+        found = equilibrium
+    else:
+        found = _equilibrium(scene, model, np.inf)
     observer = Observer(
         model.line,
         model.sea.values,
@@ -208,7 +213,9 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
-def _first_zones(scene: Scene, model: Model, t: float) -> tuple[Model, Equilibrium | None, Zoning]:
+def _first_zones(
+    scene: Scene, model: Model, t: float, at_rest: bool = False
+) -> tuple[Model, Equilibrium | None, Zoning]:
     """Zones, equilibrium if one is asked for, and what will move the zones."""
     asked = scene.model
     assert isinstance(asked, AdaptiveModel) and model.layout is not None
@@ -219,7 +226,7 @@ def _first_zones(scene: Scene, model: Model, t: float) -> tuple[Model, Equilibri
             given[(middle > a) & (middle < b)] = sign
     manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0)
     equilibrium = None
-    if scene.initial.kind == "equilibrium":
+    if at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t)
         assert model.layout is not None
         manager.follow(model.layout)

@@ -28,7 +28,7 @@ MOST_ROUNDS = 10
 
 @dataclass
 class Relaxing:
-    """Cells on their way to their true length: what they lacked (N,) m, at which rate (N,) m/s, when it began (N,) s."""
+    """Cells on their way to their true length: what they lacked (N,) m, its rate (N,) m/s, when it began (N,) s."""
 
     lack: Floats
     rate: Floats
@@ -42,9 +42,7 @@ class Relaxing:
         return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
 
 
-def manager_for(
-    model: Model, tolerance: float, dwell: float | None, given: np.ndarray, step: float
-) -> DomainManager:
+def manager_for(model: Model, tolerance: float, dwell: float | None, given: np.ndarray, step: float) -> DomainManager:
     """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
     assert model.layout is not None
     wait = dwell if dwell is not None else max(DWELL * model.time_scale, LEAST_DWELL * step)

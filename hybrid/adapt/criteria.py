@@ -15,35 +15,14 @@ bending out would make are lengths, and count against the tolerance (m) of the s
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
 
+from hybrid.adapt.table import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
-from hybrid.physics.loads import SEABED
 from hybrid.physics.element import relative_rotation
+from hybrid.physics.loads import SEABED
 from hybrid.physics.rotations import dot, frame, log_rotation
 
-BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN = range(7)
-
-
-@dataclass(frozen=True)
-class Criterion:
-    """A criterion: name, the ratio that it is (in words), and the part of 1 below which it lets go."""
-
-    name: str
-    ratio: str
-    off: float
-
-
-CRITERIA: tuple[Criterion, ...] = (
-    Criterion("bend", "bending length EI kappa/T over the tolerance", 0.25),
-    Criterion("slack", "tension floor over tension, now or as it will be a horizon ahead", 0.5),
-    Criterion("clamp", "lambda times the angle between clamp and cable, over the tolerance", 0.25),
-    Criterion("point", "lambda times the kink at a point load or jump of section, over the tolerance", 0.25),
-    Criterion("edge", "EI w/T^2 where contact with the seabed begins, over the tolerance", 0.25),
-    Criterion("torsion", "torque^2/(4 EI T), over a half", 0.25),
-    Criterion("given", "what the scene or a function of the user asks for", 0.5),
-)
 # Angle of 1 rad per lambda is the sharpest that sqrt(EI/T) can speak of; slack stretches are judged by their floor.
 MOST = 1e6
 # Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.

@@ -11,8 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.criteria import CRITERIA, GIVEN, weigh
+from hybrid.adapt.criteria import weigh
 from hybrid.adapt.plan import Rules, planned
+from hybrid.adapt.table import CRITERIA, GIVEN
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
 from hybrid.model.state import Ends, Floats, Line, Sea, State
@@ -79,7 +80,7 @@ class DomainManager:
         self.before = np.zeros(0)
 
     def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float) -> None:
-        """Raise the ratios since the last review to those of a state; dt: since the last time, 0 when there was none."""
+        """Raise the ratios since the last review to those of a state; dt: since the last time, 0 if there was none."""
         before = state.T if self.before.size != state.T.size or dt == 0.0 else self.before
         clamps = NO_CLAMPS
         if line.element[0] or line.element[-1]:
@@ -149,7 +150,9 @@ class DomainManager:
             else:
                 j = a + int(np.argmax((self.ratios[:, a:b] / off[:, None]).max(axis=0)))
                 c = int(np.argmax(self.ratios[:, j] / off))
-                text = f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} < {off[c]:g} and all else calm for {self.dwell:.3g} s"
+                text = (
+                    f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} < {off[c]:g} and all else calm for {self.dwell:.3g} s"
+                )
                 out.append((a, b, "catenary", text))
         return out
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.criteria import CRITERIA
+from hybrid.adapt.table import CRITERIA
 from hybrid.model.layout import edges
 from hybrid.model.state import Floats
 
@@ -14,8 +15,8 @@ from hybrid.model.state import Floats
 class Rules(NamedTuple):
     """How zones are made of what is asked.
 
-    buffer: (n,) m, rod on either side of what asks for it; shortest: m, least length of a zone; dwell: s, how long a rod
-    must have been calm before it goes.
+    buffer: (n,) m, rod on either side of what asks for it; shortest: m, least length of a zone; dwell: s, how
+    long a rod must have been calm before it goes.
     """
 
     buffer: Floats
@@ -56,7 +57,7 @@ def planned(
     length = np.diff(base)
     for want, least in ((False, rules.shortest), (True, rules.shortest)):
         cuts = edges(next_)
-        for a, b in zip(cuts[:-1], cuts[1:], strict=True):
+        for a, b in pairwise(cuts):
             if next_[a] != want or length[a:b].sum() >= least:
                 continue
             if not want:

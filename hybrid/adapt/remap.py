@@ -9,6 +9,7 @@ makes its tension what it was, and is let go to its true length slowly (`Relaxin
 
 from __future__ import annotations
 
+from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
@@ -120,7 +121,7 @@ def _momentum(new: Layout, line: Line, target: Line, state: State, out: State, c
     missing = line.mass @ state.v - target.mass @ out.v
     inner = np.zeros(target.mass.size, bool)
     bounds = edges(changed)
-    for a, b in zip(bounds[:-1], bounds[1:], strict=True):
+    for a, b in pairwise(bounds):
         if changed[a]:
             inner[int(new.first[a]) + 1 : int(new.first[b])] = True
     if inner.any():
@@ -133,7 +134,7 @@ def _frames(new: Layout, changed: np.ndarray, out: State, target: Line, twist: F
     """First directors of rod cells that are new: carried on without twist from those that were there."""
     rod, fresh, base = new.rod_cells, np.repeat(changed, new.counts), new.base_of_cell
     d = out.e / np.linalg.norm(out.e, axis=1)[:, None]
-    for a, b in zip(edges(rod)[:-1], edges(rod)[1:], strict=True):
+    for a, b in pairwise(edges(rod)):
         if not rod[a]:
             continue
         known = [c for c in range(a, b) if not fresh[c]]

@@ -14,8 +14,8 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.ends import EndConditions
-from hybrid.model.ledger import Entry, ledger
 from hybrid.model.layout import Layout
+from hybrid.model.ledger import Entry, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes

@@ -7,12 +7,13 @@ from dataclasses import dataclass
 from itertools import pairwise
 from math import pi
 
+from hybrid.adapt.table import CRITERIA
 from hybrid.model.mesh import Zone
 from hybrid.model.properties import weight
 from hybrid.model.sea import current_table
 from hybrid.model.state import Line
 from hybrid.physics.loads import FORCES
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import AdaptiveModel, Scene
 
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
 PLAUSIBLE = (50.0, 25_000.0)
@@ -53,6 +54,16 @@ def _implausible(scene: Scene) -> Iterator[tuple[str, str]]:
         if x.axial_stiffness is not None and x.axial_stiffness < SOFTEST * abs(weight(x, scene)) * scene.length:
             text = f"cable.sections[{i}].axial_stiffness: is it in N?"
             yield f"a cable that stretches by more than {1 / SOFTEST:.0%} under its own weight", text
+
+
+def _watched(scene: Scene) -> Iterator[Entry]:
+    """The criteria by which zones move, with their thresholds."""
+    assert isinstance(scene.model, AdaptiveModel)
+    tolerance = scene.model.tolerance * scene.length
+    yield Entry(f"zones that move; tolerance {tolerance:.3g} m", True, "model.tolerance x length")
+    for x in CRITERIA:
+        asked = x.name != "given" or scene.model.always_rod or scene.model.always_catenary
+        yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)
 
 
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
@@ -101,6 +112,8 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                 what = f"sections[{i}] has a mean density of {density:.3g} kg/m^3"
                 why = f"mass {section.mass:g} kg/m, diameter {section.diameter:g} m: are both in these units?"
                 entries.append(Entry(what, True, why, event="implausible"))
+    if isinstance(scene.model, AdaptiveModel):
+        entries += _watched(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]

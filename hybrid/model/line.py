@@ -9,9 +9,7 @@ from hybrid.model.state import Floats, Line
 from hybrid.physics.loads import BODIES, ROTARY
 
 
-def line_on(
-    material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True
-) -> Line:
+def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True) -> Line:
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
     more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.

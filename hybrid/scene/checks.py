@@ -72,6 +72,19 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
             yield Finding((*here, "torsional_stiffness"), f"a number > 0, in N m^2, because {over}", fix)
 
 
+def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
+    if not isinstance(model, AdaptiveModel):
+        return
+    rods = model.always_rod or ()
+    for key in ("always_rod", "always_catenary"):
+        for i, (a, b) in enumerate(getattr(model, key) or ()):
+            if not a < b <= cable.length * (1 + SAME_LENGTH):
+                expected = f"[s_a, s_b] with s_a < s_b <= {cable.length:.8g} m, the length of the cable"
+                yield Finding(("model", key, i), expected, "write [from, to], in m")
+            elif key == "always_catenary" and any(a < d and c < b for c, d in rods):
+                yield Finding(("model", key, i), "a stretch apart from those of always_rod", "let them end before")
+
+
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
     if isinstance(model, RodModel | AdaptiveModel):
@@ -125,6 +138,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.arbiter_knows,
     _zones_fill,
     _rods_can_bend,
+    _stretches_on_cable,
     _mesh_spans,
     _output_on_cable,
 )

@@ -48,7 +48,8 @@ from hybrid.scene.task import (
 )
 
 __all__ = [
-    "AdaptiveModel", "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
+    "AdaptiveModel",
+    "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
     "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends", "Environment", "Equilibrium", "Float",
     "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial", "JonswapWaves", "Load", "Mesh", "Model", "Modules",
     "Motion", "Output", "Pinned", "Points", "PowerLawCurrent", "RegularWaves", "RodModel", "RodZone", "Scene",

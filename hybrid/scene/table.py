@@ -196,13 +196,11 @@ def by_kind(value: Any) -> str | None:
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
 
-    `usual` names what to advise someone who says nothing.  `later` holds kinds that people may ask for
-    but this version does not have, with what to do instead.
+    `usual` names what to advise someone who says nothing.
     """
 
     names: tuple[str, ...]
     usual: tuple[str, ...]
-    later: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.check, handler(source))
@@ -229,9 +227,6 @@ class Kinds:
         if kind is None:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
-        elif str(kind) in dict(self.later):
-            given = f"{kind}, which is not available in this version (0.1)"
-            refuse([Finding(("kind",), expected, dict(self.later)[str(kind)], given)])
         elif kind not in self.names:
             refuse([Finding(("kind",), expected, nearest(str(kind), self.names))])
         return value

@@ -6,6 +6,7 @@ them need not be in balance: remapping and criteria ask for none.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable, Sequence
 from typing import Any
 
@@ -74,7 +75,7 @@ def untwisted(e: Floats, first: Floats | None = None) -> Floats:
     a = first if first is not None else np.eye(3)[int(np.argmin(np.abs(d[0])))]
     a = a - (a @ d[0]) * d[0]
     out = [a / np.linalg.norm(a)]
-    for t, u in zip(d[:-1], d[1:], strict=True):
+    for t, u in itertools.pairwise(d):
         x, y, z = np.cross(t, u)
         K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
         out.append((np.eye(3) + K + K @ K / (1.0 + t @ u)) @ out[-1])

@@ -89,7 +89,13 @@ def lowering(**more: Any) -> Scene:
     """A cable that lies on the bed and rises to its end: where it leaves the bed EI w/T^2 passes the tolerance."""
     bed = {"seabed": {"z": 0.0, "stiffness": 2e3}}
     return breathing(
-        8.9, 8.2, {"tolerance": 0.0016} | more.pop("model", {}), height=3.5, start=pinned(0, 0, 0), environment=bed, **more
+        8.9,
+        8.2,
+        {"tolerance": 0.0016} | more.pop("model", {}),
+        height=3.5,
+        start=pinned(0, 0, 0),
+        environment=bed,
+        **more,
     )
 
 
@@ -111,7 +117,9 @@ def turning(**more: Any) -> Scene:
         cable, clamped(), end, cells=CELLS, gravity=GRAVITY, time={"duration": 3.0, "step": 0.02},
         output={"every": 0.02, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
     ).model_dump(exclude_none=True)  # fmt: skip
-    return Scene.model_validate(what | {"model": {"kind": "adaptive", "dwell": DWELL, "tolerance": 0.01} | more["model"]})
+    return Scene.model_validate(
+        what | {"model": {"kind": "adaptive", "dwell": DWELL, "tolerance": 0.01} | more["model"]}
+    )
 
 
 SCENES = {"slack": slackening, "bend": bending, "point": kinking, "clamp": nodding, "edge": lowering}

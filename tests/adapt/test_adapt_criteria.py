@@ -10,6 +10,8 @@ Round-off: it is a difference of numbers near 1, so 1e-16/angle^2 of the ratio: 
 
 from __future__ import annotations
 
+import itertools
+
 import numpy as np
 import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
@@ -29,7 +31,7 @@ ROUND = 1e-11
 def of_nodes(ratio, zones):
     """The largest of a ratio at nodes (N+1,) in each base cell, its two ends included."""
     first = zones.first
-    return np.array([ratio[a : b + 1].max() for a, b in zip(first[:-1], first[1:], strict=True)])
+    return np.array([ratio[a : b + 1].max() for a, b in itertools.pairwise(first)])
 
 
 def least(T):
@@ -146,7 +148,10 @@ def clamp(angle, end=0):
 def clamped_cable(end):
     ends = [{"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0)}, {"kind": "free"}]
     if end:
-        ends = [{"kind": "pinned", "position": (0, 0, 0)}, {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)}]
+        ends = [
+            {"kind": "pinned", "position": (0, 0, 0)},
+            {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)},
+        ]
     return cable(start=ends[0], end=ends[1])
 
 
@@ -276,9 +281,7 @@ def whole_case(seed, reverse=False):
             {"kind": "clamped", "position": (10, 0, 0), "tangent": (1, 0, 0)}]  # fmt: skip
     if reverse:
         sections, at = sections[::-1], 10.0 - at
-    what = cable(
-        start=ends[0], end=ends[1], sections=sections, attachments=[{"kind": "clump", "at": at, "mass": 2.0}]
-    )
+    what = cable(start=ends[0], end=ends[1], sections=sections, attachments=[{"kind": "clump", "at": at, "mass": 2.0}])
     zones = layout(base, parts.tolist(), flags)
     if reverse:
         zones = layout(10.0 - base[::-1], parts[::-1].tolist(), flags[::-1])

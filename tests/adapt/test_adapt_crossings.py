@@ -309,7 +309,9 @@ def test_what_the_scene_gives_is_so():
         assert flags[5:10].all() and not flags[20:23].any()
 
 
-@pytest.mark.parametrize("scene, nearer", [(bending, 0.45), (slackening, 0.45), (kinking, 0.81)], ids=["bend", "slack", "point"])
+@pytest.mark.parametrize(
+    "scene, nearer", [(bending, 0.45), (slackening, 0.45), (kinking, 0.81)], ids=["bend", "slack", "point"]
+)
 def test_at_rest_nothing_happens(scene, nearer):
     """A cable that hangs still, partly a rod, keeps the zones of its equilibrium."""
     what = scene().model_dump(exclude_none=True)

@@ -9,7 +9,7 @@ from itertools import pairwise
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from hybrid.adapt.criteria import BEND, CRITERIA, SLACK
@@ -204,7 +204,12 @@ def course_of(what):
         ratios = np.zeros((K, n))
         ratios[which, np.arange(n)] = np.where(rng.random(n) < quiet, 0.2 * level, level)
         walk.append((t, ratios))
-    return np.concatenate([[0.0], np.cumsum(h)]), Rules(buffer * rng.random(n), shortest, dwell), np.full(n, seed % 2 > 0), walk
+    return (
+        np.concatenate([[0.0], np.cumsum(h)]),
+        Rules(buffer * rng.random(n), shortest, dwell),
+        np.full(n, seed % 2 > 0),
+        walk,
+    )
 
 
 def steps(what):
@@ -268,6 +273,7 @@ def test_no_catenary_becomes_rod_unless_something_asks(what):
 
 
 @given(courses)
+@example((3, False, 2.0, 1.0, 0.75, 0.0, 1))  # a rod that shrinks widens into a catenary that has just come
 @settings(max_examples=150, deadline=None, derandomize=True)
 def test_no_flicker(what):
     """Within a dwell time a cell changes kind twice only when a ratio above 1 asks for the second change."""

@@ -109,9 +109,7 @@ def test_what_stays_stays_to_the_last_bit(switch):
         assert (getattr(new_, name)[new_nodes] == getattr(state, name)[nodes]).all(), name
     assert (out.lengths[new_cells] == line.h[cells]).all()
     cuts = edges(old.rod == new.rod)
-    inner = any(
-        old.rod[a] != new.rod[a] and new.first[b] - new.first[a] > 1 for a, b in pairwise(cuts)
-    )
+    inner = any(old.rod[a] != new.rod[a] and new.first[b] - new.first[a] > 1 for a, b in pairwise(cuts))
     shift = new_.v[new_nodes] - state.v[nodes]
     if inner:
         assert not shift.any()
@@ -178,7 +176,9 @@ def test_there_and_back(switch):
     back_layout, again, back = carried(what, new, old.rod, out.state, target)
     assert (back_layout.nodes == old.nodes).all() and (again.h == line.h).all()
     assert (back.state.r == state.r).all()
-    assert (back.state.a == state.a).all() and (back.state.vd == state.vd).all() and (back.state.slip == state.slip).all()
+    assert (
+        (back.state.a == state.a).all() and (back.state.vd == state.vd).all() and (back.state.slip == state.slip).all()
+    )
     assert np.abs(back.state.v - state.v).max() <= ROUND * np.abs(state.v).max() * line.mass.sum() / line.mass.min()
 
 
@@ -250,7 +250,7 @@ def test_a_rod_that_grows_has_no_kink_where_it_grows(name):
         state = state_on(on(what, old), shape)
         grow = n // 6
         flags = "C" * (n // 3 - grow) + "R" * (n // 3 + 2 * grow) + "C" * (n // 3 - grow)
-        new, target, out = carried(what, old, flags, state)
+        _new, target, out = carried(what, old, flags, state)
         inside = target.element[1:-1] == 1
         ratio = turns(chords(out.state)) / (curvature(target.s[1:-1]) * target.hn[1:-1])
         worst.append(np.abs(ratio - 1)[inside].max())
@@ -277,7 +277,7 @@ def test_kinks_stay_sharp():
         )
 
     state = state_on(on(what, old), shape)
-    new, target, out = carried(what, old, "R" * n, state)
+    _new, target, out = carried(what, old, "R" * n, state)
     angle = turns(chords(out.state))
     at = int(np.argmin(np.abs(target.s - 5.0))) - 1
     smooth = target.hn[1:-1] / arm
@@ -311,7 +311,7 @@ def test_frames_do_not_twist():
     shape, _, _ = SHAPES["helix"]
     what, old = cable(), even(n, "CCCCRRRCCCCC")
     state = state_on(on(what, old), shape)
-    new, target, out = carried(what, old, "CRRRRRRRRCCC", state)
+    new, _target, out = carried(what, old, "CRRRRRRRRCCC", state)
     rod = new.rod_cells
     twist = twists(out.state)
     inside = rod[:-1] & rod[1:]
@@ -336,7 +336,7 @@ def test_closing_twist_is_spread_evenly(angle):
     shape, _, _ = SHAPES["helix"]
     what, old = cable(), even(12, "CRRRCCCCRRRC")
     state = state_on(on(what, old), shape)
-    new, target, clean = carried(what, old, "CRRRRRRRRRRC", state)
+    new, _target, clean = carried(what, old, "CRRRRRRRRRRC", state)
     state.a1[:] = untwisted(state.e)
     # what parallel transport over the new chords gives at the second rod, turned by `angle`
     carried_a1 = untwisted(clean.state.e[1:], state.a1[1])  # from the first cell of the first rod
@@ -346,7 +346,7 @@ def test_closing_twist_is_spread_evenly(angle):
     turned = np.cos(angle) * carried_a1[start - 1] + np.sin(angle) * np.cross(d, carried_a1[start - 1])
     frames = untwisted(state.e[second:], turned)
     state.a1[second:] = frames
-    state.a1[1 : second] = untwisted(state.e[1:second], state.a1[1])
+    state.a1[1:second] = untwisted(state.e[1:second], state.a1[1])
     _, _, out = carried(what, old, "CRRRRRRRRRRC", state)
     twist = twists(out.state)
     gap = np.arange(int(new.first[4]) - 1, int(new.first[8]))  # elements between the rods: one more than new cells

@@ -113,7 +113,9 @@ def test_no_axial_stiffness_rings(stiffness):
     for pull in PULLS:
         rod = np.interp(runs[0].steps["t"], runs[1].steps["t"], runs[1].steps[pull])  # steps may have been halved
         one = runs[0].steps[pull]
-        assert np.abs(one - rod).max() <= 0.02 * rod.mean(), f"{pull}: {100 * np.abs(one - rod).max() / rod.mean():.1f} %"
+        assert np.abs(one - rod).max() <= 0.02 * rod.mean(), (
+            f"{pull}: {100 * np.abs(one - rod).max() / rod.mean():.1f} %"
+        )
 
 
 @pytest.mark.parametrize("step", [0.02, 0.01])

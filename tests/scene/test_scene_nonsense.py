@@ -20,7 +20,18 @@ from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.scene.table import dotted
 
-TEXTS = {"everything": EVERYTHING, "everything else": EVERYTHING_ELSE, "ocean": OCEAN, "at rest": AT_REST} | SEAS
+ADAPTIVE = OCEAN.replace(
+    "model: {kind: catenary}",
+    "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
+    "always_catenary: [[200.0, 250.0]]}",
+)
+TEXTS = {
+    "adaptive": ADAPTIVE,
+    "everything": EVERYTHING,
+    "everything else": EVERYTHING_ELSE,
+    "ocean": OCEAN,
+    "at rest": AT_REST,
+} | SEAS
 
 
 def _values(node: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:

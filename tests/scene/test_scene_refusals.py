@@ -64,8 +64,9 @@ CASES = {
     "no kind": (SUSPENSION, PINNED, "§{position: [0, 0, 0]}", "ends.start.kind", "pinned"),
     "kind misspelt": (SUSPENSION, PINNED, "{kind: §pined, position: [0, 0, 0]}", "ends.start.kind", "did you mean pinned?"),
     "kind is a list": (SUSPENSION, PINNED, "{kind: §[pinned], position: [0, 0, 0]}", "ends.start.kind", "pinned"),
-    "adaptive": (SUSPENSION, MODEL, "{kind: §adaptive, tolerance: 1}", "model.kind", "choose the zones yourself"),
-    "adaptive, a word": (SUSPENSION, MODEL, "§adaptive", "model.kind", "choose the zones yourself"),
+    "a tolerance of everything": (SUSPENSION, MODEL, "{kind: adaptive, tolerance: §1}", "model.tolerance", "<= 0.1"),
+    "rod and catenary at once": (SUSPENSION, MODEL, "{kind: adaptive, always_rod: [[0, 1]], always_catenary: [§[0.5, 2]]}", "model.always_catenary[0]", "always_rod"),
+    "a stretch off the cable": (SUSPENSION, MODEL, "{kind: adaptive, always_rod: [§[0, 7]]}", "model.always_rod[0]", "2 m"),
     "end is a number": (SUSPENSION, PINNED, "§3", "ends.start", "kind: pinned"),
     "zone of no kind": (SUSPENSION, ZONES, "[{catenary: 1.5}, §{rood: 0.5}]", "model.zones[1]", "{rod: length}"),
     "zone of both kinds": (SUSPENSION, ZONES, "[§{catenary: 1.5, rod: 0.5}]", "model.zones[0]", "{rod: length}"),
@@ -210,8 +211,6 @@ def test_a_complaint_reads_well() -> None:
 def test_nothing_is_said_twice() -> None:
     (kind,) = complaints(change(SUSPENSION, PINNED, "{kind: xyzzy, position: [0, 0, 0]}"))
     assert kind.expected == "one of: pinned, clamped, guided, free, body" and not kind.fix
-    (later,) = complaints(change(SUSPENSION, MODEL, "adaptive"))
-    assert later.value == "adaptive, which is not available in this version (0.1)"
     (bare,) = complaints(change(SUSPENSION, STRAIGHT, "straight"))
     assert bare.value == "nothing"
 
