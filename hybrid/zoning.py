@@ -148,7 +148,7 @@ class Zoning:
             if not self.letting_go:
                 self.relaxing = None
         if self.manager.going or self.manager.coming:
-            parts = self.manager.blend(dt, state)
+            parts = self.manager.blend(dt)
             was = _bending(line, ends, state)
             line.kb[:] = parts[:, None] * self.stiff
             booked += _bending(line, ends, state) - was

@@ -66,7 +66,7 @@ def weigh(line, sea, r, e, T, a1, before, a, EI, w, kink, floor, tolerance, clam
             c = max(-1.0, min(1.0, dot(d0, d)))
             turn = 2.0 * math.sqrt(max(0.0, 0.5 * (1.0 - c)))
             d0 = d
-            if kink[i]:
+            if kink[i] or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
                 which = POINT
         else:
             which = CLAMP

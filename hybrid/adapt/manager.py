@@ -20,11 +20,10 @@ from hybrid.model.state import Ends, Floats, Line, Sea, State
 
 # The tension below which a stretch must be rod, in (EI w^2)^(1/3): there a cable bends under its weight as much as
 # its tension straightens it.
-FLOOR = 1.0
-# Rod on either side of what asks for it, in sqrt(EI/T).
+FLOOR = 0.2
+# Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
+# is what straightens a cable.
 BUFFER = 2.0
-# Time over which bending comes and goes, in sqrt(m EI)/T, the time a wave of bending takes over sqrt(EI/T).
-BLENDING = 1.5
 # How far ahead a falling tension is seen, in dwell times.
 HORIZON = 0.5
 REVIEWS = 8  # in a dwell time, when nothing asks: what happens in between is remembered
@@ -120,7 +119,9 @@ class DomainManager:
         first = self.layout.first[:-1]
         T = np.minimum.reduceat(state.T, first)
         EI, floor = self.EI[first], self.floor[first]
-        buffer = BUFFER * np.sqrt(EI / np.maximum(T, floor))
+        buffer = BUFFER * np.minimum(
+            np.sqrt(EI / np.maximum(T, floor)), np.cbrt(EI / np.maximum(self.w[first], 1e-9 * self.scale))
+        )
         return Rules(buffer, SHORTEST * float(np.median(np.diff(self.layout.base))), self.dwell)
 
     def insist(self, cells: np.ndarray) -> Change:
@@ -156,12 +157,10 @@ class DomainManager:
                 out.append((a, b, "catenary", text))
         return out
 
-    def blend(self, dt: float, state: State) -> Floats:
+    def blend(self, dt: float) -> Floats:
         """Move on by dt; how much of its stiffness every node has (N+1,)."""
-        first = self.layout.first[:-1]
-        T = np.maximum(np.minimum.reduceat(state.T, first), self.floor[first])
-        tau = np.clip(BLENDING * np.sqrt(self.m[first] * self.EI[first]) / T, 2.0 * dt, self.dwell)
-        self.grown = np.clip(self.grown + np.where(self.leaving, -dt, dt) / tau, 0.0, 1.0)
+        # over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring
+        self.grown = np.clip(self.grown + np.where(self.leaving, -dt, dt) / self.dwell, 0.0, 1.0)
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
         return self.parts()
 

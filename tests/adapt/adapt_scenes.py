@@ -22,7 +22,7 @@ GRAVITY = 10.0
 LENGTH, CELLS, EI = 10.0, 50, 0.64
 CELL = LENGTH / CELLS
 DWELL = 0.5
-FLOORED = FLOOR * (EI * (1.0 * GRAVITY) ** 2) ** (1 / 3)  # N: 4, for a cable of 1 kg/m
+FLOORED = FLOOR * (EI * (1.0 * GRAVITY) ** 2) ** (1 / 3)  # N, for a cable of 1 kg/m
 OFF = {"slack": 0.5, "bend": 0.25, "point": 0.25, "clamp": 0.25, "edge": 0.25}
 
 
@@ -38,8 +38,8 @@ def breathing(
         "axial_stiffness": 1e5, "damping": {"mass": 3.0},
     } | section  # fmt: skip
     cable = {k: x for k, x in cable.items() if x is not None}
-    one = (start or pinned()) | {"motion": {"travel": {"by": by, "over": period / 2}}}
-    two = (end or pinned(far, 0, height)) | {"motion": {"travel": {"by": by, "over": period / 2, "begin": period / 2}}}
+    one = {"motion": {"travel": {"by": by, "over": period / 2}}} | (start or pinned())
+    two = {"motion": {"travel": {"by": by, "over": period / 2, "begin": period / 2}}} | (end or pinned(far, 0, height))
     what = scene(
         cable, one, two, cells=CELLS, gravity=GRAVITY, time={"duration": duration, "step": step},
         output={"every": step, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
@@ -52,8 +52,24 @@ def breathing(
 
 
 def slackening(**more: Any) -> Scene:
-    """From 11.5 N at the lowest point to about 2 and back; the floor is 4 N, and bend is 0.4 of its tolerance there."""
-    return breathing(5.0, 2.2, {"tolerance": 0.1} | more.pop("model", {}), **more)
+    """A cable that stands straight up, its foot raised and its head raised after: slack at the foot, without any bend.
+
+    The tension at s is that of the foot and w s; in the lowest cell it goes from 25 N to half the floor and back.
+    """
+    stiff, w = 4e3, GRAVITY
+    high, low = 24.0, 0.5 * FLOORED - 0.5 * w * CELL  # N, at the foot
+    lengths = [LENGTH + (x * LENGTH + 0.5 * w * LENGTH**2) / stiff for x in (high, low)]
+    foot = pinned(0, 0, 0) | {"motion": {"travel": {"by": [0, 0, lengths[0] - lengths[1]], "over": 3.0}}}
+    head = pinned(0, 0, lengths[0])
+    head["motion"] = {"travel": {"by": [0, 0, lengths[0] - lengths[1]], "over": 3.0, "begin": 3.0}}
+    return breathing(
+        0.0, 0.0, {"tolerance": 0.1} | more.pop("model", {}), start=foot, end=head, axial_stiffness=stiff, **more
+    )
+
+
+def sagging(**more: Any) -> Scene:
+    """A deep sag, from 11.5 N at the lowest point to about 2 and back; at (EI w^2)^(1/3) = 4 N EI w/T^2 is the tolerance."""
+    return breathing(5.0, 2.2, {"tolerance": 0.04} | more.pop("model", {}), **more)
 
 
 def bending(**more: Any) -> Scene:
@@ -102,7 +118,7 @@ def lowering(**more: Any) -> Scene:
 def easing(normal: tuple[float, float, float], **more: Any) -> Scene:
     """A cable clamped where it is lowest, along its own tangent; its end comes near, and it goes slack at the clamp."""
     clamp = {"kind": "clamped", "position": (0, 0, 0), "tangent": (1, 0, 0), "normal": normal}
-    model = {"tolerance": 0.1} | more.pop("model", {})
+    model = {"tolerance": 0.04} | more.pop("model", {})
     return breathing(7.0, 2.5, model, start=clamp, height=6.0, duration=3.0, **more)
 
 
@@ -122,7 +138,7 @@ def turning(**more: Any) -> Scene:
     )
 
 
-SCENES = {"slack": slackening, "bend": bending, "point": kinking, "clamp": nodding, "edge": lowering}
+SCENES = {"slack": slackening, "deep": sagging, "bend": bending, "point": kinking, "clamp": nodding, "edge": lowering}
 
 
 @cache

@@ -1,8 +1,8 @@
 """Slow crossings: where and when zones switch, against criteria computed anew from the result.
 
 Every scene passes a criterion's 1 on the way in and its `off` on the way out; see `adapt_scenes`.  What is computed
-here is from outputs at every step.  In catenaries it is what the manager weighs, but for the tension ahead (two steps:
-less than 10 % here); in rods it misses what is between base nodes.  Times are good to some steps, ratios to 10 %.
+here is from outputs at every step.  In catenaries it is what the manager weighs; in rods it misses what is between base
+nodes.  Times are good to some steps, ratios to 10 %.
 """
 
 from __future__ import annotations
@@ -17,6 +17,7 @@ from adapt_scenes import (
     DWELL,
     EI,
     FLOORED,
+    GRAVITY,
     LENGTH,
     OFF,
     SCENES,
@@ -31,8 +32,8 @@ from adapt_scenes import (
     output_at,
     ran,
     rods,
+    sagging,
     slack,
-    slackening,
     swapped,
     tensions,
     turning,
@@ -40,7 +41,7 @@ from adapt_scenes import (
 from problems import Scene
 
 import hybrid
-from hybrid.adapt.manager import BUFFER
+from hybrid.adapt.manager import BUFFER, HORIZON
 from hybrid.adapt.plan import spread
 
 Floats = np.ndarray
@@ -54,7 +55,7 @@ def cells_of(node_ratio: Floats) -> Floats:
 
 def ratios(result: hybrid.Result, name: str, most: bool = True) -> dict[str, Floats]:
     """Criteria (nt, n) of one of the scenes; at a clump within a rod what is weighed lies between two: least and most."""
-    tolerance = {"slack": 1.0, "bend": 0.0444, "point": 0.12, "clamp": 0.015, "edge": 0.016}[name]
+    tolerance = {"slack": 1.0, "deep": 0.4, "bend": 0.0444, "point": 0.12, "clamp": 0.015, "edge": 0.016}[name]
     mass = {"point": 0.1, "clamp": 0.2}.get(name, 1.0)
     floor = FLOORED * mass ** (2 / 3)
     node = bend(result, tolerance, floor)
@@ -77,7 +78,8 @@ def flags_of(stretches: list[tuple[float, float]]) -> Floats:
 
 def buffers(result: hybrid.Result, output: int) -> Floats:
     """(n,) m."""
-    return BUFFER * np.sqrt(EI / np.maximum(tensions(result)[output], FLOORED))
+    lam = np.sqrt(EI / np.maximum(tensions(result)[output], FLOORED))
+    return BUFFER * np.minimum(lam, np.cbrt(EI / GRAVITY))
 
 
 # --- on -------------------------------------------------------------------------------------------------
@@ -95,14 +97,20 @@ def test_on(name):
     assert (loud[:k] <= 1.0 + 1e-6).all()
     assert first.text.startswith(name), first.text
     at = all_[name][k - 1 : k]  # a step before; a step goes on by some %
-    assert at.max() > 0.9
+    if name == "slack":  # what is weighed is the tension ahead: to the digits in a catenary
+        T = tensions(result)[:k].min(axis=1)
+        T = np.append(T, 2 * T[-1] - T[-2])  # at the step of the switch, where outputs show the new cells
+        weighed = FLOORED / (T[1:] + min(HORIZON * DWELL / DT, 2.0) * np.minimum(np.diff(T), 0.0))
+        assert (weighed[:-1] <= 1.0 + 1e-6).all() and weighed[-1] > 0.95
+    assert at.max() > 0.9 or name == "slack"
     assert all_[name][k - 1].max() == loud[k - 1].max()  # no other was nearer
     hot = np.flatnonzero(at.max(axis=0) > 0.98 * at.max())
     asked = np.zeros(CELLS, bool)
     asked[hot] = True
     near = np.flatnonzero(spread(asked, np.linspace(0, LENGTH, CELLS + 1), buffers(result, k - 1)))
-    assert first.s_a == pytest.approx(near[0] * CELL, abs=1.01 * CELL)
-    assert first.s_b == pytest.approx((near[-1] + 1) * CELL, abs=1.01 * CELL)
+    # a node counts for the cells on both sides, and round-off for one more
+    assert (near[0] - 2.01) * CELL <= first.s_a <= (near[0] + 1.01) * CELL
+    assert near[-1] * CELL - 0.01 <= first.s_b <= (near[-1] + 3.01) * CELL
 
 
 def test_on_at_a_clamp():
@@ -201,16 +209,16 @@ def test_zones_are_what_events_say(name):
 # --- what is asked of the whole ---------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("name", ["slack", "bend", "point"])
+@pytest.mark.parametrize("name", ["deep", "bend", "point"])
 def test_no_further_from_the_rod_than_the_tolerance(name):
     """Against the rod of full length: what leaving bending out costs stays below what the scene allows."""
-    allowed = {"slack": 1.0, "bend": 0.0444, "point": 0.12}[name]
+    allowed = {"deep": 0.4, "bend": 0.0444, "point": 0.12}[name]
     apart = np.linalg.norm(ran(name).position - ran(name, "rod").position, axis=2)
     assert apart.max() < allowed
     assert apart.max() > 1e-4  # and it is a hybrid
 
 
-@pytest.mark.parametrize("name", ["slack", "bend"])
+@pytest.mark.parametrize("name", ["deep", "bend"])
 def test_a_rod_grows_no_further_than_the_motion_asks(name):
     """Rods are never wider than what asks in the fully flexible or the fully stiff cable, with buffer and 3 cells.
 
@@ -240,10 +248,11 @@ def test_a_stress_wave_is_no_slack():
 def test_counted_from_the_other_end(name):
     """The same scene with its ends swapped: the same events at mirrored places, the same tensions."""
     one, other = ran(name), hybrid.run(swapped(SCENES[name]()))
-    mirrored = sorted((round(e.t, 6), e.kind, LENGTH - e.s_b, LENGTH - e.s_a) for e in other.events)
-    straight = sorted((round(e.t, 6), e.kind, e.s_a, e.s_b) for e in one.events)
+    switches = [[e for e in x.events if e.kind in ("split", "merge")] for x in (one, other)]
+    straight = sorted((round(e.t, 6), e.kind, round(e.s_a, 6), round(e.s_b, 6)) for e in switches[0])
+    mirrored = sorted((round(e.t, 6), e.kind, round(LENGTH - e.s_b, 6), round(LENGTH - e.s_a, 6)) for e in switches[1])
     assert [x[:2] for x in mirrored] == [x[:2] for x in straight]
-    assert np.array([x[2:] for x in mirrored]) == pytest.approx(np.array([x[2:] for x in straight]), abs=1e-6)
+    assert [x[2:] for x in mirrored] == [x[2:] for x in straight]
     # in the middles of base cells: at a joint or a clump an output shows the side before it
     assert np.abs(tensions(other)[:, ::-1] - tensions(one)).max() < 1e-6 * np.abs(tensions(one)).max()
 
@@ -288,7 +297,7 @@ def test_nothing_asks_is_a_catenary(how):
 @pytest.mark.parametrize("how", ["always rod", "intolerant"])
 def test_everything_asks_is_a_rod(how):
     """Rods of two cells in each base cell here: a quarter of (EI/w)^(1/3) is 0.1 m."""
-    what = slackening(model={"always_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
+    what = sagging(model={"always_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
     result = hybrid.run(what)
     assert all(rods(result, k) == [(0.0, LENGTH)] for k in range(len(result.times)))
     same(result, fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
@@ -296,7 +305,7 @@ def test_everything_asks_is_a_rod(how):
 
 def test_rotary_inertia_is_kept():
     """A rod with rotary inertia stays one when its zones may move: all rod is `model: rod`."""
-    what = slackening(model={"always_rod": [[0, LENGTH]]}, rotary_inertia=0.01)
+    what = sagging(model={"always_rod": [[0, LENGTH]]}, rotary_inertia=0.01)
     same(hybrid.run(what), fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
 
 
@@ -310,7 +319,7 @@ def test_what_the_scene_gives_is_so():
 
 
 @pytest.mark.parametrize(
-    "scene, nearer", [(bending, 0.45), (slackening, 0.45), (kinking, 0.81)], ids=["bend", "slack", "point"]
+    "scene, nearer", [(bending, 0.45), (sagging, 0.45), (kinking, 0.81)], ids=["bend", "deep", "point"]
 )
 def test_at_rest_nothing_happens(scene, nearer):
     """A cable that hangs still, partly a rod, keeps the zones of its equilibrium."""

@@ -288,6 +288,16 @@ def test_kinks_stay_sharp():
     assert np.abs(out.state.r - shape(target.s)).max() < 1e-4
 
 
+def test_a_linear_tension_stays_linear():
+    """A hanging line: T = 20 + 5 s in old cells and in new ones, up to both its ends."""
+    what, old = cable(), even(10, "CCCCRRCCCC")
+    state = state_on(on(what, old), along((0, 0, 1)), lambda s: 20.0 + 5.0 * s)
+    for flags in ("RRRRRRRRRR", "CRRCRRCRRC", "CCCCCCCCCC"):
+        _, target, out = carried(what, old, flags, state)
+        middle = 0.5 * (target.s[:-1] + target.s[1:])
+        assert pytest.approx(20.0 + 5.0 * middle, rel=ROUND) == out.state.T, flags
+
+
 def test_tension_jumps_at_a_point_load():
     """A clump of 40 N on a vertical cable: above it the tension is 40 N more, in new cells as well.
 

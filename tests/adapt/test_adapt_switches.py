@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from adapt_scenes import CELL, DWELL, LENGTH, of_kind, output_at, ran, slackening
+from adapt_scenes import CELL, DWELL, LENGTH, of_kind, output_at, ran, sagging
 
 import hybrid
 
-BUSY = ["slack", "bend", "point", "edge"]
+BUSY = ["deep", "bend", "point", "edge"]
 PULLS = ("pull_start", "pull_end")
 
 
@@ -108,7 +108,7 @@ def test_ends_do_not_ring(name):
 def test_no_axial_stiffness_rings(stiffness):
     """An inextensible cable, and one whose axial waves take a step or two: the pull stays within 2 % of the rod's."""
     runs = [
-        hybrid.run(slackening(model=model, axial_stiffness=stiffness)) for model in ({}, {"always_rod": [[0, LENGTH]]})
+        hybrid.run(sagging(model=model, axial_stiffness=stiffness)) for model in ({}, {"always_rod": [[0, LENGTH]]})
     ]
     for pull in PULLS:
         rod = np.interp(runs[0].steps["t"], runs[1].steps["t"], runs[1].steps[pull])  # steps may have been halved
@@ -121,7 +121,7 @@ def test_no_axial_stiffness_rings(stiffness):
 @pytest.mark.parametrize("step", [0.02, 0.01])
 def test_smaller_steps_ring_no_more(step):
     """A switch is no blow: at half the step the largest change of the pull from one step to the next is no larger."""
-    result = hybrid.run(slackening(step=step))
+    result = hybrid.run(sagging(step=step))
     change = np.abs(np.diff(result.steps["pull_end"])).max() / result.steps["pull_end"].mean()
     assert change <= 0.02
 
@@ -132,7 +132,7 @@ def test_what_switches_does_not_move():
     Second differences of positions at base nodes are accelerations; over a switch they stay those of the motion,
     which are below 20 m/s2, times dt^2.
     """
-    result = ran("slack")
+    result = ran("deep")
     r = result.position[:, ::2]
     for t in switches(result):
         k = output_at(result, t)
