@@ -18,15 +18,15 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-KERNEL_ROOMS = ("physics", "solve", "adapt")
+KERNELS = ("physics/*.py", "solve/*.py", "adapt/criteria.py", "adapt/table.py")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 
 
 def kernel_hash(package: Path = Path(__file__).parent) -> str:
     """Hash of all kernel sources and of the compiler's version."""
     digest = hashlib.sha256()
-    for room in KERNEL_ROOMS:
-        for file in sorted((package / room).rglob("*.py")):
+    for where in KERNELS:
+        for file in sorted(package.glob(where)):
             digest.update(file.relative_to(package).as_posix().encode())
             digest.update(file.read_bytes())
     for name in ("numba", "llvmlite", "numpy"):

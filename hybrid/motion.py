@@ -79,16 +79,16 @@ class Motion:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
             ends = self.model.ends.at(end)
             if self.zoning is not None:
-                self.zoning.prepare(end)
+                self.zoning.prepare(end, end - self.t, self.state)
             taken = self.stepper.step(
                 self.model.sea.at(end), ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf
             )
-            if taken.outcome == Outcome.OK:
-                self._accept(taken, end, repeats, wasted)
-                wasted = 0
-            elif self.zoning is not None and taken.outcome == Outcome.SLACK and self._rescued(taken, rescues):
+            if self.zoning is not None and self._rescued(taken, end, rescues):
                 rescues += 1
                 wasted += taken.iterations
+            elif taken.outcome == Outcome.OK:
+                self._accept(taken, end, repeats, wasted)
+                wasted = rescues = 0
             elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
                 # A slack catenary is no matter of the step: its answer would be grid noise at any dt.
                 self._stop(taken, end - self.t)
@@ -154,37 +154,46 @@ class Motion:
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)
         if self.zoning is not None:
-            ends = self.model.ends.values
-            self.work[-1] += self.zoning.settle(dt, ends, self.spare, self.state)
-            change = self.zoning.look(end, dt, ends, self.state)
+            booked, change = self.zoning.settle(end, dt, self.model.ends.values, self.spare, self.state)
+            self.work[-1] += booked
             if change is not None:
                 self._switch(change)
 
-    def _rescued(self, taken: Taken, rescues: int) -> bool:
-        """After a step that failed: more rod where it failed, as long as there is anything to add."""
+    def _rescued(self, taken: Taken, end: float, rescues: int) -> bool:
+        """Whether a step was taken back and more of the line made rod: it failed, or a catenary went too far in it."""
         assert self.zoning is not None
-        if rescues > MOST_RESCUES:
-            return False
-        if taken.outcome == Outcome.SLACK:
-            cells = np.flatnonzero((self.model.line.spin == 0) & (self.model.slack_floor >= self.spare.T))
+        line = self.model.line
+        if taken.outcome == Outcome.OK:
+            cells = self.zoning.weigh(end, end - self.t, self.model.ends.values, self.spare)
+            why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
+        elif taken.outcome == Outcome.SLACK:
+            cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= self.spare.T))
+            why = "a step would have left it a catenary without tension; the step is repeated"
         else:
             cells = np.array([min(max(taken.where, 0), self.model.cells - 1)])
-        change = self.zoning.manager.insist(cells)
+            why = f"a step failed here ({taken.outcome.cause}); it is repeated"
+            rescues *= MOST_RESCUES  # once; after that, a smaller step
+        if rescues >= MOST_RESCUES or not cells.size:
+            return False
+        change = self.zoning.manager.insist(cells, why)
         if (change.rod == self.zoning.manager.layout.rod).all():
             return False
         self._switch(change)
         return True
 
     def _switch(self, change: Change) -> None:
-        """Zones change: nothing moves, and accelerations are found anew."""
+        """Zones change: nothing moves, and what changes energy is booked."""
         assert self.zoning is not None
         ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
         self.model, self.state, booked = self.zoning.switch(change, self.t, ends, self.state, sea)
         self.work[-1] += booked
         base = self.zoning.manager.layout.base
-        for k, (a, b, kind, why) in enumerate(change.reasons):
-            text = f"{why}; energy booked {booked:.3g} J" if k == 0 else why
-            self.recorder.event(self.t, float(base[a]), float(base[b]), "split" if kind == "rod" else "merge", text)
+        for k, why in enumerate(change.reasons):
+            energy = booked if k == 0 else 0.0  # of all that change now
+            self.recorder.event(
+                self.t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
+                criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
+            )  # fmt: skip
         self.spare = self.state.copy()
         floor = self.stepper.floor
         self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.build import Model, build
+from hybrid.model.build import Model, build, given_zones
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times, step_ends
 from hybrid.model.reasons import reasons_against
@@ -219,11 +219,7 @@ def _first_zones(
     """Zones, equilibrium if one is asked for, and what will move the zones."""
     asked = scene.model
     assert isinstance(asked, AdaptiveModel) and model.layout is not None
-    middle = 0.5 * (model.layout.base[:-1] + model.layout.base[1:])
-    given = np.zeros(middle.size, int)
-    for stretches, sign in ((asked.always_catenary, -1), (asked.always_rod, 1)):
-        for a, b in stretches or ():
-            given[(middle > a) & (middle < b)] = sign
+    given = given_zones(scene, model.layout)
     manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0)
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":

@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybrid.adapt.manager import Change, DomainManager
-from hybrid.adapt.plan import spread, wanted
-from hybrid.adapt.remap import remap
+from hybrid.adapt.criteria import twist_of_rods
+from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
+from hybrid.adapt.remap import Clamp, Remapped, remap
+from hybrid.errors import ComputationError
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
-from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.model.state import Ends, Floats, Line, Sea, State, blank_state
 from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.physics.seabed import stored
 from hybrid.solve.observe import observe
@@ -22,6 +23,7 @@ from hybrid.solve.statics import Equilibrium, solve_statics
 LETTING_GO = 1.0
 # Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 DWELL, LEAST_DWELL = 0.25, 20
+NONE = np.zeros(0, int)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
 
@@ -42,11 +44,18 @@ class Relaxing:
         return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
 
 
-def manager_for(model: Model, tolerance: float, dwell: float | None, given: np.ndarray, step: float) -> DomainManager:
+def manager_for(
+    model: Model,
+    tolerance: float,
+    dwell: float | None,
+    given: np.ndarray,
+    step: float,
+    user: UserCriterion | None = None,
+) -> DomainManager:
     """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
     assert model.layout is not None
     wait = dwell if dwell is not None else max(DWELL * model.time_scale, LEAST_DWELL * step)
-    return DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale)
+    return DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale, user)
 
 
 def on_layout(model: Model, layout: Layout) -> Model:
@@ -56,39 +65,32 @@ def on_layout(model: Model, layout: Layout) -> Model:
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
-def first_zones(model: Model, manager: DomainManager, t: float, **how: object) -> tuple[Model, Equilibrium]:
+def first_zones(model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
     """Zones for an equilibrium, and the equilibrium: all rod first, then rod where the criteria ask for it."""
     found = _equilibrium(model, t, model.start)
-    layout = model.layout
-    assert layout is not None
-    fine = layout.nodes
-    full = found.state
+    assert model.layout is not None
+    fine, full = model.layout.nodes, found.state
     manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
-    rod = _asked(manager, full)
+    rod = manager.first(full)
     best = (model, found)
+    if rod.all():
+        return best
     for _ in range(MOST_ROUNDS):
-        new = on_layout(model, layout._replace(rod=rod))
-        start = _picked(full, fine, new.line)
+        layout = model.layout._replace(rod=rod)
+        new = on_layout(model, layout)
         try:
-            answer = _equilibrium(new, t, start)
-        except Exception:
-            return best
-        manager.follow(new.layout)  # type: ignore[arg-type]
+            answer = _equilibrium(new, t, _picked(full, fine, new.line))
+        except ComputationError:  # with fewer rods there is none: the one with rods everywhere is right as well
+            manager.follow(model.layout)
+            return model, found
+        manager.follow(layout)
         manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
-        more = rod | _asked(manager, answer.state)
+        more = rod | manager.first(answer.state)
+        best = (new, answer)
         if (more == rod).all():
-            return new, answer
+            return best
         rod = more
     return best
-
-
-def _asked(manager: DomainManager, state: State) -> np.ndarray:
-    """Base cells that ask to be rod, after `weigh`, which then begins anew."""
-    n = manager.layout.rod.size
-    asks = wanted(manager.ratios, np.zeros(n, bool)) | (manager.given > 0)
-    out = spread(asks, manager.layout.base, manager.rules(state).buffer)
-    manager.ratios[:] = 0.0
-    return np.asarray(out & (manager.given >= 0))
 
 
 def _equilibrium(model: Model, t: float, start: State) -> Equilibrium:
@@ -100,8 +102,6 @@ def _equilibrium(model: Model, t: float, start: State) -> Equilibrium:
 
 def _picked(state: State, s: Floats, line: Line) -> State:
     """The state at the nodes of a coarser line, a subset of the nodes s."""
-    from hybrid.model.state import blank_state
-
     at = np.searchsorted(s, line.s - 1e-9 * s[-1])
     out = blank_state(line.h.size)
     out.r[:] = state.r[at]
@@ -117,54 +117,69 @@ def _picked(state: State, s: Floats, line: Line) -> State:
 class Zoning:
     """The zones of one motion."""
 
-    def __init__(self, model: Model, manager: DomainManager) -> None:
+    def __init__(self, model: Model, manager: DomainManager, loaded: bool = False) -> None:
+        """loaded: whether joints carry the moment of the catenary's curvature."""
         self.model, self.manager = model, manager
         self.stiff = model.line.kb.copy()  # N m, with all bending
         self.true = model.line.h.copy()
         self.lengths = self.true.copy()  # m, at the end of the last step
         self.relaxing: Relaxing | None = None
         self.letting_go = False
-        self.switches = 0
+        self.joints = Joints(model.line) if loaded else None
+        manager.coming = bool((manager.grown < 1.0).any())
 
-    def look(self, t: float, dt: float, ends: Ends, state: State) -> Change | None:
-        """Weigh the criteria after a step of dt."""
-        manager = self.manager
-        manager.weigh(self.model.line, self.model.sea.values, ends, state, dt)
-        return manager.review(t, state) if manager.due(t) else None
-
-    def prepare(self, end: float) -> None:
-        """Give cells on their way to their true length the one they have at the end of the step that comes."""
+    def prepare(self, end: float, dt: float, state: State) -> None:
+        """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
+        line = self.model.line
         if self.relaxing is not None:
             lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.dwell)
-            self.model.line.h[:] = self.true - lack
+            line.h[:] = self.true - lack
+        if self.manager.blending:
+            line.kb[:] = self.manager.parts(dt)[:, None] * self.stiff
+        if self.joints is not None:
+            self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.dwell)
 
-    def settle(self, dt: float, ends: Ends, before: State, state: State) -> float:
-        """After a step from `before` to `state`: the energy (J) of lengths let go in it, and of bending blended now."""
+    def weigh(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
+        """Weigh the criteria after a step of dt to t; catenary cells that are beyond their hard bound."""
+        loudest = self.manager.weigh(self.model.line, self.model.sea.values, ends, state, dt, t)
+        return self.manager.catenary_beyond if loudest > HARD else NONE
+
+    def settle(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
+        """After an accepted step: the energy (J) that changing lengths, bending and joints put in; what should change."""
+        manager, line = self.manager, self.model.line
         booked = 0.0
-        line = self.model.line
         if self.relaxing is not None:
             booked -= 0.5 * float((before.T + state.T) @ (line.h - self.lengths))
             self.lengths[:] = line.h
             if not self.letting_go:
                 self.relaxing = None
-        if self.manager.going or self.manager.coming:
-            parts = self.manager.blend(dt)
-            was = _bending(line, ends, state)
-            line.kb[:] = parts[:, None] * self.stiff
-            booked += _bending(line, ends, state) - was
-        return booked
+        if manager.blending:
+            new, old = line.kb.copy(), manager.parts()[:, None] * self.stiff
+            for x in (before, state):
+                line.kb[:] = new
+                booked += 0.5 * _bending(line, ends, x)
+                line.kb[:] = old
+                booked -= 0.5 * _bending(line, ends, x)
+            line.kb[:] = new
+            manager.blend(dt)
+        if self.joints is not None:
+            booked += self.joints.unload(line, state.r - before.r)
+        manager.remember(state)
+        return booked, manager.review(t, state) if manager.due(t) else None
 
     def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
         """The model and the state with other zones, and the energy (J) that the switch puts in."""
         old, manager, model = self.manager.layout, self.manager, self.model
         new = old._replace(rod=change.rod)
-        was = _energy(model.line, sea, ends, state)
+        line = model.line
+        if self.joints is not None:
+            self.joints.unload(line, np.zeros_like(state.r))
+        line.kb[:] = manager.parts()[:, None] * self.stiff  # a step that was refused has left others
+        line.h[:] = self.lengths
+        was = _energy(line, sea, ends, state)
         changed = on_layout(model, new)
         target = changed.line
-        n = new.rod.size
-        kinks = np.zeros(n + 1, bool)
-        kinks[np.searchsorted(new.base, model.cable.at - 1e-9 * model.length)] = True
-        carried = remap(old, new, model.line, target, state, kinks, np.zeros(n))
+        carried = self._carried(old, new, line, target, ends, state)
         fresh = new.rod & ~old.rod
         manager.grown[fresh], manager.leaving[fresh] = 0.0, False
         manager.grown[~new.rod], manager.leaving[~new.rod] = 1.0, False
@@ -185,8 +200,92 @@ class Zoning:
                 mine[kept_now] = its[kept_then]
         self.relaxing = Relaxing(lack, rate, since)
         self.model = changed
-        self.switches += 1
+        if self.joints is not None:
+            self.joints = self.joints.on(target)
         return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
+
+    def _carried(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Remapped:
+        """The state on the new nodes, with the twist that the cable has had since its ends lost each other."""
+        manager, cable = self.manager, self.model.cable
+        kinks = np.zeros(new.rod.size + 1, bool)
+        kinks[np.searchsorted(new.base, cable.at - 1e-9 * new.base[-1])] = True
+        frames = ends.frame.reshape(2, 3, 3)
+        clamps: list[Clamp | None] = [
+            (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None for k in (0, 1)
+        ]
+        twist = np.zeros(new.rod.size)
+        carried = remap(old, new, line, target, state, kinks, twist, clamps)
+        fresh = new.rod & ~old.rod
+        if not (manager.twisted and new.rod.all() and fresh.any()):
+            return carried
+        length = float(np.diff(new.base)[fresh].sum())
+        for _ in range(2):  # in whole turns; what is between them the clamps say
+            missing = manager.total_twist - twist_of_rods(target, ends.frame, carried.state.e, carried.state.a1)
+            twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
+            carried = remap(old, new, line, target, state, kinks, twist, clamps)
+        return carried
+
+
+class Joints:
+    """Joints that carry the moment EI kappa of the catenary beside them, relaxed in time, onto the rod.
+
+    The moment is a couple on the rod's last cell.  The catenary's side gets none: its own moments, which the
+    model leaves out, go on beyond the joint.
+    """
+
+    def __init__(self, line: Line) -> None:
+        turns = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
+        before = line.spin[turns - 1] == 1  # the rod lies before the joint
+        self.node, self.cell = turns, np.where(before, turns - 1, turns)
+        self.side = np.where(before, 1.0, -1.0)
+        self.inside = np.clip(np.where(before, turns + 1, turns - 1), 1, line.h.size - 1)
+        self.s = line.s[turns]
+        self.beside = np.where(before, turns - 1, turns + 1)  # the rod's last element
+        self.moment = self.next = np.zeros((turns.size, 3))
+        self.force = np.zeros((line.s.size, 3))
+
+    def on(self, line: Line) -> Joints:
+        """The joints of another line; those that stay keep their moments."""
+        new = Joints(line)
+        for k, s in enumerate(new.s):
+            same = np.flatnonzero(self.s == s)
+            if same.size and self.side[same[0]] == new.side[k]:
+                new.moment[k] = self.moment[same[0]]
+        return new
+
+    def aim(self, line: Line, state: State, EI: Floats) -> Floats:
+        """EI kappa (k, 3) N m of the catenary at its first node beyond each joint."""
+        i = self.inside
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        a, b = d[i - 1], d[i]
+        turn = 2.0 * np.cross(a, b) / (1.0 + np.einsum("ij,ij->i", a, b))[:, None]
+        return np.asarray((EI[i] / line.hn[i])[:, None] * turn)
+
+    def load(self, line: Line, state: State, EI: Floats, grown: Floats, part: float) -> None:
+        """Relax the moments by a part towards their aim, and put them on the rods' ends as forces on the line.
+
+        grown: (N+1,) how much of its stiffness every node has; a rod gets no more moment than that.
+        """
+        if not self.node.size:
+            return
+        line.force[:] -= self.force  # of a step that was refused
+        c = self.cell
+        l = np.linalg.norm(state.e[c], axis=1)[:, None]
+        moment = self.moment + min(part, 1.0) * (self.aim(line, state, EI) - self.moment)
+        pull = (grown[self.beside] * self.side)[:, None] * np.cross(moment, state.e[c] / l) / l
+        self.next, self.force[:] = moment, 0.0
+        np.add.at(self.force, c + 1, pull)
+        np.add.at(self.force, c, -pull)
+        line.force[:] += self.force
+
+    def unload(self, line: Line, way: Floats) -> float:
+        """After a step: the work (J) of the moments on the way (N+1, 3) m; the line has its dead loads only."""
+        work = float(np.sum(self.force * way))
+        line.force[:] -= self.force
+        if way.any():
+            self.moment = self.next
+        self.force[:] = 0.0
+        return work
 
 
 def _observed(line: Line, ends: Ends, state: State) -> Floats:

@@ -1,4 +1,4 @@
-"""When a stretch must be a rod: the criteria, their thresholds, and the kernel that weighs them at every step.
+"""When a stretch must be a rod: the kernel that weighs every criterion of the table at every step.
 
 Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
 rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
@@ -8,8 +8,9 @@ bending out would make are lengths, and count against the tolerance (m) of the s
     EI       bending stiffness at a node                      -      N m2
     lam      sqrt(EI/T), over which bending fades             -      m
     kappa    curvature at a node                              -      1/m
-    T, Ta    tension now and ahead                            -      N
-    phi      angle between a clamp and the cable              -      rad
+    T, ahead tension now, and as it will be                   -      N
+    turn     |d_b - d_a| of the chords at a node              -      rad
+    Mt       torque                                           -      N m
 """
 
 from __future__ import annotations
@@ -21,12 +22,14 @@ from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
 from hybrid.physics.loads import SEABED
-from hybrid.physics.rotations import dot, frame, log_rotation
+from hybrid.physics.rotations import cross, dot, frame, log_rotation, sub, transport
 
-# Angle of 1 rad per lambda is the sharpest that sqrt(EI/T) can speak of; slack stretches are judged by their floor.
+# What a ratio is where there is no tension, or no number: large, and finite.
 MOST = 1e6
 # Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.
 TWISTED = 0.5
+# What may sit at a node: nothing, a jump of bending stiffness, a point load.
+SMOOTH, STEP, LOAD = 0, 1, 2
 
 
 @inner
@@ -34,78 +37,133 @@ def get3(A, i):
     return (A[i, 0], A[i, 1], A[i, 2])
 
 
+@inner
+def put(ratios, c, ja, jb, x):
+    """Raise a ratio of the base cells on both sides of a node; what is not a number is large."""
+    if not x < MOST:
+        x = MOST
+    if x > ratios[c, ja]:
+        ratios[c, ja] = x
+    if x > ratios[c, jb]:
+        ratios[c, jb] = x
+
+
+@inner
+def get9(A, i):
+    return (A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5], A[i, 6], A[i, 7], A[i, 8])
+
+
+@inner
+def depth(sea, r, i):
+    return sea.offset + 0.5 * sea.onset - dot(sea.normal, get3(r, i))
+
+
 @kernel
-def weigh(line, sea, r, e, T, a1, before, a, EI, w, kink, floor, tolerance, clamps, base_of_cell, ratios):
+def weigh(
+    line, sea, tangents, r, e, T, a1, past, a, EI, w, node, floor, tolerance, torque, base_of_cell, free, turn, ratios
+):  # fmt: skip
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
-    Returns the largest ratio among base cells that are catenary.
+    Returns the largest ratio among base cells that are catenary and free to change.
 
-    before, a: tensions a step ago (N,), and horizon over step, for the tension ahead; EI, w, kink, floor: (N+1,)
-    bending stiffness, weight per length, 1 where a point load or a jump of section sits, tension floor;
-    clamps: (2, 3) tangents of clamped ends, zero where there is none.
+    tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
+    change since then goes on; EI, w, node, floor: (N+1,) bending stiffness, weight per length, what sits there,
+    tension floor; torque: of the whole line as far as its rods do not know it, N m; free: (n,) of base
+    cells; turn: (N+1,) to work in.
     """
     n = e.shape[0]
-    d0, _, _ = chord((e[0, 0], e[0, 1], e[0, 2]))
+    turn[0], turn[n] = 0.0, 0.0
+    d0 = get3(tangents, 0)
+    d1, _, _ = chord(get3(e, 0))
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[0] = math.sqrt(dot(x, x))
+    for i in range(1, n):
+        d0 = d1
+        d1, _, _ = chord(get3(e, i))
+        x = sub(d1, d0)
+        turn[i] = math.sqrt(dot(x, x))
+    d0 = get3(tangents, 1)
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[n] = math.sqrt(dot(x, x))
     for i in range(n + 1):
         ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
         jb = base_of_cell[i] if i < n else base_of_cell[n - 1]
-        tension = T[i] if i < n else T[n - 1]
-        old = before[i] if i < n else before[n - 1]
-        if i > 0:
-            if T[i - 1] < tension:
-                tension = T[i - 1]
-            old = min(old, before[i - 1])
-        ahead = min(tension, tension + a * (tension - old))
-        ratio = min(floor[i] / ahead, MOST) if ahead > 0.0 else MOST
-        ratios[SLACK, ja] = max(ratios[SLACK, ja], ratio)
-        ratios[SLACK, jb] = max(ratios[SLACK, jb], ratio)
-        T1 = max(tension, floor[i], 1e-300)
-        turn, which = 0.0, BEND
+        c = min(i, n - 1)
+        now, ahead = T[c], T[c] + a * (T[c] - past[c])
         if 0 < i < n:
-            d, _, _ = chord((e[i, 0], e[i, 1], e[i, 2]))
-            c = max(-1.0, min(1.0, dot(d0, d)))
-            turn = 2.0 * math.sqrt(max(0.0, 0.5 * (1.0 - c)))
-            d0 = d
-            if kink[i] or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
-                which = POINT
+            before = T[i - 1] + a * (T[i - 1] - past[i - 1])
+            ahead = before if not ahead < before else ahead
+            now = T[i - 1] if not now < T[i - 1] else now
+            if not T[i] + before < math.inf:  # a NaN must not hide behind a number
+                ahead = -1.0
+        ahead = min(now, ahead)
+        put(ratios, SLACK, ja, jb, floor[i] / ahead if ahead > 0.0 else MOST)
+        T1 = max(floor[i], 1e-300)
+        T1 = now if now > T1 else T1
+        if i == 0 or i == n:
+            put(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
         else:
-            which = CLAMP
-            t = (clamps[0 if i == 0 else 1, 0], clamps[0 if i == 0 else 1, 1], clamps[0 if i == 0 else 1, 2])
-            if dot(t, t) > 0.0:
-                c = max(-1.0, min(1.0, dot(d0, t)))
-                turn = 2.0 * math.sqrt(max(0.0, 0.5 * (1.0 - c)))
-        if which == BEND:
-            ratio = EI[i] * turn / (line.hn[i] * T1 * tolerance)
-        else:
-            ratio = math.sqrt(EI[i] / T1) * turn / tolerance
-        ratios[which, ja] = max(ratios[which, ja], ratio)
-        ratios[which, jb] = max(ratios[which, jb], ratio)
-        if line.bits & SEABED and 0 < i < n:
-            p = (
-                sea.offset
-                + 0.5 * sea.onset
-                - (sea.normal[0] * r[i, 0] + sea.normal[1] * r[i, 1] + sea.normal[2] * r[i, 2])
-            )
-            k = i + 1 if p > 0.0 else i - 1
-            q = (
-                sea.offset
-                + 0.5 * sea.onset
-                - (sea.normal[0] * r[k, 0] + sea.normal[1] * r[k, 1] + sea.normal[2] * r[k, 2])
-            )
-            if (p > 0.0) != (q > 0.0):
-                ratio = EI[i] * w[i] / (T1 * T1 * tolerance)
-                ratios[EDGE, ja] = max(ratios[EDGE, ja], ratio)
-                ratios[EDGE, jb] = max(ratios[EDGE, jb], ratio)
-        if line.element[i] and 0 < i < n:
-            Ra, Rb = frame(get3(a1, i - 1), chord(get3(e, i - 1))[0]), frame(get3(a1, i), d0)
-            torque = line.kb[i, 2] * (log_rotation(relative_rotation(Ra, Rb))[2] - line.k0[i, 2])
-            ratio = torque * torque / (4.0 * EI[i] * T1 * TWISTED)
-            ratios[TORSION, ja] = max(ratios[TORSION, ja], ratio)
-            ratios[TORSION, jb] = max(ratios[TORSION, jb], ratio)
+            bend = EI[i] * turn[i] / (line.hn[i] * T1 * tolerance)
+            if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+                smooth = 0.0  # what is left of the turn without what the curvature on both sides makes of it
+                if 1 < i:
+                    smooth = turn[i - 1] / line.hn[i - 1]
+                if i < n - 1:
+                    smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if 1 < i else turn[i + 1] / line.hn[i + 1]
+                kink = max(turn[i] - smooth * line.hn[i], 0.0)
+                put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink / tolerance)
+            else:
+                put(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
+            if line.bits & SEABED:
+                p = depth(sea, r, i) > 0.0
+                if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
+                    put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+            Mt = torque
+            if line.element[i]:
+                da, _, _ = chord(get3(e, i - 1))
+                db, _, _ = chord(get3(e, i))
+                Ra, Rb = frame(get3(a1, i - 1), da), frame(get3(a1, i), db)
+                Mt = line.kb[i, 2] * (log_rotation(relative_rotation(Ra, Rb))[2] - line.k0[i, 2])
+            put(ratios, TORSION, ja, jb, Mt * Mt / (4.0 * EI[i] * T1 * TWISTED))
     loudest = 0.0
     for i in range(n):
-        if not line.spin[i]:
-            j = base_of_cell[i]
-            for c in range(6):
+        j = base_of_cell[i]
+        if not line.spin[i] and free[j]:
+            for c in range(ratios.shape[0]):
                 loudest = max(loudest, ratios[c, j])
     return loudest
+
+
+@kernel
+def end_turn(e, frames):
+    """Angle, rad, from the first end's director, carried along all chords without twist, to the second's.
+
+    frames: (2, 9) of the ends.
+    """
+    Ra, Rb = get9(frames, 0), get9(frames, 1)
+    a, d = (Ra[0], Ra[3], Ra[6]), (Ra[2], Ra[5], Ra[8])
+    b, db = (Rb[0], Rb[3], Rb[6]), (Rb[2], Rb[5], Rb[8])
+    for i in range(e.shape[0]):
+        d1, _, _ = chord(get3(e, i))
+        a = transport(a, d, d1)
+        d = d1
+    a = transport(a, d, db)
+    return math.atan2(dot(cross(a, b), db), dot(a, b))
+
+
+@kernel
+def twist_of_rods(line, frames, e, a1):
+    """Twist of all elements, rad; frames: (2, 9) of the ends."""
+    n = e.shape[0]
+    twist = 0.0
+    for i in range(n + 1):
+        if line.element[i]:
+            Ra, Rb = get9(frames, 0), get9(frames, 1)
+            if i > 0:
+                Ra = frame(get3(a1, i - 1), chord(get3(e, i - 1))[0])
+            if i < n:
+                Rb = frame(get3(a1, i), chord(get3(e, i))[0])
+            twist += log_rotation(relative_rotation(Ra, Rb))[2]
+    return twist

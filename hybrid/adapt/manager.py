@@ -1,19 +1,22 @@
 """The domain manager: watches the criteria, proposes zones, and blends bending in and out.
 
 It proposes; the loop disposes.  What it holds besides the layout is small: how far bending has
-been blended in (`grown`), which rods are on their way out (`leaving`), since when they are calm.
+been blended in (`grown`), which rods are on their way out (`leaving`), since when they are calm, and
+tensions of a while ago.
 """
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from itertools import pairwise
 from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.criteria import weigh
-from hybrid.adapt.plan import Rules, planned
-from hybrid.adapt.table import CRITERIA, GIVEN
+from hybrid.adapt.criteria import LOAD, STEP, end_turn, twist_of_rods, weigh
+from hybrid.adapt.plan import OFF, Rules, planned, spread, tidied, wanted
+from hybrid.adapt.table import CRITERIA, GIVEN, TORSION
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
 from hybrid.model.state import Ends, Floats, Line, Sea, State
@@ -24,37 +27,80 @@ FLOOR = 0.2
 # Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
 # is what straightens a cable.
 BUFFER = 2.0
-# How far ahead a falling tension is seen, in dwell times.
-HORIZON = 0.5
+# How far ahead a falling tension is seen, in dwell times; the past it is judged by is a review or two old.
+HORIZON, MOST_AHEAD = 0.25, 2.0
 REVIEWS = 8  # in a dwell time, when nothing asks: what happens in between is remembered
-NO_CLAMPS = np.zeros((2, 3))
+HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 # A rod begins with this part of its stiffness: with none its cells could spin freely.
 FIRST = 1e-3
 SHORTEST = 2.0  # base cells that make a zone
+ASKED = 2.0  # ratio of what the scene says is always rod
+
+
+class Look(NamedTuple):
+    """What a criterion of the user gets to see; arrays are not his to change.
+
+    t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
+    bending_stiffness: (N+1,) N m2.
+    """
+
+    t: float
+    s: Floats
+    position: Floats
+    velocity: Floats
+    tension: Floats
+    curvature: Floats
+    bending_stiffness: Floats
+
+
+# At 1 (N+1,) asks for rod around a node, below 0.5 lets go.
+UserCriterion = Callable[[Look], Floats]
+
+
+class Reason(NamedTuple):
+    """Why base cells a to b (exclusive) change: kind of event, criterion with its value and threshold, and words."""
+
+    a: int
+    b: int
+    kind: str
+    text: str
+    criterion: str = ""
+    value: float = math.nan
+    threshold: float = math.nan
 
 
 class Change(NamedTuple):
     """A proposal: what the base cells should be, and why."""
 
     rod: np.ndarray
-    reasons: tuple[tuple[int, int, str, str], ...]  # first and last base cell (+1), kind of event, text
+    reasons: tuple[Reason, ...]
 
 
 class DomainManager:
     """Watches one line.  lengths in m, times in s."""
 
     def __init__(
-        self, cable: Material, layout: Layout, tolerance: float, dwell: float, given: np.ndarray, scale: float
+        self,
+        cable: Material,
+        layout: Layout,
+        tolerance: float,
+        dwell: float,
+        given: np.ndarray,
+        scale: float,
+        user: UserCriterion | None = None,
     ) -> None:
         """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N."""
         n = layout.rod.size
         self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
-        self.scale = scale
-        self.ratios = np.zeros((len(CRITERIA), n))
+        self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
+        self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving = np.ones(n), np.zeros(n, bool)
         self.calm_since = np.full(n, np.inf)
-        self.before = np.zeros(0)
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
+        self.clamped = np.array(cable.held_tangent, float)[:, None]
+        # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
+        self.twisted = all(cable.held_twist) and all(cable.held_tangent)
+        self.total_twist = 0.0
         self.follow(layout)
 
     def follow(self, layout: Layout) -> None:
@@ -66,33 +112,82 @@ class DomainManager:
         of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
         pad = np.concatenate([[of[0]], of, [of[-1]]])
         EI = cable.B[:, :2].mean(axis=1)
-        buoy = np.nan_to_num(cable.buoy)
-        weight = np.abs(cable.weight - buoy)
-        self.EI = np.maximum(EI[pad[:-1]], EI[pad[1:]])
+        weight = np.abs(cable.weight - np.nan_to_num(cable.buoy))
+        self.s, self.EI = s, np.maximum(EI[pad[:-1]], EI[pad[1:]])
         self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
-        self.m = cable.mass[of]
-        self.kink = (EI[pad[:-1]] != EI[pad[1:]]).astype(np.int8)
-        self.kink[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = 1
+        self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, 0).astype(np.int8)
+        self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
         self.base_of_cell = layout.base_of_cell
+        self.turn = np.zeros(s.size)
+        self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
+        self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
         self.coming = bool((layout.rod & (self.grown < 1.0)).any())
-        self.before = np.zeros(0)
+        self.past = self.recent = np.zeros(0)
+        self.age = self.recent_age = 0.0
 
-    def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float) -> None:
-        """Raise the ratios since the last review to those of a state; dt: since the last time, 0 if there was none."""
-        before = state.T if self.before.size != state.T.size or dt == 0.0 else self.before
-        clamps = NO_CLAMPS
-        if line.element[0] or line.element[-1]:
-            clamps = ends.frame[:, 2::3] * np.array([[line.element[0]], [line.element[-1]]])
-        ahead = min(HORIZON * self.dwell / dt, 2.0) if dt > 0.0 else 0.0
+    # --- watching ------------------------------------------------------------------------------
+
+    def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float, t: float = 0.0) -> float:
+        """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
+
+        dt = 0: there was none, or it was on other nodes.
+        """
+        if self.past.size != state.T.size or dt == 0.0:
+            self.past = self.recent = state.T.copy()
+            self.age = self.recent_age = 0.0
+        self.age, self.recent_age = self.age + dt, self.recent_age + dt
+        ahead = min(HORIZON * self.dwell / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
+        torque = self._torque(line, ends, state) if self.twisted else 0.0
         self.loudest = weigh(
-            line, sea, state.r, state.e, state.T, state.a1, before, ahead, self.EI, self.w, self.kink, self.floor,
-            self.tolerance, clamps, self.base_of_cell, self.ratios,
+            line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
+            self.EI, self.w, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free, self.turn,
+            self.ratios,
         )  # fmt: skip
-        if self.before.size == state.T.size:
-            self.before[:] = state.T
-        else:
-            self.before = state.T.copy()
+        if self.user is not None:
+            self._ask_user(line, state, t)
+        return self.loudest
+
+    def remember(self, state: State) -> None:
+        """The state that was weighed is accepted: its tensions will be the past."""
+        if self.recent_age * REVIEWS >= self.dwell:
+            self.past, self.age = self.recent, self.recent_age
+            self.recent, self.recent_age = state.T.copy(), 0.0
+
+    def _torque(self, line: Line, ends: Ends, state: State) -> float:
+        """Torque, N m, of the turn of one end against the other, as if all the line were rod; 0 if it is: rods know."""
+        whole = bool(self.layout.rod.all())
+        if whole:
+            self.total_twist = float(twist_of_rods(line, ends.frame, state.e, state.a1))
+            return 0.0
+        turn = end_turn(state.e, ends.frame)
+        self.total_twist += (turn - self.total_twist + math.pi) % (2.0 * math.pi) - math.pi
+        return (self.total_twist - self.free_twist) / self.compliance
+
+    def _ask_user(self, line: Line, state: State, t: float) -> None:
+        assert self.user is not None
+        look = Look(t, self.s, state.r, state.v, state.T, self.turn / line.hn, self.EI)
+        for x in look[1:]:
+            x.flags.writeable = False
+        try:
+            ratio = np.asarray(self.user(look), float)
+        finally:
+            for x in look[1:]:
+                x.flags.writeable = True
+        if ratio.shape != self.s.shape:
+            raise ValueError(f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {self.s.shape}")
+        cells = np.maximum(ratio[:-1], ratio[1:])
+        np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
+        quiet = self.layout.rod | (self.given < 0)
+        self.loudest = max(self.loudest, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
+
+    @property
+    def catenary_beyond(self) -> np.ndarray:
+        """Cells of catenaries that must not be so any longer, by what was weighed last and since the last review."""
+        loud = ~(self.ratios <= HARD).all(axis=0) & ~self.layout.rod & (self.given >= 0)
+        return np.flatnonzero(loud[self.base_of_cell])
+
+    # --- proposing -----------------------------------------------------------------------------
 
     def due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod is on its way out, or some time has passed."""
@@ -101,7 +196,7 @@ class DomainManager:
     def review(self, t: float, state: State) -> Change | None:
         """What should change now, after the ratios since the last review; None most of the time."""
         rod = self.layout.rod
-        self.ratios[GIVEN] = self.given > 0
+        self._complete()
         stays = rod & ~self.leaving
         next_, self.calm_since = planned(self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state))
         next_ &= self.given >= 0
@@ -111,8 +206,25 @@ class DomainManager:
         gone = self.leaving & (self.grown <= 0.0)
         new = (rod & ~gone) | next_
         change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)))
-        self.ratios[:] = 0.0
+        self._forget()
         return change
+
+    def first(self, state: State) -> np.ndarray:
+        """Base cells that ask to be rod, whatever they are, after `weigh`; the ratios begin anew."""
+        n = self.layout.rod.size
+        self._complete()
+        rules = self.rules(state)
+        asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
+        self._forget()
+        return np.asarray(tidied(asks, asks, self.layout.base, rules.shortest) & (self.given >= 0))
+
+    def insist(self, cells: np.ndarray, why: str) -> Change:
+        """Rods wanted at once, whatever the criteria say: for a step that failed."""
+        new = self.layout.rod.copy()
+        for j in np.unique(self.base_of_cell[cells]):
+            new[max(j - 1, 0) : j + 2] = True
+        new &= self.given >= 0
+        return Change(new, tuple(r._replace(kind="retry") for r in self._reasons(self.layout.rod, new, why)))
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
@@ -124,50 +236,74 @@ class DomainManager:
         )
         return Rules(buffer, SHORTEST * float(np.median(np.diff(self.layout.base))), self.dwell)
 
-    def insist(self, cells: np.ndarray) -> Change:
-        """Rods wanted at once, whatever the criteria say: for a step that failed."""
-        new = self.layout.rod.copy()
-        for j in np.unique(self.base_of_cell[cells]):
-            new[max(j - 1, 0) : j + 2] = True
-        new &= self.given >= 0
-        return Change(new, tuple(self._reasons(self.layout.rod, new, "a step that failed")))
+    def _complete(self) -> None:
+        """What is not of a place: the scene's wishes, and torque, which needs rods from end to end."""
+        self.ratios[GIVEN, self.given > 0] = ASKED
+        if self.twisted:
+            self.ratios[TORSION] = self.ratios[TORSION].max()
 
-    def _reasons(self, rod: np.ndarray, new: np.ndarray, why: str = "") -> list[tuple[int, int, str, str]]:
+    def _forget(self) -> None:
+        np.maximum(self.seen, self.ratios, out=self.seen)
+        self.ratios[:] = 0.0
+
+    def told(self) -> Floats:
+        """The largest ratios (criteria, base cells) since this was asked last."""
+        out = np.maximum(self.seen, self.ratios)
+        self.seen[:] = 0.0
+        return out
+
+    def _reasons(self, rod: np.ndarray, new: np.ndarray, why: str = "") -> list[Reason]:
         """Runs of base cells that change, and for each what asks for it, or had held it until now."""
         out = []
-        base, off = self.layout.base, np.array([x.off for x in CRITERIA])
+        base = self.layout.base
         loud = self.ratios.max(axis=0)
         for a, b in pairwise(edges(np.where(rod == new, 0, np.where(new, 1, -1)))):
             if rod[a] == new[a]:
                 continue
+            beside = (a > 0 and rod[a - 1] and new[a - 1]) or (b < rod.size and rod[b] and new[b])
             if new[a]:
+                kind = "grow" if beside else "split"
                 asks = np.flatnonzero(loud > 1.0)
-                text = why
-                if not why and asks.size:
+                if why:
+                    out.append(Reason(a, b, kind, why))
+                elif asks.size:
                     j = asks[np.argmin(np.abs(asks - 0.5 * (a + b - 1)))]
                     c = int(np.argmax(self.ratios[:, j]))
-                    text = f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} > 1 at s = {base[j]:.4g} to {base[j + 1]:.4g} m"
-                out.append((a, b, "rod", text or "closes a gap"))
+                    value = float(self.ratios[c, j])
+                    text = f"{CRITERIA[c].name} {value:.3g} > 1 at s = {base[j]:.4g} to {base[j + 1]:.4g} m"
+                    out.append(Reason(a, b, kind, text, CRITERIA[c].name, value, 1.0))
+                else:
+                    out.append(Reason(a, b, kind, "closes a gap"))
             else:
-                j = a + int(np.argmax((self.ratios[:, a:b] / off[:, None]).max(axis=0)))
-                c = int(np.argmax(self.ratios[:, j] / off))
-                text = (
-                    f"{CRITERIA[c].name} {self.ratios[c, j]:.3g} < {off[c]:g} and all else calm for {self.dwell:.3g} s"
-                )
-                out.append((a, b, "catenary", text))
+                j = a + int(np.argmax((self.ratios[:, a:b] / OFF[:, None]).max(axis=0)))
+                c = int(np.argmax(self.ratios[:, j] / OFF))
+                name, value, off = CRITERIA[c].name, float(self.ratios[c, j]), float(OFF[c])
+                text = f"calm for {self.dwell:.3g} s and blended out; {name} {value:.3g}, threshold {off:g}"
+                out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))
         return out
 
-    def blend(self, dt: float) -> Floats:
-        """Move on by dt; how much of its stiffness every node has (N+1,)."""
-        # over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring
-        self.grown = np.clip(self.grown + np.where(self.leaving, -dt, dt) / self.dwell, 0.0, 1.0)
-        self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
-        return self.parts()
+    # --- blending ------------------------------------------------------------------------------
 
-    def parts(self) -> Floats:
-        """How much of its stiffness every node has (N+1,)."""
-        x = self.grown
+    @property
+    def blending(self) -> bool:
+        return self.going or self.coming
+
+    def parts(self, dt: float = 0.0) -> Floats:
+        """How much of its stiffness every node has (N+1,), dt from now.
+
+        Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.
+        """
+        x = self._grown(dt)
         smooth = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)
         cells = smooth[self.base_of_cell]
         out = np.minimum(np.append(cells, cells[-1]), np.append(cells[0], cells))
         return np.asarray(out)
+
+    def _grown(self, dt: float) -> Floats:
+        return np.clip(self.grown + np.where(self.leaving, -dt, dt) / self.dwell, 0.0, 1.0)
+
+    def blend(self, dt: float) -> None:
+        """Move on by dt."""
+        self.grown = self._grown(dt)
+        self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
+

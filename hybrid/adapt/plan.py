@@ -25,19 +25,20 @@ class Rules(NamedTuple):
 
 
 OFF = np.array([x.off for x in CRITERIA])
+ROUND = 1e-12  # of a length
 
 
 def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
     """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
-    return np.where(rod, (ratios > OFF[:, None]).any(axis=0), (ratios > 1.0).any(axis=0))
+    # a ratio that is not a number asks, too
+    return np.asarray(np.where(rod, ~(ratios <= OFF[:, None]).all(axis=0), ~(ratios <= 1.0).all(axis=0)))
 
 
 def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
     """Base cells within the buffer of those that ask."""
     out = asks.copy()
     for j in np.flatnonzero(asks):
-        near = (base[:-1] < base[j + 1] + buffer[j]) & (base[1:] > base[j] - buffer[j])
-        out |= near
+        out |= (base[:-1] < base[j + 1] + buffer[j]) & (base[1:] > base[j] - buffer[j])
     return out
 
 
@@ -52,27 +53,31 @@ def planned(
     grows = spread(wanted(ratios, np.zeros_like(rod)), base, rules.buffer)
     calm = np.where(rod & ~keeps, np.minimum(calm_since, t), np.inf)
     goes = rod & (t - calm >= rules.dwell)
-    next_ = (rod & ~goes) | grows
-    # short gaps between rods are rod; short rods grow until they are long enough, or until they meet another
-    length = np.diff(base)
-    for want, least in ((False, rules.shortest), (True, rules.shortest)):
-        cuts = edges(next_)
+    return tidied((rod & ~goes) | grows, rod, base, rules.shortest), calm
+
+
+def tidied(flags: np.ndarray, rod: np.ndarray, base: Floats, shortest: float) -> np.ndarray:
+    """No rod and no gap between rods shorter than `shortest`: rods widen, into what was rod first, and gaps close."""
+    flags, length, least = flags.copy(), np.diff(base), shortest * (1.0 - ROUND)
+    while True:
+        before = flags.copy()
+        for a, b in pairwise(edges(before)):
+            if before[a]:
+                _widen(flags, a, b, rod, length, least)
+        cuts = edges(flags)
         for a, b in pairwise(cuts):
-            if next_[a] != want or length[a:b].sum() >= least:
-                continue
-            if not want:
-                if a > 0 and b < next_.size:
-                    next_[a:b] = True
-            else:
-                _widen(next_, a, b, length, least)
-    return next_, calm
+            if not flags[a] and a > 0 and b < flags.size and length[a:b].sum() < least:
+                flags[a:b] = True
+        if (flags == before).all():
+            return flags
 
 
-def _widen(flags: np.ndarray, a: int, b: int, length: Floats, least: float) -> None:
-    """Let a run of rods grow on both sides, cell by cell."""
+def _widen(flags: np.ndarray, a: int, b: int, rod: np.ndarray, length: Floats, least: float) -> None:
+    """Let a run of rods grow on both sides, cell by cell; on one side only while only that one was rod."""
     while length[a:b].sum() < least and (a > 0 or b < flags.size):
-        if a > 0:
-            a -= 1
-        if b < flags.size and length[a:b].sum() < least:
-            b += 1
+        left, right = a > 0, b < flags.size
+        if left and right and rod[a - 1] != rod[b]:
+            left, right = bool(rod[a - 1]), bool(rod[b])
+        a -= left
+        b += right and length[a:b].sum() < least
     flags[a:b] = True

@@ -2,13 +2,14 @@
 
 Base nodes keep their positions to the last bit.  Nodes that appear lie on a cubic through the base
 nodes, so that a rod begins without kinks; nodes that go are dropped.  Mass is exact by construction, linear momentum
-by a small shift of the velocities of the nodes concerned, region by region.  The length that a chord gains or
+by a small shift of the velocities of the nodes concerned, stretch by stretch.  The length that a chord gains or
 loses when an arc becomes chords (or chords an arc) is kept: every new cell is given the unstretched length that
 makes its tension what it was, and is let go to its true length slowly (`Relaxing`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -16,6 +17,10 @@ import numpy as np
 
 from hybrid.model.layout import Layout, edges
 from hybrid.model.state import Floats, Line, State, blank_state
+
+
+Clamp = tuple[Floats, Floats]  # first director and tangent
+ROUND = 1e-9  # of the length: places so close are one
 
 
 class Remapped(NamedTuple):
@@ -26,12 +31,20 @@ class Remapped(NamedTuple):
 
 
 def remap(
-    old: Layout, new: Layout, line: Line, target: Line, state: State, kinks: np.ndarray, twist: Floats
+    old: Layout,
+    new: Layout,
+    line: Line,
+    target: Line,
+    state: State,
+    kinks: np.ndarray,
+    twist: Floats,
+    clamps: Sequence[Clamp | None] = (None, None),
 ) -> Remapped:
     """Carry a state from one layout to another of the same base.
 
-    line, target: the old and the new line; kinks: (n+1,) bool, base nodes where the tangent may jump (point loads);
-    twist: (n,) 1/m, twist to give to the frames of base cells that become rod.
+    line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
+    loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
+    tangent of what holds the twist of the two ends, None: nothing does.
     """
     out = blank_state(target.h.size)
     now, then = old.first, new.first
@@ -46,10 +59,9 @@ def remap(
     for a, b in ((state.e, out.e), (state.T, out.T), (state.a1, out.a1), (state.w, out.w)):
         b[kept_new] = a[kept_old]
     out.wa[kept_new], out.wd[kept_new] = state.wa[kept_old], state.wd[kept_old]
-    # tension where cells are new, from the middles of the old ones
     new_cells = np.repeat(changed, new.counts)
-    middles, new_middles = 0.5 * (line.s[:-1] + line.s[1:]), 0.5 * (target.s[:-1] + target.s[1:])
-    out.T[new_cells] = np.interp(new_middles[new_cells], middles, state.T)
+    middles = 0.5 * (target.s[:-1] + target.s[1:])
+    out.T[new_cells] = _tension(middles[new_cells], line.s, state.T, old.base[kinks])
     # new nodes on a cubic
     smooth = [(a, b, _slopes(a, line.s, now, kinks)) for a, b in zip(_nodal(state)[:4], _nodal(out)[:4], strict=True)]
     for j in np.flatnonzero(changed & new.rod):
@@ -61,8 +73,8 @@ def remap(
         out.slip[inner] = (1 - x)[:, None] * state.slip[now[j]] + x[:, None] * state.slip[now[j + 1]]
     chords = np.diff(out.r, axis=0)
     out.e[new_cells] = chords[new_cells]
-    _momentum(new, line, target, state, out, changed)
-    _frames(new, changed, out, target, twist)
+    _momentum(old, new, line, target, state, out, changed)
+    _frames(new, changed, out, target, twist, clamps)
     lengths = line_lengths(out, target, new_cells, line, kept_old, kept_new)
     return Remapped(out, lengths)
 
@@ -112,46 +124,79 @@ def _hermite(x: Floats, a: Floats, b: Floats, ma: Floats, mb: Floats) -> Floats:
     )
 
 
-def _momentum(new: Layout, line: Line, target: Line, state: State, out: State, changed: np.ndarray) -> None:
-    """Make the linear momentum what it was: one shift of velocity for the inner nodes of every changed stretch.
+def _tension(at: Floats, s: Floats, T: Floats, kinks: Floats) -> Floats:
+    """Tension at places, m, from that of cells: linear between their middles and to where it may jump."""
+    out = np.empty(at.size)
+    bounds = np.unique(np.searchsorted(s, np.concatenate([s[:1], kinks, s[-1:]]) - ROUND * s[-1]))
+    for a, b in pairwise(bounds):
+        x, y = 0.5 * (s[a:b] + s[a + 1 : b + 1]), T[a:b]
+        if b - a > 1:
+            first = y[0] - (y[1] - y[0]) / (x[1] - x[0]) * (x[0] - s[a])
+            last = y[-1] + (y[-1] - y[-2]) / (x[-1] - x[-2]) * (s[b] - x[-1])
+            first, last = (v if v * w > 0.0 else w for v, w in ((first, y[0]), (last, y[-1])))  # no slack out of nothing
+            x, y = np.concatenate([s[a : a + 1], x, s[b : b + 1]]), np.concatenate([[first], y, [last]])
+        here = (at > s[a]) & (at < s[b])
+        out[here] = np.interp(at[here], x, y)
+    return out
+
+
+def _momentum(
+    old: Layout, new: Layout, line: Line, target: Line, state: State, out: State, changed: np.ndarray
+) -> None:
+    """Make the linear momentum of every changed stretch what it was, by one shift of velocity of its inner nodes.
 
     Nodes at the edge of a stretch are left alone, or cells beyond it would be pulled at their length; what is
-    then missing (a stretch without inner nodes) is a shift of the whole line.
+    then missing (of a stretch without inner nodes) is a shift of the whole line.
     """
-    missing = line.mass @ state.v - target.mass @ out.v
-    inner = np.zeros(target.mass.size, bool)
-    bounds = edges(changed)
-    for a, b in pairwise(bounds):
+    missing = np.zeros(3)
+    for a, b in pairwise(edges(changed)):
         if changed[a]:
-            inner[int(new.first[a]) + 1 : int(new.first[b])] = True
-    if inner.any():
-        out.v[inner] += missing / target.mass[inner].sum()
-    else:
+            was, now = (slice(int(x.first[a]), int(x.first[b]) + 1) for x in (old, new))
+            less = line.mass[was] @ state.v[was] - target.mass[now] @ out.v[now]
+            inner = slice(now.start + 1, now.stop - 1)
+            if inner.stop > inner.start:
+                out.v[inner] += less / target.mass[inner].sum()
+            else:
+                missing += less
+    if missing.any():
         out.v[1:-1] += missing / target.mass[1:-1].sum()
 
 
-def _frames(new: Layout, changed: np.ndarray, out: State, target: Line, twist: Floats) -> None:
-    """First directors of rod cells that are new: carried on without twist from those that were there."""
+def _frames(
+    new: Layout, changed: np.ndarray, out: State, target: Line, twist: Floats, clamps: Sequence[Clamp | None]
+) -> None:
+    """First directors of rod cells that are new: carried on from those that were there, and from clamps."""
     rod, fresh, base = new.rod_cells, np.repeat(changed, new.counts), new.base_of_cell
     d = out.e / np.linalg.norm(out.e, axis=1)[:, None]
+    step = twist[base] * target.h  # from cell to cell, rad
+
     for a, b in pairwise(edges(rod)):
         if not rod[a]:
             continue
-        known = [c for c in range(a, b) if not fresh[c]]
+        known = [(c, out.a1[c], d[c]) for c in range(a, b) if not fresh[c]]
+        if a == 0 and clamps[0] is not None:
+            known.insert(0, (-1, *clamps[0]))
+        if b == rod.size and clamps[1] is not None:
+            known.append((b, *clamps[1]))
         if not known:
             out.a1[a] = _across(d[a])
-            known = [a]
-        for c in range(known[0] - 1, a - 1, -1):
-            out.a1[c] = _turned(_carried(out.a1[c + 1], d[c + 1], d[c]), d[c], -twist[base[c]] * target.h[c])
-        for left, right in zip(known, [*known[1:], b], strict=True):
-            for c in range(left + 1, min(right, b)):
-                out.a1[c] = _turned(_carried(out.a1[c - 1], d[c - 1], d[c]), d[c], twist[base[c]] * target.h[c])
-            if right < b and right > left + 1:  # two old rods meet: spread what is left of the twist between them
-                closing = _carried(out.a1[right - 1], d[right - 1], d[right])
-                angle = np.arctan2(np.cross(closing, out.a1[right]) @ d[right], closing @ out.a1[right])
-                gap = right - left
+            known = [(a, out.a1[a], d[a])]
+        c, director, tangent = known[0]
+        for c in range(c - 1, a - 1, -1):
+            director = _turned(_carried(director, tangent, d[c]), d[c], -step[c])
+            tangent, out.a1[c] = d[c], director
+        for (left, director, tangent), after in zip(known, [*known[1:], None], strict=True):
+            right = after[0] if after else b
+            for c in range(left + 1, right):
+                # a clamp is half a cell from its neighbour
+                turn = step[c] * (0.5 if left < 0 and c == 0 else 1.0)
+                director, tangent = _turned(_carried(director, tangent, d[c]), d[c], turn), d[c]
+                out.a1[c] = director
+            if after and right > left + 1:  # what is left of the twist is spread
+                closing = _carried(director, tangent, after[2])
+                angle = np.arctan2(np.cross(closing, after[1]) @ after[2], closing @ after[1])
                 for k, c in enumerate(range(left + 1, right), start=1):
-                    out.a1[c] = _turned(out.a1[c], d[c], angle * k / gap)
+                    out.a1[c] = _turned(out.a1[c], d[c], angle * k / (right - left))
 
 
 def _across(d: Floats) -> Floats:

@@ -115,7 +115,7 @@ def build(scene: Scene) -> Model:
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    line = line_on(cable, s, rod, touch, sections_turn=layout is None)
+    line = line_on(cable, s, rod, touch, sections_turn=layout is None or all_rod(scene, layout))
     h, compliance = line.h, line.ck
 
     start = blank_state(n)
@@ -157,6 +157,22 @@ def build(scene: Scene) -> Model:
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
 # over which a cable without tension bends under its weight; the most rod cells in a base cell.
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
+
+
+def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
+    """(n,) of base cells: 1 where the scene wants rod whatever comes, -1 where catenary, else 0."""
+    assert isinstance(scene.model, AdaptiveModel)
+    middle = 0.5 * (layout.base[:-1] + layout.base[1:])
+    given = np.zeros(middle.size, int)
+    for stretches, sign in ((scene.model.always_catenary, -1), (scene.model.always_rod, 1)):
+        for a, b in stretches or ():
+            given[(middle > a) & (middle < b)] = sign
+    return given
+
+
+def all_rod(scene: Scene, layout: Layout) -> bool:
+    """Whether zones that may move never will, because the scene wants rod everywhere."""
+    return bool((given_zones(scene, layout) > 0).all())
 
 
 def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:

@@ -11,7 +11,8 @@ Layout, format 1 (`record` writes it)::
     /steps/*                        one row per time step; its first column is the scale
     /zones/{t,output,kind,s_a,s_b}  one row per zone, written only when the zones change;
                                     they hold from output number `output` on
-    /events/{t,s_a,s_b,kind,text}   one row per event
+    /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
+    /events/{criterion,value,threshold,energy}
     /scene                          the scene, as YAML text
 
 A table grows by whole rows and its dimension scale grows last, so the length of the
@@ -54,13 +55,21 @@ class Zone(NamedTuple):
 
 
 class Event(NamedTuple):
-    """Something that happened at time t (s) on s_a <= s <= s_b (m), and why."""
+    """Something that happened at time t (s) on s_a <= s <= s_b (m), and why.
+
+    Of a change of zones also: the criterion, its value and threshold, and the energy (J) that all changes of this
+    moment put in, on the first of them.
+    """
 
     t: float
     s_a: float
     s_b: float
     kind: str
     text: str
+    criterion: str = ""
+    value: float | None = None
+    threshold: float | None = None
+    energy: float | None = None  # J
 
 
 class UnknownName(ResultError, AttributeError):
@@ -269,8 +278,8 @@ class Result:
     def events(self) -> list[Event]:
         """What happened and why, in the order of time."""
         table = self._groups["events"]
-        rows = zip(*(table[k].tolist() for k in Event._fields), strict=True)
-        return [Event(*row) for row in rows]
+        rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
+        return [Event(*(None if x != x else x for x in row)) for row in rows]  # NaN: there is none
 
     @property
     def scene_text(self) -> str:

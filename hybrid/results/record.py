@@ -21,7 +21,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
-from math import isfinite
+from math import isfinite, nan
 from pathlib import Path
 from time import monotonic
 from types import TracebackType
@@ -81,6 +81,10 @@ _EVENTS = (
     Field("s_b", "m", "end of the stretch concerned, unstretched arc length"),
     Field("kind", "", "kind of the event", dtype=_KIND),
     Field("text", "", "what happened and why", dtype=_TEXT),
+    Field("criterion", "", "of a change of zones: the criterion that asks for it, or held the rod longest", dtype=_KIND),
+    Field("value", "", "what that criterion has there: its ratio", nan_ok=True),
+    Field("threshold", "", "above which it asks, or below which it lets go", nan_ok=True),
+    Field("energy", "J", "energy that all changes of zones at this moment put in, on the first of them", nan_ok=True),
 )
 
 
@@ -206,11 +210,23 @@ class Recorder:
         if len(self._steps.rows) >= _BLOCK:
             self.flush()
 
-    def event(self, t: float, s_a: float, s_b: float, kind: str, text: str) -> None:
-        """Note that something happened at time t (s) on s_a <= s <= s_b (m), and why."""
+    def event(
+        self,
+        t: float,
+        s_a: float,
+        s_b: float,
+        kind: str,
+        text: str,
+        *,
+        criterion: str = "",
+        value: float = nan,
+        threshold: float = nan,
+        energy: float = nan,
+    ) -> None:
+        """Note that something happened at time t (s) on s_a <= s <= s_b (m), and why; the rest: of changes of zones."""
         if not (isfinite(t) and isfinite(s_a) and isfinite(s_b)):
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
-        self._events.rows.append((t, s_a, s_b, kind, text))
+        self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
 
     def flush(self) -> None:
         """Write what is held back, for readers to see."""

@@ -31,7 +31,13 @@ COLOURS = {
 _UNSEEN = "#D9D9D9"
 _DECADES = 2.0  # of curvature, at most: what is a hundred times straighter than the tightest bend is straight
 _SPAN = 10.0  # a curvature that varies by more is shown by its logarithm
-_MARKS = {"split": ("^", "white"), "merge": ("v", "#9E9E9E"), "retry": ("X", ALARM)}
+_MARKS = {
+    "split": ("^", "white"),
+    "grow": ("+", "white"),
+    "shrink": ("x", "#9E9E9E"),
+    "merge": ("v", "#9E9E9E"),
+    "retry": ("X", ALARM),
+}
 _MOST_MARKS = 250  # more would hide the zones
 _SAME = 1e-12  # of the length: places so close are one, as they are to the recorder
 

@@ -15,6 +15,7 @@ from problems import Scene, clamped, pinned, scene
 
 from hybrid import run
 from hybrid.adapt.manager import FLOOR
+from hybrid.adapt.table import CRITERIA
 from hybrid.results.read import Event, Result
 
 Floats = np.ndarray
@@ -23,7 +24,7 @@ LENGTH, CELLS, EI = 10.0, 50, 0.64
 CELL = LENGTH / CELLS
 DWELL = 0.5
 FLOORED = FLOOR * (EI * (1.0 * GRAVITY) ** 2) ** (1 / 3)  # N, for a cable of 1 kg/m
-OFF = {"slack": 0.5, "bend": 0.25, "point": 0.25, "clamp": 0.25, "edge": 0.25}
+OFF = {x.name: x.off for x in CRITERIA}
 
 
 def breathing(
@@ -195,8 +196,21 @@ def kink(result: Result, tolerance: float, node: int, floor: float) -> Floats:
     return np.sqrt(EI / np.maximum(at_nodes(result)[:, node], floor)) * angle / tolerance
 
 
-def of_kind(result: Result, kind: str) -> list[Event]:
-    return [e for e in result.events if e.kind == kind]
+COMES, GOES = ("split", "grow", "retry"), ("merge", "shrink")
+
+
+def comes(result: Result) -> list[Event]:
+    """Where a rod comes."""
+    return [e for e in result.events if e.kind in COMES]
+
+
+def goes(result: Result) -> list[Event]:
+    """Where a rod goes."""
+    return [e for e in result.events if e.kind in GOES]
+
+
+def changes(result: Result) -> list[Event]:
+    return [e for e in result.events if e.kind in COMES + GOES]
 
 
 def rods(result: Result, output: int) -> list[tuple[float, float]]:

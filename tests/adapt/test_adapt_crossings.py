@@ -14,6 +14,7 @@ import pytest
 from adapt_scenes import (
     CELL,
     CELLS,
+    COMES,
     DWELL,
     EI,
     FLOORED,
@@ -28,7 +29,9 @@ from adapt_scenes import (
     kink,
     kinking,
     nodding,
-    of_kind,
+    changes,
+    comes,
+    goes,
     output_at,
     ran,
     rods,
@@ -89,7 +92,7 @@ def buffers(result: hybrid.Result, output: int) -> Floats:
 def test_on(name):
     """No earlier than something asks, and no later; there, and no further than the buffer and the shortest zone."""
     result = ran(name)
-    first = of_kind(result, "split")[0]
+    first = comes(result)[0]
     k = output_at(result, first.t)
     all_ = ratios(result, name)
     loud = np.max(list(all_.values()), axis=0)
@@ -100,8 +103,8 @@ def test_on(name):
     if name == "slack":  # what is weighed is the tension ahead: to the digits in a catenary
         T = tensions(result)[:k].min(axis=1)
         T = np.append(T, 2 * T[-1] - T[-2])  # at the step of the switch, where outputs show the new cells
-        weighed = FLOORED / (T[1:] + min(HORIZON * DWELL / DT, 2.0) * np.minimum(np.diff(T), 0.0))
-        assert (weighed[:-1] <= 1.0 + 1e-6).all() and weighed[-1] > 0.95
+        weighed = FLOORED / (T[1:] + HORIZON * DWELL / DT * np.minimum(np.diff(T), 0.0))
+        assert (weighed[:-1] <= 1.0 + 1e-6).all() and weighed[-1] > 0.9
     assert at.max() > 0.9 or name == "slack"
     assert all_[name][k - 1].max() == loud[k - 1].max()  # no other was nearer
     hot = np.flatnonzero(at.max(axis=0) > 0.98 * at.max())
@@ -122,7 +125,7 @@ def test_on_at_a_clamp():
     angle = yaw * x**3 * (10 - 15 * x + 6 * x * x)
     ratio = np.sqrt(EI / T) * 2 * np.sin(np.abs(angle) / 2) / 0.015
     assert rods(result, 0) == [] and ratio.max() > 1.3
-    split = of_kind(result, "split")
+    split = comes(result)
     assert split, "a catenary at a clamp must ask to become a rod when the clamp turns"
     k = output_at(result, split[0].t)
     assert split[0].text.startswith("clamp") and split[0].s_a == 0.0
@@ -132,7 +135,7 @@ def test_on_at_a_clamp():
 def test_on_where_a_cable_leaves_the_bed():
     """The rod begins about the edge of contact, where bend and edge are the same length EI w/T^2."""
     result = ran("edge")
-    first = of_kind(result, "split")[0]
+    first = comes(result)[0]
     assert first.text.startswith(("edge", "bend"))
     k = output_at(result, first.t)
     edge = result.touchdown[k][1]
@@ -167,7 +170,7 @@ def test_off(name):
     """
     result = ran(name)
     least, most = (np.max([x / OFF[k] for k, x in ratios(result, name, m).items()], axis=0) for m in (False, True))
-    merges = of_kind(result, "merge")
+    merges = goes(result)
     for e in merges:
         j = slice(round(e.s_a / CELL), round(e.s_b / CELL))
         # while bending goes, which takes a dwell at most, it may be anything below 1 again
@@ -183,11 +186,13 @@ def test_off(name):
 
 @pytest.mark.parametrize("name", SCENES)
 def test_every_event_says_why(name):
-    for e in of_kind(ran(name), "split"):
-        assert (e.text.split()[0] in (*OFF, "closes") and "J" in e.text) or ">" in e.text or "gap" in e.text
-    for e in of_kind(ran(name), "merge"):
-        word, ratio, _, off = e.text.split()[:4]
-        assert float(ratio) <= float(off) == OFF[word], e.text
+    events = changes(ran(name))
+    for e in comes(ran(name)):
+        assert e.text == "closes a gap" or e.kind == "retry" or (e.value > e.threshold == 1.0 and e.text.startswith(e.criterion))
+    for e in goes(ran(name)):
+        assert e.value < 1.0 and e.threshold == OFF[e.criterion] and e.criterion in e.text
+    booked = sum(e.energy for e in events)
+    assert np.isfinite(booked) and (booked != 0.0 or not events)
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -195,13 +200,13 @@ def test_zones_are_what_events_say(name):
     """Zones at every output are those at the start with all splits and merges since."""
     result = ran(name)
     flags = flags_of(rods(result, 0))
-    events = [e for e in result.events if e.kind in ("split", "merge")]
+    events = changes(result)
     for k, t in enumerate(result.times):
         while events and events[0].t <= t + 1e-9:
             e = events.pop(0)
             a, b = round(e.s_a / CELL), round(e.s_b / CELL)
-            assert (flags[a:b] == (e.kind == "merge")).all(), e
-            flags[a:b] = e.kind == "split"
+            assert not (flags[a:b] == (e.kind in COMES)).all(), e
+            flags[a:b] = e.kind in COMES
         assert (flags_of(rods(result, k)) == flags).all(), t
     assert not events
 
@@ -239,7 +244,7 @@ def test_a_rod_grows_no_further_than_the_motion_asks(name):
 
 def test_a_stress_wave_is_no_slack():
     """A clump's corner becomes a bend in a taut cable: nothing is near the floor, so nothing but the corner asks."""
-    asked = {e.text.split()[0] for e in of_kind(ran("point"), "split")}
+    asked = {e.text.split()[0] for e in comes(ran("point"))}
     assert asked <= {"point", "bend", "closes"}, asked
     assert tensions(ran("point", "rod")).min() > 10.0  # the floor is 0.9 N
 
@@ -248,7 +253,7 @@ def test_a_stress_wave_is_no_slack():
 def test_counted_from_the_other_end(name):
     """The same scene with its ends swapped: the same events at mirrored places, the same tensions."""
     one, other = ran(name), hybrid.run(swapped(SCENES[name]()))
-    switches = [[e for e in x.events if e.kind in ("split", "merge")] for x in (one, other)]
+    switches = [changes(x) for x in (one, other)]
     straight = sorted((round(e.t, 6), e.kind, round(e.s_a, 6), round(e.s_b, 6)) for e in switches[0])
     mirrored = sorted((round(e.t, 6), e.kind, round(LENGTH - e.s_b, 6), round(LENGTH - e.s_a, 6)) for e in switches[1])
     assert [x[:2] for x in mirrored] == [x[:2] for x in straight]
@@ -275,7 +280,7 @@ def same(one: hybrid.Result, other: hybrid.Result) -> None:
     assert np.abs(one.position - other.position).max() < 1e-7 * LENGTH
     assert np.abs(one.tension - other.tension).max() < 1e-6 * np.abs(other.tension).max()
     assert np.abs(one["energy/kinetic"] - other["energy/kinetic"]).max() < 1e-6 * other["energy/kinetic"].max()
-    assert not [e for e in one.events if e.kind in ("split", "merge")]
+    assert not changes(one)
     assert not one["work/zones"].any()
 
 
@@ -312,7 +317,7 @@ def test_rotary_inertia_is_kept():
 def test_what_the_scene_gives_is_so():
     """always_rod in a cable that asks for nothing, always_catenary where it bends: at every output, to the base cell."""
     result = hybrid.run(bending(model={"always_rod": [[1.0, 2.0]], "always_catenary": [[4.0, 4.6]]}))
-    assert of_kind(result, "split")
+    assert comes(result)
     for k in range(len(result.times)):
         flags = flags_of(rods(result, k))
         assert flags[5:10].all() and not flags[20:23].any()
@@ -330,7 +335,7 @@ def test_at_rest_nothing_happens(scene, nearer):
     what["time"]["duration"] = 1.0
     result = hybrid.run(Scene.model_validate(what))
     assert rods(result, 0) not in ([], [(0.0, LENGTH)])
-    assert not [e for e in result.events if e.kind in ("split", "merge")]
+    assert not changes(result)
     assert np.abs(result["work/zones"]).max() < 1e-12
     assert np.abs(result.position - result.position[0]).max() < 1e-6
 
@@ -339,7 +344,7 @@ def test_at_rest_nothing_happens(scene, nearer):
 def test_no_catenary_is_ever_slack(period, step):
     """Thrown together in half a second: every cell is a rod before it loses its tension, or the step is repeated so."""
     result = hybrid.run(breathing(5.0, 2.2, {"tolerance": 0.1}, period=period, duration=2 * period, step=step))
-    assert of_kind(result, "split")
+    assert comes(result)
     T = tensions(result)
     for k in range(len(result.times)):
         assert (T[k] > 0.0)[~flags_of(rods(result, k))].all(), result.times[k]
@@ -355,7 +360,7 @@ def test_a_rod_may_begin_at_any_clamp(normal):
     bending moment of 5 N m.
     """
     result = hybrid.run(easing(normal))
-    assert any(e.s_a == 0.0 for e in of_kind(result, "split"))
+    assert any(e.s_a == 0.0 for e in comes(result))
     assert np.abs(result.torque).max() < 0.05
     assert np.abs(result.torque).max(axis=(1))[-1] < 1e-6
 
@@ -363,4 +368,4 @@ def test_a_rod_may_begin_at_any_clamp(normal):
 def test_a_clamp_that_nods_and_a_cable_that_does_not_care():
     """Within a tolerance that allows the bend at the clamp, nothing switches: the catenary is what is asked for."""
     result = hybrid.run(nodding(model={"tolerance": 0.01}))
-    assert rods(result, 0) == [] and not of_kind(result, "split")
+    assert rods(result, 0) == [] and not comes(result)

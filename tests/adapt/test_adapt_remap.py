@@ -93,7 +93,7 @@ def stays(old, new):
 def test_what_stays_stays_to_the_last_bit(switch):
     """Base nodes do not move; nodes and cells of base cells that do not change keep everything.
 
-    Velocities of kept nodes are an exception, and a documented one, where no stretch that changes has inner nodes to
+    Velocities of kept nodes are an exception, and a documented one, where a stretch that changes has no inner nodes to
     take up the momentum: all then move together, and that shift is the same for all.
     """
     what, old, line, state = made(switch)
@@ -109,7 +109,7 @@ def test_what_stays_stays_to_the_last_bit(switch):
         assert (getattr(new_, name)[new_nodes] == getattr(state, name)[nodes]).all(), name
     assert (out.lengths[new_cells] == line.h[cells]).all()
     cuts = edges(old.rod == new.rod)
-    inner = any(old.rod[a] != new.rod[a] and new.first[b] - new.first[a] > 1 for a, b in pairwise(cuts))
+    inner = all(old.rod[a] == new.rod[a] or new.first[b] - new.first[a] > 1 for a, b in pairwise(cuts))
     shift = new_.v[new_nodes] - state.v[nodes]
     if inner:
         assert not shift.any()
@@ -143,9 +143,10 @@ def test_new_cells_have_the_tension_that_was_there(switch):
     fresh = np.repeat(old.rod != new.rod, new.counts)
     new_middle = 0.5 * (target.s[:-1] + target.s[1:])
     kinks = what.at.size
+    between = fresh & (new_middle > middle[0]) & (new_middle < middle[-1])  # beyond, on the same line
     if not kinks:
-        assert out.state.T[fresh] == pytest.approx(np.interp(new_middle, middle, state.T)[fresh], rel=ROUND)
-    assert (state.T.min() - ROUND <= out.state.T).all() and (state.T.max() + ROUND >= out.state.T).all()
+        assert out.state.T[between] == pytest.approx(np.interp(new_middle, middle, state.T)[between], rel=ROUND)
+    assert (out.state.T > 0.0).all()
     l = np.linalg.norm(np.diff(out.state.r, axis=0), axis=1)
     if switch[-1] is None:
         assert out.lengths[fresh] == pytest.approx(l[fresh], rel=ROUND)

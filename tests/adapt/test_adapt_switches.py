@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from adapt_scenes import CELL, DWELL, LENGTH, of_kind, output_at, ran, sagging
+from adapt_scenes import CELL, DWELL, LENGTH, changes, comes, goes, output_at, ran, sagging
 
 import hybrid
 
@@ -17,13 +17,13 @@ PULLS = ("pull_start", "pull_end")
 
 
 def switches(result: hybrid.Result) -> list[float]:
-    return sorted({e.t for e in result.events if e.kind in ("split", "merge")})
+    return sorted({e.t for e in changes(result)})
 
 
 @pytest.mark.parametrize("name", BUSY)
 def test_there_are_switches(name):
     """These scenes are a test: zones come and go."""
-    assert of_kind(ran(name), "split") and of_kind(ran(name), "merge")
+    assert comes(ran(name)) and goes(ran(name))
 
 
 @pytest.mark.parametrize("name", BUSY)
