@@ -170,7 +170,7 @@ class Motion:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= self.spare.T))
             why = "a step would have left it a catenary without tension; the step is repeated"
         else:
-            cells = np.array([min(max(taken.where, 0), self.model.cells - 1)])
+            cells = self.zoning.manager.near_asking(min(max(taken.where, 0), self.model.cells - 1))
             why = f"a step failed here ({taken.outcome.cause}); it is repeated"
             rescues *= MOST_RESCUES  # once; after that, a smaller step
         if rescues >= MOST_RESCUES or not cells.size:

@@ -223,9 +223,7 @@ def _first_zones(
     manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0)
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":
-        model, equilibrium = first_zones(model, manager, t)
-        assert model.layout is not None
-        manager.follow(model.layout)
+        model, equilibrium = first_zones(model, manager, t, _equilibrium(scene, model, t))
     return model, equilibrium, Zoning(model, manager)
 
 

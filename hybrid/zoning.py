@@ -24,6 +24,8 @@ LETTING_GO = 1.0
 # Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 DWELL, LEAST_DWELL = 0.25, 20
 NONE = np.zeros(0, int)
+# Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
+STRICTER = (1.0, 0.5, 0.25)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
 
@@ -65,32 +67,60 @@ def on_layout(model: Model, layout: Layout) -> Model:
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
-def first_zones(model: Model, manager: DomainManager, t: float) -> tuple[Model, Equilibrium]:
-    """Zones for an equilibrium, and the equilibrium: all rod first, then rod where the criteria ask for it."""
-    found = _equilibrium(model, t, model.start)
+def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:
+    """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
+
+    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than the tolerance (criteria are estimates, and a cable lying
+    slack has many equilibria) more becomes rod, in the end all.
+    """
     assert model.layout is not None
-    fine, full = model.layout.nodes, found.state
+    allowed = manager.tolerance
+    try:
+        for part in STRICTER:
+            manager.follow(model.layout)
+            manager.tolerance = part * allowed
+            answer = _zones_within(model, found, manager, t)
+            if answer is None:
+                break
+            if _apart(found.state, model.layout, answer) <= allowed:
+                return answer
+    finally:
+        manager.tolerance = allowed
+    manager.follow(model.layout)
+    return model, found
+
+
+def _zones_within(
+    model: Model, found: Equilibrium, manager: DomainManager, t: float
+) -> tuple[Model, Equilibrium] | None:
+    """Zones that satisfy the criteria in their own equilibrium; None: all rod, or there is no such equilibrium."""
+    assert model.layout is not None
+    full = found.state
     manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
     rod = manager.first(full)
-    best = (model, found)
-    if rod.all():
-        return best
     for _ in range(MOST_ROUNDS):
+        if rod.all():
+            return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
         try:
-            answer = _equilibrium(new, t, _picked(full, fine, new.line))
-        except ComputationError:  # with fewer rods there is none: the one with rods everywhere is right as well
-            manager.follow(model.layout)
-            return model, found
+            answer = _equilibrium(new, t, _picked(full, model.layout.nodes, new.line))
+        except ComputationError:
+            return None
         manager.follow(layout)
         manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
         more = rod | manager.first(answer.state)
-        best = (new, answer)
         if (more == rod).all():
-            return best
+            return new, answer
         rod = more
-    return best
+    return None
+
+
+def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium]) -> float:
+    """Largest distance, m, of base nodes between the equilibrium of a rod and another."""
+    other = answer[0].layout
+    assert other is not None
+    return float(np.linalg.norm(full.r[layout.first] - answer[1].state.r[other.first], axis=1).max())
 
 
 def _equilibrium(model: Model, t: float, start: State) -> Equilibrium:

@@ -187,6 +187,13 @@ class DomainManager:
         loud = ~(self.ratios <= HARD).all(axis=0) & ~self.layout.rod & (self.given >= 0)
         return np.flatnonzero(loud[self.base_of_cell])
 
+    def near_asking(self, cell: int) -> np.ndarray:
+        """Cells about one where a step failed in which more rod may be the cure: some criterion is above its `off`."""
+        j = self.base_of_cell[cell]
+        near = np.arange(max(j - 1, 0), min(j + 2, self.layout.rod.size))
+        asks = ~(self.ratios[:, near] <= OFF[:, None]).all(axis=0) & ~self.layout.rod[near]
+        return np.flatnonzero(np.isin(self.base_of_cell, near[asks]))
+
     # --- proposing -----------------------------------------------------------------------------
 
     def due(self, t: float) -> bool:
@@ -197,8 +204,9 @@ class DomainManager:
         """What should change now, after the ratios since the last review; None most of the time."""
         rod = self.layout.rod
         self._complete()
-        stays = rod & ~self.leaving
-        next_, self.calm_since = planned(self.ratios, stays, self.calm_since, t, self.layout.base, self.rules(state))
+        next_, self.calm_since = planned(
+            self.ratios, rod, self.calm_since, t, self.layout.base, self.rules(state), self.leaving
+        )
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
         self.going = bool(self.leaving.any())

@@ -26,6 +26,7 @@ class Rules(NamedTuple):
 
 OFF = np.array([x.off for x in CRITERIA])
 ROUND = 1e-12  # of a length
+BACK = 0.5  # ratio above which a rod that is on its way out comes back
 
 
 def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
@@ -43,13 +44,23 @@ def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
 
 
 def planned(
-    ratios: Floats, rod: np.ndarray, calm_since: Floats, t: float, base: Floats, rules: Rules
+    ratios: Floats,
+    rod: np.ndarray,
+    calm_since: Floats,
+    t: float,
+    base: Floats,
+    rules: Rules,
+    leaving: np.ndarray | None = None,
 ) -> tuple[np.ndarray, Floats]:
     """What the base cells should be, and since when (s) each rod has been calm (infinity: it is not).
 
-    rod: (n,) what they are; calm_since: (n,) from the last review.
+    rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
+    whose curvature rises for that reason alone: they are kept only above BACK.
     """
-    keeps = spread(wanted(ratios, rod), base, rules.buffer)
+    holds = wanted(ratios, rod)
+    if leaving is not None:
+        holds = np.where(leaving, ~(ratios <= BACK).all(axis=0), holds)
+    keeps = spread(holds, base, rules.buffer)
     grows = spread(wanted(ratios, np.zeros_like(rod)), base, rules.buffer)
     calm = np.where(rod & ~keeps, np.minimum(calm_since, t), np.inf)
     goes = rod & (t - calm >= rules.dwell)

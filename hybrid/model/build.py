@@ -115,7 +115,7 @@ def build(scene: Scene) -> Model:
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    line = line_on(cable, s, rod, touch, sections_turn=layout is None or all_rod(scene, layout))
+    line = line_on(cable, s, rod, touch)
     h, compliance = line.h, line.ck
 
     start = blank_state(n)
@@ -168,11 +168,6 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
         for a, b in stretches or ():
             given[(middle > a) & (middle < b)] = sign
     return given
-
-
-def all_rod(scene: Scene, layout: Layout) -> bool:
-    """Whether zones that may move never will, because the scene wants rod everywhere."""
-    return bool((given_zones(scene, layout) > 0).all())
 
 
 def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:
