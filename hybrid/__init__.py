@@ -16,6 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from hybrid.adapt.manager import Look
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.model.plan import plan
     from hybrid.results.plot import plot_summary as plot
@@ -29,6 +30,7 @@ if TYPE_CHECKING:
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
+    "Look": ("hybrid.adapt.manager", "Look"),
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.results.read", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
@@ -49,6 +51,7 @@ _HOME = {
 __all__ = [
     "ComputationError",
     "HybridError",
+    "Look",
     "Outcome",
     "Result",
     "ResultError",

@@ -62,6 +62,8 @@ class Motion:
             self.state = equilibrium.state.copy()
             self.watch.equilibrium(equilibrium)
         self._ignite()
+        if self.zoning is not None:
+            self.zoning.begin(model.ends.values, self.state)
         self.spare = self.state.copy()
         self.power = self._powers()
         self._look(self.watch.still(model.ends.values, self.state))
@@ -89,6 +91,8 @@ class Motion:
             elif taken.outcome == Outcome.OK:
                 self._accept(taken, end, repeats, wasted)
                 wasted = rescues = 0
+            elif self.zoning is not None and 0.5 * dt < smallest and self._all_rod(taken):
+                dt, wasted = until - self.t, wasted + taken.iterations
             elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
                 # A slack catenary is no matter of the step: its answer would be grid noise at any dt.
                 self._stop(taken, end - self.t)
@@ -111,7 +115,8 @@ class Motion:
             self.observer = self.observer.on(self.model.line, self.model.sea.values, self.model.zones)
             self._stale = False
         ends = self.model.ends.at(self.t)
-        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work))
+        ratios = self.zoning.manager.told if self.zoning is not None else None
+        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios)
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
         self.watch.mesh(self.t, self.state)
@@ -176,6 +181,16 @@ class Motion:
         if rescues >= MOST_RESCUES or not cells.size:
             return False
         change = self.zoning.manager.insist(cells, why)
+        if (change.rod == self.zoning.manager.layout.rod).all():
+            return False
+        self._switch(change)
+        return True
+
+    def _all_rod(self, taken: Taken) -> bool:
+        """The last resort of a step that fails however small: rod wherever the scene lets it be; False if it is."""
+        assert self.zoning is not None
+        why = f"steps fail here, however small ({taken.outcome.cause}); repeated with rods everywhere"
+        change = self.zoning.manager.insist(np.arange(self.model.cells), why)
         if (change.rod == self.zoning.manager.layout.rod).all():
             return False
         self._switch(change)

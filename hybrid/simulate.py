@@ -17,6 +17,8 @@ from pathlib import Path
 
 import numpy as np
 
+from hybrid.adapt.manager import UserCriterion
+from hybrid.adapt.table import CRITERIA
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones
 from hybrid.model.mesh import Zone
@@ -70,12 +72,14 @@ def run(
     *,
     progress: bool | Callable[[Progress], None] = False,
     overwrite: bool = True,
+    criterion: UserCriterion | None = None,
 ) -> Result:
     """Integrate a scene over its duration.
 
     output: the HDF5 file to write; None keeps the result in memory.  progress: True for a
     live line, or a function called about ten times a second.  overwrite: replace an
-    existing result (never another program's file).
+    existing result (never another program's file).  criterion: for zones that move, one more: it gets a
+    `hybrid.Look` at every step and gives a number (N+1,) per node, 1 or more where the cable must be a rod.
 
     Raises SceneError when the scene is refused and ComputationError when the computation
     stops; what was computed until then is in the file, and the last good state beside it.
@@ -89,8 +93,10 @@ def run(
         return run_shooting(scene, output, overwrite)
     model = build(scene)
     zoning = None
+    if criterion is not None and model.layout is None:
+        raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     if model.layout is not None:
-        model, equilibrium, zoning = _first_zones(scene, model, 0.0)
+        model, equilibrium, zoning = _first_zones(scene, model, 0.0, criterion)
     else:
         equilibrium = _equilibrium(scene, model, 0.0) if scene.initial.kind == "equilibrium" else None
     outputs = output_times(scene)
@@ -104,6 +110,7 @@ def run(
         True,
         model.attached,
         kinds,
+        [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria else (),
     )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
@@ -167,7 +174,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
     if model.layout is not None:
-        model, equilibrium, _ = _first_zones(scene, model, np.inf, at_rest=True)
+        model, equilibrium, _ = _first_zones(scene, model, np.inf, None, at_rest=True)
         assert equilibrium is not None
         found = equilibrium
     else:
@@ -214,17 +221,17 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
 
 
 def _first_zones(
-    scene: Scene, model: Model, t: float, at_rest: bool = False
+    scene: Scene, model: Model, t: float, criterion: UserCriterion | None, at_rest: bool = False
 ) -> tuple[Model, Equilibrium | None, Zoning]:
     """Zones, equilibrium if one is asked for, and what will move the zones."""
     asked = scene.model
     assert isinstance(asked, AdaptiveModel) and model.layout is not None
     given = given_zones(scene, model.layout)
-    manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0)
+    manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0, criterion)
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t, _equilibrium(scene, model, t))
-    return model, equilibrium, Zoning(model, manager)
+    return model, equilibrium, Zoning(model, manager, loaded=asked.joint == "curvature")
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

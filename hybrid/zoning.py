@@ -23,7 +23,7 @@ from hybrid.solve.statics import Equilibrium, solve_statics
 LETTING_GO = 1.0
 # Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 DWELL, LEAST_DWELL = 0.25, 20
-NONE = np.zeros(0, int)
+NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
 STRICTER = (1.0, 0.5, 0.25)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
@@ -155,8 +155,14 @@ class Zoning:
         self.lengths = self.true.copy()  # m, at the end of the last step
         self.relaxing: Relaxing | None = None
         self.letting_go = False
+        self.strain = NO_STRAIN  # of the last step, while bending is being blended
         self.joints = Joints(model.line) if loaded else None
         manager.coming = bool((manager.grown < 1.0).any())
+
+    def begin(self, ends: Ends, state: State) -> None:
+        """Weigh the criteria of the first state."""
+        self.manager.begin()
+        self.weigh(0.0, 0.0, ends, state)
 
     def prepare(self, end: float, dt: float, state: State) -> None:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
@@ -184,14 +190,15 @@ class Zoning:
             if not self.letting_go:
                 self.relaxing = None
         if manager.blending:
-            new, old = line.kb.copy(), manager.parts()[:, None] * self.stiff
-            for x in (before, state):
-                line.kb[:] = new
-                booked += 0.5 * _bending(line, ends, x)
-                line.kb[:] = old
-                booked -= 0.5 * _bending(line, ends, x)
-            line.kb[:] = new
+            more = line.kb - manager.parts()[:, None] * self.stiff
+            if self.strain.size != more.size:
+                self.strain = _strain(line, ends, before)
+            now = _strain(line, ends, state)
+            booked += 0.25 * float(np.sum(more * (self.strain**2 + now**2)))
+            self.strain = now
             manager.blend(dt)
+        else:
+            self.strain = NO_STRAIN
         if self.joints is not None:
             booked += self.joints.unload(line, state.r - before.r)
         manager.remember(state)
@@ -229,7 +236,7 @@ class Zoning:
             for mine, its in ((lack, self.relaxing.lack), (rate, self.relaxing.rate), (since, self.relaxing.since)):
                 mine[kept_now] = its[kept_then]
         self.relaxing = Relaxing(lack, rate, since)
-        self.model = changed
+        self.model, self.strain = changed, NO_STRAIN
         if self.joints is not None:
             self.joints = self.joints.on(target)
         return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
@@ -325,8 +332,12 @@ def _observed(line: Line, ends: Ends, state: State) -> Floats:
     return energy
 
 
-def _bending(line: Line, ends: Ends, state: State) -> float:
-    return float(_observed(line, ends, state)[1:3].sum())
+def _strain(line: Line, ends: Ends, state: State) -> Floats:
+    """Strains (N+1, 3) rad of all elements, from what has no stress."""
+    n = line.h.size
+    M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
+    observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
+    return (strain - line.k0) * line.element[:, None]
 
 
 def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:

@@ -27,9 +27,9 @@ FLOOR = 0.2
 # Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
 # is what straightens a cable.
 BUFFER = 2.0
-# How far ahead a falling tension is seen, in dwell times; the past it is judged by is a review or two old.
+# How far ahead a falling tension is seen, in dwell times; the past it is judged by is a sample or two old.
 HORIZON, MOST_AHEAD = 0.25, 2.0
-REVIEWS = 8  # in a dwell time, when nothing asks: what happens in between is remembered
+REVIEWS, SAMPLES = 4, 8  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 # A rod begins with this part of its stiffness: with none its cells could spin freely.
 FIRST = 1e-3
@@ -150,7 +150,7 @@ class DomainManager:
 
     def remember(self, state: State) -> None:
         """The state that was weighed is accepted: its tensions will be the past."""
-        if self.recent_age * REVIEWS >= self.dwell:
+        if self.recent_age * SAMPLES >= self.dwell:
             self.past, self.age = self.recent, self.recent_age
             self.recent, self.recent_age = state.T.copy(), 0.0
 
@@ -197,8 +197,8 @@ class DomainManager:
     # --- proposing -----------------------------------------------------------------------------
 
     def due(self, t: float) -> bool:
-        """Whether a review is due: a catenary asks, a rod is on its way out, or some time has passed."""
-        return self.loudest > 1.0 or self.going or t >= self.next_review
+        """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
+        return self.loudest > 1.0 or t >= self.next_review
 
     def review(self, t: float, state: State) -> Change | None:
         """What should change now, after the ratios since the last review; None most of the time."""
@@ -210,7 +210,8 @@ class DomainManager:
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
         self.going = bool(self.leaving.any())
-        self.next_review = t + self.dwell / REVIEWS
+        wait = self.dwell * float(np.min(self.grown, where=self.leaving, initial=1.0 / REVIEWS))
+        self.next_review = t + max(wait, 0.0) - 1e-9 * self.dwell
         gone = self.leaving & (self.grown <= 0.0)
         new = (rod & ~gone) | next_
         change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)))
@@ -254,11 +255,16 @@ class DomainManager:
         np.maximum(self.seen, self.ratios, out=self.seen)
         self.ratios[:] = 0.0
 
-    def told(self) -> Floats:
-        """The largest ratios (criteria, base cells) since this was asked last."""
+    def begin(self) -> None:
+        """Forget what was weighed until now."""
+        self.ratios[:] = self.seen[:] = 0.0
+
+    def told(self, s: Floats) -> Floats:
+        """The largest ratios (criteria, places) at places s, m, since this was asked last."""
         out = np.maximum(self.seen, self.ratios)
         self.seen[:] = 0.0
-        return out
+        cells = np.clip(np.searchsorted(self.layout.base, s) - 1, 0, self.layout.rod.size - 1)
+        return np.asarray(out[:, cells])
 
     def _reasons(self, rod: np.ndarray, new: np.ndarray, why: str = "") -> list[Reason]:
         """Runs of base cells that change, and for each what asks for it, or had held it until now."""
@@ -301,17 +307,18 @@ class DomainManager:
 
         Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.
         """
-        x = self._grown(dt)
-        smooth = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)
-        cells = smooth[self.base_of_cell]
-        out = np.minimum(np.append(cells, cells[-1]), np.append(cells[0], cells))
-        return np.asarray(out)
+        x = self._grown(dt) if dt else self.grown
+        cells = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)[self.base_of_cell]
+        out = np.empty(cells.size + 1)
+        out[0], out[-1] = cells[0], cells[-1]
+        np.minimum(cells[1:], cells[:-1], out=out[1:-1])
+        return out
 
     def _grown(self, dt: float) -> Floats:
-        return np.clip(self.grown + np.where(self.leaving, -dt, dt) / self.dwell, 0.0, 1.0)
+        x = self.grown + np.where(self.leaving, -dt, dt) / self.dwell
+        return np.minimum(np.maximum(x, 0.0), 1.0)
 
     def blend(self, dt: float) -> None:
         """Move on by dt."""
         self.grown = self._grown(dt)
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())
-

@@ -37,10 +37,11 @@ def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
 
 def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
     """Base cells within the buffer of those that ask."""
-    out = asks.copy()
-    for j in np.flatnonzero(asks):
-        out |= (base[:-1] < base[j + 1] + buffer[j]) & (base[1:] > base[j] - buffer[j])
-    return out
+    j = np.flatnonzero(asks)
+    inside = np.zeros(asks.size + 1, int)
+    np.add.at(inside, np.searchsorted(base[1:], base[j] - buffer[j], side="right"), 1)
+    np.subtract.at(inside, np.searchsorted(base[:-1], base[j + 1] + buffer[j], side="left"), 1)
+    return np.asarray(np.cumsum(inside[:-1]) > 0)
 
 
 def planned(

@@ -94,7 +94,9 @@ def build(scene: Scene) -> Model:
     mesh = scene.mesh
     layout = None
     if isinstance(scene.model, AdaptiveModel):
-        layout = _layout(scene, cable, cuts)
+        wanted = (*(scene.model.always_rod or ()), *(scene.model.always_catenary or ()))
+        edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
+        layout = _layout(scene, cable, sorted({*cuts, *edges}))
         s, zones = layout.nodes, layout.zones
     elif mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
@@ -175,8 +177,11 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:
     model, mesh = scene.model, scene.mesh
     assert isinstance(model, AdaptiveModel)
     whole = (ZonePlan("rod", scene.length),)
-    cells = mesh.cells if mesh and mesh.cells else BASE_CELLS
-    base, _ = place_nodes(whole, cuts, cells, mesh.ratio if mesh else None)
+    if mesh is not None and mesh.nodes is not None:
+        base, _ = given_nodes(mesh.nodes, whole, cuts)
+    else:
+        cells = mesh.cells if mesh and mesh.cells else BASE_CELLS
+        base, _ = place_nodes(whole, cuts, cells, mesh.ratio if mesh else None)
     middle = 0.5 * (base[:-1] + base[1:])
     of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
     EI = cable.B[of, :2].min(axis=1)

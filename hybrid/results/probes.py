@@ -375,8 +375,12 @@ class Observer:
         with_work: bool,
         loads: Sequence[float] = (),
         kinds: set[str] | None = None,
+        criteria: Sequence[tuple[str, str]] = (),
     ) -> None:
-        """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are."""
+        """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
+
+        criteria: name and description of those that are written as well; `values` gets them.
+        """
         self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
         self._loads = tuple(loads)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
@@ -390,6 +394,11 @@ class Observer:
         ]
         if with_work:
             fields += [Field(f"work/{name}", "J", text) for name, text in WORK.items()]
+        self._criteria = [f"criteria/{name}" for name, _ in criteria]
+        fields += [
+            Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
+            for name, (_, text) in zip(self._criteria, criteria, strict=True)
+        ]
         self.fields = tuple(fields)
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
@@ -407,10 +416,15 @@ class Observer:
     def zone_rows(self) -> list[tuple[str, float, float]]:
         return [(z.kind, z.s_a, z.s_b) for z in self.zones]
 
-    def values(self, ends: Ends, state: State, report: Floats, work: Floats) -> dict[str, object]:
-        """All fields at one moment; `work` (7,) J in the order of POWERS since the start."""
+    def values(
+        self, ends: Ends, state: State, report: Floats, work: Floats, ratios: Callable[[Floats], Floats] | None = None
+    ) -> dict[str, object]:
+        """All fields at one moment; `work` J in the order of POWERS since the start; ratios: criteria at places, m."""
         view = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
         out = {name: p.value(view) for name, p in self._probes.items()}
+        if self._criteria:
+            assert ratios is not None
+            out |= dict(zip(self._criteria, ratios(self.grid.s), strict=True))
         if self._with_work:
             energy = float(sum(out[name] for name in out if name.startswith("energy/")))  # type: ignore[misc]
             if self._first_energy is None:

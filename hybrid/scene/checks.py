@@ -85,6 +85,15 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
                 yield Finding(("model", key, i), "a stretch apart from those of always_rod", "let them end before")
 
 
+def _zones_that_move(model: Model, output: Output, solver: str) -> Iterator[Finding]:
+    if isinstance(model, AdaptiveModel):
+        if solver == "shooting":
+            yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
+    elif output.criteria:
+        expected = "false, because only zones that move have criteria"
+        yield Finding(("output", "criteria"), expected, "write `model: adaptive`, or leave it out")
+
+
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
     if isinstance(model, RodModel | AdaptiveModel):
@@ -139,6 +148,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _zones_fill,
     _rods_can_bend,
     _stretches_on_cable,
+    _zones_that_move,
     _mesh_spans,
     _output_on_cable,
 )

@@ -45,6 +45,7 @@ from hybrid.scene.task import (
     Straight,
     Time,
     ZonesModel,
+    usual_model,
 )
 
 __all__ = [
@@ -66,7 +67,11 @@ class Scene(Table):
     cable: Cable = Field(description="what the cable is made of")
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")
-    model: Model = Field(description="where the cable is a rod and where a catenary")
+    model: Model = Field(
+        default_factory=lambda data: usual_model(data.get("cable")),
+        description="where the cable is a rod and where a catenary; absent: adaptive for a cable with bending "
+        "stiffness, else catenary",
+    )
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     output: Output = Field(default=Output(), description="what is kept")

@@ -210,6 +210,17 @@ class AdaptiveModel(Table):
     always_catenary: Stretches | None = Field(
         default=None, description="stretches [s_a, s_b] that are always catenary [m]"
     )
+    joint: Literal["spherical", "curvature"] = Field(
+        default="spherical",
+        description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
+        "of the catenary's curvature, relaxed in time (curvature)",
+    )
+
+
+def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
+    """The model of a scene that names none: zones that move, if the cable can bend."""
+    stiff = [x.bending_stiffness is not None for x in getattr(cable, "sections", ())]
+    return AdaptiveModel() if any(stiff) else CatenaryModel()
 
 
 Model = Annotated[
@@ -218,7 +229,7 @@ Model = Annotated[
     | Annotated[ZonesModel, Tag("<zones>")]
     | Annotated[AdaptiveModel, Tag("<adaptive>")],
     Discriminator(by_kind),
-    Kinds(("rod", "catenary", "zones", "adaptive"), usual=("catenary", "rod")),
+    Kinds(("rod", "catenary", "zones", "adaptive"), usual=("adaptive", "rod", "catenary")),
 ]
 
 
@@ -281,6 +292,10 @@ class Output(Table):
     )
     history: tuple[NonNegative, ...] | None = Field(
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"
+    )
+
+    criteria: bool = Field(
+        default=False, description="also write the criteria of zones that move, each as a field over time and arc length"
     )
 
     @model_validator(mode="after")

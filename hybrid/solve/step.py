@@ -167,6 +167,8 @@ def newton(
             part = reach / shift
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
+        if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
+            part *= 0.5
         update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
