@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybrid.adapt.criteria import twist_of_rods
+from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
 from hybrid.adapt.remap import Clamp, Remapped, remap
 from hybrid.errors import ComputationError
@@ -70,8 +71,8 @@ def on_layout(model: Model, layout: Layout) -> Model:
 def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:
     """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
 
-    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than the tolerance (criteria are estimates, and a cable lying
-    slack has many equilibria) more becomes rod, in the end all.
+    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than
+    the tolerance (criteria are estimates, and slack has many equilibria) more becomes rod, in the end all.
     """
     assert model.layout is not None
     allowed = manager.tolerance
@@ -181,7 +182,7 @@ class Zoning:
         return self.manager.catenary_beyond if loudest > HARD else NONE
 
     def settle(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
-        """After an accepted step: the energy (J) that changing lengths, bending and joints put in; what should change."""
+        """After an accepted step: energy (J) that lengths, bending and joints put in, and what should change."""
         manager, line = self.manager, self.model.line
         booked = 0.0
         if self.relaxing is not None:
@@ -248,7 +249,8 @@ class Zoning:
         kinks[np.searchsorted(new.base, cable.at - 1e-9 * new.base[-1])] = True
         frames = ends.frame.reshape(2, 3, 3)
         clamps: list[Clamp | None] = [
-            (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None for k in (0, 1)
+            (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None
+            for k in (0, 1)
         ]
         twist = np.zeros(new.rod.size)
         carried = remap(old, new, line, target, state, kinks, twist, clamps)
@@ -263,84 +265,20 @@ class Zoning:
         return carried
 
 
-class Joints:
-    """Joints that carry the moment EI kappa of the catenary beside them, relaxed in time, onto the rod.
-
-    The moment is a couple on the rod's last cell.  The catenary's side gets none: its own moments, which the
-    model leaves out, go on beyond the joint.
-    """
-
-    def __init__(self, line: Line) -> None:
-        turns = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
-        before = line.spin[turns - 1] == 1  # the rod lies before the joint
-        self.node, self.cell = turns, np.where(before, turns - 1, turns)
-        self.side = np.where(before, 1.0, -1.0)
-        self.inside = np.clip(np.where(before, turns + 1, turns - 1), 1, line.h.size - 1)
-        self.s = line.s[turns]
-        self.beside = np.where(before, turns - 1, turns + 1)  # the rod's last element
-        self.moment = self.next = np.zeros((turns.size, 3))
-        self.force = np.zeros((line.s.size, 3))
-
-    def on(self, line: Line) -> Joints:
-        """The joints of another line; those that stay keep their moments."""
-        new = Joints(line)
-        for k, s in enumerate(new.s):
-            same = np.flatnonzero(self.s == s)
-            if same.size and self.side[same[0]] == new.side[k]:
-                new.moment[k] = self.moment[same[0]]
-        return new
-
-    def aim(self, line: Line, state: State, EI: Floats) -> Floats:
-        """EI kappa (k, 3) N m of the catenary at its first node beyond each joint."""
-        i = self.inside
-        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-        a, b = d[i - 1], d[i]
-        turn = 2.0 * np.cross(a, b) / (1.0 + np.einsum("ij,ij->i", a, b))[:, None]
-        return np.asarray((EI[i] / line.hn[i])[:, None] * turn)
-
-    def load(self, line: Line, state: State, EI: Floats, grown: Floats, part: float) -> None:
-        """Relax the moments by a part towards their aim, and put them on the rods' ends as forces on the line.
-
-        grown: (N+1,) how much of its stiffness every node has; a rod gets no more moment than that.
-        """
-        if not self.node.size:
-            return
-        line.force[:] -= self.force  # of a step that was refused
-        c = self.cell
-        l = np.linalg.norm(state.e[c], axis=1)[:, None]
-        moment = self.moment + min(part, 1.0) * (self.aim(line, state, EI) - self.moment)
-        pull = (grown[self.beside] * self.side)[:, None] * np.cross(moment, state.e[c] / l) / l
-        self.next, self.force[:] = moment, 0.0
-        np.add.at(self.force, c + 1, pull)
-        np.add.at(self.force, c, -pull)
-        line.force[:] += self.force
-
-    def unload(self, line: Line, way: Floats) -> float:
-        """After a step: the work (J) of the moments on the way (N+1, 3) m; the line has its dead loads only."""
-        work = float(np.sum(self.force * way))
-        line.force[:] -= self.force
-        if way.any():
-            self.moment = self.next
-        self.force[:] = 0.0
-        return work
-
-
-def _observed(line: Line, ends: Ends, state: State) -> Floats:
-    n = line.h.size
-    M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
-    observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
-    return energy
-
-
 def _strain(line: Line, ends: Ends, state: State) -> Floats:
     """Strains (N+1, 3) rad of all elements, from what has no stress."""
+    return (_observed(line, ends, state)[0] - line.k0) * line.element[:, None]
+
+
+def _observed(line: Line, ends: Ends, state: State) -> tuple[Floats, Floats]:
+    """Log strains (N+1, 3) rad of all elements, and energies (4,) J."""
     n = line.h.size
     M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
     observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
-    return (strain - line.k0) * line.element[:, None]
+    return strain, energy
 
 
 def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:
     """All energy of a state, J."""
     contact = stored(line, sea, state.r) if line.bits & SEABED else 0.0
-    return float(_observed(line, ends, state).sum() - np.sum(line.force * state.r) + contact)
+    return float(_observed(line, ends, state)[1].sum() - np.sum(line.force * state.r) + contact)

@@ -108,10 +108,10 @@ def weigh(
             bend = EI[i] * turn[i] / (line.hn[i] * T1 * tolerance)
             if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
                 smooth = 0.0  # what is left of the turn without what the curvature on both sides makes of it
-                if 1 < i:
+                if i > 1:
                     smooth = turn[i - 1] / line.hn[i - 1]
                 if i < n - 1:
-                    smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if 1 < i else turn[i + 1] / line.hn[i + 1]
+                    smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if i > 1 else turn[i + 1] / line.hn[i + 1]
                 kink = max(turn[i] - smooth * line.hn[i], 0.0)
                 put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink / tolerance)
             else:

@@ -175,7 +175,9 @@ class DomainManager:
             for x in look[1:]:
                 x.flags.writeable = True
         if ratio.shape != self.s.shape:
-            raise ValueError(f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {self.s.shape}")
+            raise ValueError(
+                f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {self.s.shape}"
+            )
         cells = np.maximum(ratio[:-1], ratio[1:])
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)

@@ -18,7 +18,6 @@ import numpy as np
 from hybrid.model.layout import Layout, edges
 from hybrid.model.state import Floats, Line, State, blank_state
 
-
 Clamp = tuple[Floats, Floats]  # first director and tangent
 ROUND = 1e-9  # of the length: places so close are one
 
@@ -133,7 +132,9 @@ def _tension(at: Floats, s: Floats, T: Floats, kinks: Floats) -> Floats:
         if b - a > 1:
             first = y[0] - (y[1] - y[0]) / (x[1] - x[0]) * (x[0] - s[a])
             last = y[-1] + (y[-1] - y[-2]) / (x[-1] - x[-2]) * (s[b] - x[-1])
-            first, last = (v if v * w > 0.0 else w for v, w in ((first, y[0]), (last, y[-1])))  # no slack out of nothing
+            first, last = (
+                v if v * w > 0.0 else w for v, w in ((first, y[0]), (last, y[-1]))
+            )  # no slack out of nothing
             x, y = np.concatenate([s[a : a + 1], x, s[b : b + 1]]), np.concatenate([[first], y, [last]])
         here = (at > s[a]) & (at < s[b])
         out[here] = np.interp(at[here], x, y)
@@ -181,8 +182,8 @@ def _frames(
         if not known:
             out.a1[a] = _across(d[a])
             known = [(a, out.a1[a], d[a])]
-        c, director, tangent = known[0]
-        for c in range(c - 1, a - 1, -1):
+        begin, director, tangent = known[0]
+        for c in range(begin - 1, a - 1, -1):
             director = _turned(_carried(director, tangent, d[c]), d[c], -step[c])
             tangent, out.a1[c] = d[c], director
         for (left, director, tangent), after in zip(known, [*known[1:], None], strict=True):

@@ -35,27 +35,43 @@ def cross(a: Floats, b: Floats) -> Floats:
     return out
 
 
-def _sparse(rows: Sequence[tuple[int, int, float]], shape: tuple[int, int]) -> csr_array:
-    i, j, x = (np.array(column) for column in zip(*rows, strict=True))
-    return csr_array((x, (i, j)), shape=shape)
+def _sparse(columns: np.ndarray, weights: Floats, width: int) -> csr_array:
+    """One row per output point: its weights (ns, k) at their columns; those at the same column add up."""
+    rows, each = weights.shape
+    out = csr_array((weights.ravel(), columns.ravel(), each * np.arange(rows + 1)), shape=(rows, width))
+    out.sum_duplicates()
+    return out
 
 
-def _slopes(x: Floats) -> Callable[[int], list[tuple[int, float]]]:
-    """Weights of the derivative at node i of x from the parabola through the three nearest nodes."""
+def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Interpolation along x[first] .. x[last], and beyond: the two that count, (..., 2), and their weights at `at`.
 
-    def at(i: int) -> list[tuple[int, float]]:
-        if x.size == 2:
-            return [(0, -1.0 / (x[1] - x[0])), (1, 1.0 / (x[1] - x[0]))]
-        j = min(max(i, 1), x.size - 2)
-        a, b, c = x[j - 1], x[j], x[j + 1]
-        p = x[i]
-        return [
-            (j - 1, (2 * p - b - c) / ((a - b) * (a - c))),
-            (j, (2 * p - a - c) / ((b - a) * (b - c))),
-            (j + 1, (2 * p - a - b) / ((c - a) * (c - b))),
-        ]
+    Where first = last, that one counts alone.
+    """
+    left = np.maximum(np.minimum(np.searchsorted(x, at) - 1, last - 1), first)
+    right = np.minimum(left + 1, last)
+    p = np.divide(at - x[left], x[right] - x[left], out=np.zeros(at.shape), where=left < right)
+    return np.stack([left, right], axis=-1), np.stack([1 - p, p], axis=-1)
 
-    return at
+
+def _slopes(x: Floats, node: np.ndarray, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Weights (..., 4) of the derivative at a node from the parabola through the three nearest nodes of first .. last.
+
+    It is linear, and in the middle of a cell it is the slope of the secant; of one cell alone there is no other.
+    """
+    cell, share = _linear(0.5 * (x[:-1] + x[1:]), x[node], first, last - 1)
+    w = share / (x[cell + 1] - x[cell])
+    return np.concatenate([cell, cell + 1], axis=-1), np.concatenate([-w, w], axis=-1)
+
+
+def _cubic(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Weights (ns, 10) of the Hermite interpolation along the nodes x[first] .. x[last]."""
+    node, p = _linear(x, at, first, last)
+    H = np.diff(x[node])
+    of_slope = H * p[:, :1] * p[:, 1:] * p * [1.0, -1.0]
+    near, slope = _slopes(x, node, first[:, None], last[:, None])
+    columns = np.hstack([node, near.reshape(-1, 8)])
+    return columns, np.hstack([p * p * (3 - 2 * p), (of_slope[:, :, None] * slope).reshape(-1, 8)])
 
 
 def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
@@ -90,53 +106,25 @@ class Grid:
 
     def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = ()) -> None:
         n = nodes_s.size
-        cubic: list[tuple[int, int, float]] = []
-        held: list[tuple[int, int, float]] = []
-        middle: list[tuple[int, int, float]] = []
-        linear: list[tuple[int, int, float]] = []
-        self.side_nodes: list[int] = []
-        middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
-        done = np.zeros(s.size, bool)
-        self.spans: list[tuple[int, int, int]] = []  # first node, last node, offset of the stretch's sides
+        self.s = s
         self.loads = tuple(loads)
         self.parts = stretches(zones, loads)
-        for zone in self.parts:
-            a, b = (int(np.argmin(np.abs(nodes_s - x))) for x in (zone.s_a, zone.s_b))
-            offset = len(self.side_nodes)
-            self.spans.append((a, b, offset))
-            self.side_nodes += range(a, b + 1)
-            x, c = nodes_s[a : b + 1], middles[a:b]
-            slope = _slopes(x)
-            inside = np.flatnonzero(~done & (s <= zone.s_b + 1e-12 * nodes_s[-1]))
-            done[inside] = True
-            for g in inside.tolist():
-                k = min(max(int(np.searchsorted(x, s[g], side="right")) - 1, 0), x.size - 2)
-                H = x[k + 1] - x[k]
-                p = (s[g] - x[k]) / H
-                cubic.append((g, a + k, (1 + 2 * p) * (1 - p) ** 2))
-                cubic.append((g, a + k + 1, p * p * (3 - 2 * p)))
-                cubic += [(g, a + j, p * (1 - p) ** 2 * H * w) for j, w in slope(k)]
-                cubic += [(g, a + j, p * p * (p - 1) * H * w) for j, w in slope(k + 1)]
-                linear += [(g, offset + k, 1 - p), (g, offset + k + 1, p)]
-                if c.size == 1:
-                    weights = [(a, 1.0)]
-                else:
-                    m = min(max(int(np.searchsorted(c, s[g])) - 1, 0), c.size - 2)
-                    q = (s[g] - c[m]) / (c[m + 1] - c[m])
-                    weights = [(a + m, 1 - q), (a + m + 1, q)]
-                middle += [(g, j, w) for j, w in weights]
-                # columns of `held`: start, cells, end; next to an end its value takes part
-                if s[g] < middles[0]:
-                    weights = [(-1, 1 - s[g] / middles[0]), (0, s[g] / middles[0])]
-                elif s[g] > middles[-1]:
-                    q = (s[g] - middles[-1]) / (nodes_s[-1] - middles[-1])
-                    weights = [(n - 2, 1 - q), (n - 1, q)]
-                held += [(g, j + 1, w) for j, w in weights]
-        self.nodes = _sparse(cubic, (s.size, n))
-        self.held = _sparse(held, (s.size, n + 1))
-        self.cells = _sparse(middle, (s.size, n - 1))
-        self.sides = _sparse(linear, (s.size, len(self.side_nodes)))
-        self.s = s
+        bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
+        cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
+        # first node, last node, offset of the stretch's sides: every joint before it has one side more
+        self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
+        self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
+
+        stretch = np.searchsorted(bounds[1:-1] + 1e-12 * nodes_s[-1], s)
+        a, b = cuts[stretch], cuts[stretch + 1]
+        middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
+        self.nodes = _sparse(*_cubic(nodes_s, s, a, b), n)
+        self.cells = _sparse(*_linear(middles, s, a, b - 1), n - 1)
+        # columns of `held`: start, cells, end; next to an end its value takes part
+        start, end = np.where(s < middles[0], 0, a + 1), np.where(s > middles[-1], n, b)
+        self.held = _sparse(*_linear(np.concatenate([nodes_s[:1], middles, nodes_s[-1:]]), s, start, end), n + 1)
+        node, share = _linear(nodes_s, s, a, b)
+        self.sides = _sparse(node + stretch[:, None], share, len(self.side_nodes))
 
 
 class View:

@@ -279,7 +279,7 @@ class Result:
         """What happened and why, in the order of time."""
         table = self._groups["events"]
         rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
-        return [Event(*(None if x != x else x for x in row)) for row in rows]  # NaN: there is none
+        return [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
 
     @property
     def scene_text(self) -> str:

@@ -81,7 +81,7 @@ _EVENTS = (
     Field("s_b", "m", "end of the stretch concerned, unstretched arc length"),
     Field("kind", "", "kind of the event", dtype=_KIND),
     Field("text", "", "what happened and why", dtype=_TEXT),
-    Field("criterion", "", "of a change of zones: the criterion that asks for it, or held the rod longest", dtype=_KIND),
+    Field("criterion", "", "of a change of zones: the criterion that asks, or held the rod longest", dtype=_KIND),
     Field("value", "", "what that criterion has there: its ratio", nan_ok=True),
     Field("threshold", "", "above which it asks, or below which it lets go", nan_ok=True),
     Field("energy", "J", "energy that all changes of zones at this moment put in, on the first of them", nan_ok=True),

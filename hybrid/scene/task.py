@@ -295,7 +295,8 @@ class Output(Table):
     )
 
     criteria: bool = Field(
-        default=False, description="also write the criteria of zones that move, each as a field over time and arc length"
+        default=False,
+        description="also write the criteria of zones that move, as fields over time and arc length",
     )
 
     @model_validator(mode="after")

@@ -25,13 +25,13 @@ from adapt_scenes import (
     bend,
     bending,
     breathing,
+    changes,
+    comes,
     easing,
+    goes,
     kink,
     kinking,
     nodding,
-    changes,
-    comes,
-    goes,
     output_at,
     ran,
     rods,
@@ -188,7 +188,11 @@ def test_off(name):
 def test_every_event_says_why(name):
     events = changes(ran(name))
     for e in comes(ran(name)):
-        assert e.text == "closes a gap" or e.kind == "retry" or (e.value > e.threshold == 1.0 and e.text.startswith(e.criterion))
+        assert (
+            e.text == "closes a gap"
+            or e.kind == "retry"
+            or (e.value > e.threshold == 1.0 and e.text.startswith(e.criterion))
+        )
     for e in goes(ran(name)):
         assert e.value < 1.0 and e.threshold == OFF[e.criterion] and e.criterion in e.text
     booked = sum(e.energy for e in events)
