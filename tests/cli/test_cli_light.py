@@ -58,7 +58,7 @@ def test_plan_computes_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypa
 def test_schema_is_valid_json_schema() -> None:
     schema = json.loads(call("schema")[0])
     assert schema["$schema"].startswith("https://json-schema.org/")
-    assert {"cable", "ends", "initial", "model"} <= set(schema["required"])
+    assert {"cable", "ends", "initial"} <= set(schema["required"])
     assert schema["additionalProperties"] is False
 
     def check(part: object) -> None:

@@ -23,8 +23,8 @@ from hybrid.scene.table import dotted
 ADAPTIVE = OCEAN.replace(
     "model: {kind: catenary}",
     "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
-    "always_catenary: [[200.0, 250.0]]}",
-)
+    "always_catenary: [[200.0, 250.0]], joint: curvature}",
+) + "output: {criteria: true}\n"
 TEXTS = {
     "adaptive": ADAPTIVE,
     "everything": EVERYTHING,
@@ -94,8 +94,8 @@ def _say(name: str, path: tuple[str | int, ...], nonsense: str) -> list[Any]:
 
 
 def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
-    """A title may be any line, true is a word for swivel, and damping may be an empty table."""
-    harmless = {"title": ("nonsense",), "swivel": (True,), "damping": ({},)}
+    """A title may be any line, true is a word for swivel and criteria, and damping may be an empty table."""
+    harmless = {"title": ("nonsense",), "swivel": (True,), "criteria": (True,), "damping": ({},)}
     return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
 
 
@@ -138,7 +138,7 @@ def _loaded(name: str) -> Any:
 
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
-SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel"}
+SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria"}
 SIGNED |= {"z", "slope", "surface", "top", "bottom", "turn", "near", "thrust", "by", "shape"}
 
 
