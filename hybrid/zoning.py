@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
-from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
+from hybrid.adapt.manager import HARD, HASTE, Change, DomainManager, UserCriterion
 from hybrid.adapt.remap import Clamp, Remapped, remap
 from hybrid.errors import ComputationError
 from hybrid.model.build import Model
@@ -220,6 +220,7 @@ class Zoning:
         carried = self._carried(old, new, line, target, ends, state)
         fresh = new.rod & ~old.rod
         manager.grown[fresh], manager.leaving[fresh] = 0.0, False
+        manager.haste[fresh] = np.where(change.urgent[fresh], HASTE, 1.0)
         manager.grown[~new.rod], manager.leaving[~new.rod] = 1.0, False
         manager.calm_since[fresh] = np.inf
         manager.follow(new)

@@ -16,7 +16,7 @@ import numpy as np
 
 from hybrid.adapt.criteria import LOAD, STEP, end_turn, twist_of_rods, weigh
 from hybrid.adapt.plan import OFF, Rules, planned, spread, tidied, wanted
-from hybrid.adapt.table import CRITERIA, GIVEN, TORSION
+from hybrid.adapt.table import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
 from hybrid.model.state import Ends, Floats, Line, Sea, State
@@ -33,6 +33,7 @@ REVIEWS, SAMPLES = 4, 8  # in a dwell time: reviews when nothing asks, what happ
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 # A rod begins with this part of its stiffness: with none its cells could spin freely.
 FIRST = 1e-3
+HASTE = 8.0  # times as fast bending is blended in where tension is lost
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
 
@@ -70,10 +71,11 @@ class Reason(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A proposal: what the base cells should be, and why."""
+    """A proposal: what the base cells should be, why, and which have no time to be blended in slowly."""
 
     rod: np.ndarray
     reasons: tuple[Reason, ...]
+    urgent: np.ndarray
 
 
 class DomainManager:
@@ -94,7 +96,7 @@ class DomainManager:
         self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
-        self.grown, self.leaving = np.ones(n), np.zeros(n, bool)
+        self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
         self.calm_since = np.full(n, np.inf)
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
@@ -206,9 +208,8 @@ class DomainManager:
         """What should change now, after the ratios since the last review; None most of the time."""
         rod = self.layout.rod
         self._complete()
-        next_, self.calm_since = planned(
-            self.ratios, rod, self.calm_since, t, self.layout.base, self.rules(state), self.leaving
-        )
+        rules = self.rules(state)
+        next_, self.calm_since = planned(self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving)
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
         self.going = bool(self.leaving.any())
@@ -216,7 +217,8 @@ class DomainManager:
         self.next_review = t + max(wait, 0.0) - 1e-9 * self.dwell
         gone = self.leaving & (self.grown <= 0.0)
         new = (rod & ~gone) | next_
-        change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)))
+        urgent = spread(self.ratios[SLACK] > 1.0, self.layout.base, rules.buffer)
+        change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)), urgent)
         self._forget()
         return change
 
@@ -235,7 +237,8 @@ class DomainManager:
         for j in np.unique(self.base_of_cell[cells]):
             new[max(j - 1, 0) : j + 2] = True
         new &= self.given >= 0
-        return Change(new, tuple(r._replace(kind="retry") for r in self._reasons(self.layout.rod, new, why)))
+        reasons = (r._replace(kind="retry") for r in self._reasons(self.layout.rod, new, why))
+        return Change(new, tuple(reasons), new)
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
@@ -307,7 +310,8 @@ class DomainManager:
     def parts(self, dt: float = 0.0) -> Floats:
         """How much of its stiffness every node has (N+1,), dt from now.
 
-        Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.
+        Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
+        tension goes there is less time, and nothing that could ring.
         """
         x = self._grown(dt) if dt else self.grown
         cells = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)[self.base_of_cell]
@@ -317,7 +321,7 @@ class DomainManager:
         return out
 
     def _grown(self, dt: float) -> Floats:
-        x = self.grown + np.where(self.leaving, -dt, dt) / self.dwell
+        x = self.grown + np.where(self.leaving, -dt, dt * self.haste) / self.dwell
         return np.minimum(np.maximum(x, 0.0), 1.0)
 
     def blend(self, dt: float) -> None:

@@ -20,11 +20,14 @@ from hybrid.scene.read import parse_scene, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.scene.table import dotted
 
-ADAPTIVE = OCEAN.replace(
-    "model: {kind: catenary}",
-    "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
-    "always_catenary: [[200.0, 250.0]], joint: curvature}",
-) + "output: {criteria: true}\n"
+ADAPTIVE = (
+    OCEAN.replace(
+        "model: {kind: catenary}",
+        "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
+        "always_catenary: [[200.0, 250.0]], joint: curvature}",
+    )
+    + "output: {criteria: true}\n"
+)
 TEXTS = {
     "adaptive": ADAPTIVE,
     "everything": EVERYTHING,
