@@ -28,6 +28,8 @@ from hybrid.physics.rotations import cross, dot, frame, log_rotation, sub, trans
 MOST = 1e6
 # Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.
 TWISTED = 0.5
+# The most that a tension counts for that is only foreseen.
+FORESEEN = 2.0
 # What may sit at a node: nothing, a jump of bending stiffness, a point load.
 SMOOTH, STEP, LOAD = 0, 1, 2
 
@@ -97,9 +99,12 @@ def weigh(
             ahead = before if not ahead < before else ahead
             now = T[i - 1] if not now < T[i - 1] else now
             if not T[i] + before < math.inf:  # a NaN must not hide behind a number
-                ahead = -1.0
+                now = -1.0
         ahead = min(now, ahead)
-        put(ratios, SLACK, ja, jb, floor[i] / ahead if ahead > 0.0 else MOST)
+        slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
+        if not floor[i] <= slack * now:
+            slack = floor[i] / now if now > 0.0 else MOST
+        put(ratios, SLACK, ja, jb, slack)
         T1 = max(floor[i], 1e-300)
         T1 = now if now > T1 else T1
         if i == 0 or i == n:

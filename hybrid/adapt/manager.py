@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.adapt.criteria import LOAD, STEP, end_turn, twist_of_rods, weigh
-from hybrid.adapt.plan import OFF, Rules, planned, spread, tidied, wanted
+from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.adapt.table import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
@@ -28,7 +28,7 @@ FLOOR = 0.2
 # is what straightens a cable.
 BUFFER = 2.0
 # How far ahead a falling tension is seen, in dwell times; the past it is judged by is a sample or two old.
-HORIZON, MOST_AHEAD = 0.25, 2.0
+HORIZON, MOST_AHEAD = 0.125, 2.0
 REVIEWS, SAMPLES = 4, 8  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 # A rod begins with this part of its stiffness: with none its cells could spin freely.
@@ -97,7 +97,8 @@ class DomainManager:
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
-        self.calm_since = np.full(n, np.inf)
+        self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
+        self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
@@ -213,12 +214,15 @@ class DomainManager:
         next_ &= self.given >= 0
         self.leaving = rod & ~next_
         self.going = bool(self.leaving.any())
-        wait = self.dwell * float(np.min(self.grown, where=self.leaving, initial=1.0 / REVIEWS))
-        self.next_review = t + max(wait, 0.0) - 1e-9 * self.dwell
-        gone = self.leaving & (self.grown <= 0.0)
-        new = (rod & ~gone) | next_
-        urgent = spread(self.ratios[SLACK] > 1.0, self.layout.base, rules.buffer)
-        change = None if (new == rod).all() else Change(new, tuple(self._reasons(rod, new)), urgent)
+        wait, new = 1.0 / REVIEWS, next_
+        if self.going:
+            wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
+            new = next_ | (self.leaving & (self.grown > 0.0))
+        self.next_review = t + (wait - 1e-9) * self.dwell
+        change = None
+        if (new != rod).any():
+            urgent = spread(self.ratios[SLACK] > 1.0, self.layout.base, rules.buffer)
+            change = Change(new, tuple(self._reasons(rod, new)), urgent)
         self._forget()
         return change
 
@@ -242,13 +246,8 @@ class DomainManager:
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
-        first = self.layout.first[:-1]
-        T = np.minimum.reduceat(state.T, first)
-        EI, floor = self.EI[first], self.floor[first]
-        buffer = BUFFER * np.minimum(
-            np.sqrt(EI / np.maximum(T, floor)), np.cbrt(EI / np.maximum(self.w[first], 1e-9 * self.scale))
-        )
-        return Rules(buffer, SHORTEST * float(np.median(np.diff(self.layout.base))), self.dwell)
+        reach(state.T, self.base_of_cell, self.EI, self.w, self.floor, BUFFER, 1e-9 * self.scale, self.buffer)
+        return Rules(self.buffer, self.shortest, self.dwell)
 
     def _complete(self) -> None:
         """What is not of a place: the scene's wishes, and torque, which needs rods from end to end."""

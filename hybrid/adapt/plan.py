@@ -1,14 +1,17 @@
-"""From what the criteria say to zones: a pure function, so that the same past gives the same plan."""
+"""From what the criteria say to zones: a pure function, so that the same past gives the same plan.
+
+Compiled, because it is asked for a plan several times in a dwell time, mostly to hear that nothing changes.
+"""
 
 from __future__ import annotations
 
-from itertools import pairwise
+import math
 from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.adapt.table import CRITERIA
-from hybrid.model.layout import edges
+from hybrid.compiled import inner, kernel
 from hybrid.model.state import Floats
 
 
@@ -31,17 +34,23 @@ BACK = 0.5  # ratio above which a rod that is on its way out comes back
 
 def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
     """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
-    # a ratio that is not a number asks, too
-    return np.asarray(np.where(rod, ~(ratios <= OFF[:, None]).all(axis=0), ~(ratios <= 1.0).all(axis=0)))
+    out = np.empty(rod.size, bool)
+    _wanted(ratios, OFF, rod, out)
+    return out
 
 
 def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
     """Base cells within the buffer of those that ask."""
-    j = np.flatnonzero(asks)
-    inside = np.zeros(asks.size + 1, int)
-    np.add.at(inside, np.searchsorted(base[1:], base[j] - buffer[j], side="right"), 1)
-    np.subtract.at(inside, np.searchsorted(base[:-1], base[j + 1] + buffer[j], side="left"), 1)
-    return np.asarray(np.cumsum(inside[:-1]) > 0)
+    out = np.empty(asks.size, bool)
+    _spread(asks, base, buffer, out)
+    return out
+
+
+def tidied(flags: np.ndarray, rod: np.ndarray, base: Floats, shortest: float) -> np.ndarray:
+    """No rod and no gap between rods shorter than `shortest`: rods widen, into what was rod first, and gaps close."""
+    out = flags.copy()
+    _tidy(out, rod, base, shortest, np.empty_like(out))
+    return out
 
 
 def planned(
@@ -58,38 +67,134 @@ def planned(
     rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
     whose curvature rises for that reason alone: they are kept only above BACK.
     """
-    holds = wanted(ratios, rod)
+    n = rod.size
+    calm = calm_since.copy()
+    flags = np.zeros((4, n), bool)
     if leaving is not None:
-        holds = np.where(leaving, ~(ratios <= BACK).all(axis=0), holds)
-    keeps = spread(holds, base, rules.buffer)
-    grows = spread(wanted(ratios, np.zeros_like(rod)), base, rules.buffer)
-    calm = np.where(rod & ~keeps, np.minimum(calm_since, t), np.inf)
-    goes = rod & (t - calm >= rules.dwell)
-    return tidied((rod & ~goes) | grows, rod, base, rules.shortest), calm
+        flags[0] = leaving
+    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, float(rules.shortest), float(rules.dwell), flags)
+    return flags[3], calm
 
 
-def tidied(flags: np.ndarray, rod: np.ndarray, base: Floats, shortest: float) -> np.ndarray:
-    """No rod and no gap between rods shorter than `shortest`: rods widen, into what was rod first, and gaps close."""
-    flags, length, least = flags.copy(), np.diff(base), shortest * (1.0 - ROUND)
-    while True:
-        before = flags.copy()
-        for a, b in pairwise(edges(before)):
+@inner
+def _asks(ratios, bound, j):
+    """Whether any ratio of base cell j is above its bound, or not a number."""
+    for c in range(ratios.shape[0]):
+        if not ratios[c, j] <= bound[c]:
+            return True
+    return False
+
+
+@inner
+def _over(ratios, bound, j):
+    """The same with one bound for all."""
+    for c in range(ratios.shape[0]):
+        if not ratios[c, j] <= bound:
+            return True
+    return False
+
+
+@kernel
+def _wanted(ratios, off, rod, out):
+    for j in range(rod.size):
+        out[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
+
+
+@kernel
+def _spread(asks, base, buffer, out):
+    n = asks.size
+    out[:] = False
+    for j in range(n):
+        if asks[j]:
+            out[j] = True
+            k = j - 1
+            while k >= 0 and base[k + 1] > base[j] - buffer[j]:
+                out[k] = True
+                k -= 1
+            k = j + 1
+            while k < n and base[k] < base[j + 1] + buffer[j]:
+                out[k] = True
+                k += 1
+
+
+@kernel
+def reach(T, base_of_cell, EI, w, floor, parts, light, buffer):
+    """Buffers (n,) m of base cells: `parts` times sqrt(EI/T), or (EI/w)^(1/3) where that is shorter.
+
+    Of the lowest tension in a base cell, and of its first node; light: least weight that counts, N/m.
+    """
+    j = -1
+    for i in range(T.size):
+        new = base_of_cell[i] != j
+        j = base_of_cell[i]
+        if new:
+            buffer[j] = parts * (EI[i] / max(w[i], light)) ** (1.0 / 3.0)
+            low, least = floor[i], T[i]
+            e = EI[i]
+        least = min(least, T[i])
+        if i + 1 == T.size or base_of_cell[i + 1] != j:
+            buffer[j] = min(buffer[j], parts * math.sqrt(e / max(least, low)))
+
+
+@inner
+def _end(flags, a):
+    """Where the run of equal flags that begins at a ends."""
+    b = a + 1
+    while b < flags.size and flags[b] == flags[a]:
+        b += 1
+    return b
+
+
+@kernel
+def _tidy(flags, rod, base, shortest, before):
+    n, least = flags.size, shortest * (1.0 - ROUND)
+    changed = True
+    while changed:
+        for j in range(n):
+            before[j] = flags[j]
+        a = 0
+        while a < n:
+            b = _end(before, a)
             if before[a]:
-                _widen(flags, a, b, rod, length, least)
-        cuts = edges(flags)
-        for a, b in pairwise(cuts):
-            if not flags[a] and a > 0 and b < flags.size and length[a:b].sum() < least:
+                # a rod grows on both sides, cell by cell; on one side only while only that one was rod
+                lo, hi = a, b
+                while base[hi] - base[lo] < least and (lo > 0 or hi < n):
+                    left, right = lo > 0, hi < n
+                    if left and right and rod[lo - 1] != rod[hi]:
+                        left, right = rod[lo - 1], rod[hi]
+                    if left:
+                        lo -= 1
+                    if right and base[hi] - base[lo] < least:
+                        hi += 1
+                flags[lo:hi] = True
+            a = b
+        a = 0
+        while a < n:
+            b = _end(flags, a)
+            if not flags[a] and a > 0 and b < n and base[b] - base[a] < least:
                 flags[a:b] = True
-        if (flags == before).all():
-            return flags
+            a = b
+        changed = False
+        for j in range(n):
+            if flags[j] != before[j]:
+                changed = True
 
 
-def _widen(flags: np.ndarray, a: int, b: int, rod: np.ndarray, length: Floats, least: float) -> None:
-    """Let a run of rods grow on both sides, cell by cell; on one side only while only that one was rod."""
-    while length[a:b].sum() < least and (a > 0 or b < flags.size):
-        left, right = a > 0, b < flags.size
-        if left and right and rod[a - 1] != rod[b]:
-            left, right = bool(rod[a - 1]), bool(rod[b])
-        a -= left
-        b += right and length[a:b].sum() < least
-    flags[a:b] = True
+@kernel
+def _plan(ratios, off, rod, calm, t, base, buffer, shortest, dwell, flags):
+    """flags: (4, n) leaving; two to work in; what the base cells should be (written)."""
+    leaving, asks, near, out = flags[0], flags[1], flags[2], flags[3]
+    n = rod.size
+    for j in range(n):
+        if leaving[j]:
+            asks[j] = _over(ratios, BACK, j)
+        else:
+            asks[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
+    _spread(asks, base, buffer, near)
+    for j in range(n):
+        calm[j] = min(calm[j], t) if rod[j] and not near[j] else np.inf
+        asks[j] = _over(ratios, 1.0, j)
+    _spread(asks, base, buffer, near)
+    for j in range(n):
+        out[j] = near[j] or (rod[j] and t - calm[j] < dwell)
+    _tidy(out, rod, base, shortest, asks)

@@ -187,7 +187,7 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:
     EI = cable.B[of, :2].min(axis=1)
     weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
     cell = np.full(middle.size, model.rod_cell) if model.rod_cell else ROD_CELL * np.cbrt(EI / weight)
-    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 2, MOST_PARTS).astype(int)
+    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(middle.size, bool))
 
 
