@@ -158,7 +158,6 @@ class Zoning:
         self.letting_go = False
         self.strain = NO_STRAIN  # of the last step, while bending is being blended
         self.joints = Joints(model.line) if loaded else None
-        manager.coming = bool((manager.grown < 1.0).any())
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""

@@ -125,7 +125,7 @@ class DomainManager:
         self.turn = np.zeros(s.size)
         self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
         self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
-        self.coming = bool((layout.rod & (self.grown < 1.0)).any())
+        self._see_who_comes()
         self.past = self.recent = np.zeros(0)
         self.age = self.recent_age = 0.0
 
@@ -212,8 +212,10 @@ class DomainManager:
         rules = self.rules(state)
         next_, self.calm_since = planned(self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving)
         next_ &= self.given >= 0
-        self.leaving = rod & ~next_
+        back, self.leaving = self.going, rod & ~next_
         self.going = bool(self.leaving.any())
+        if back or self.going:
+            self._see_who_comes()  # perhaps one that was on its way out
         wait, new = 1.0 / REVIEWS, next_
         if self.going:
             wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
@@ -326,4 +328,7 @@ class DomainManager:
     def blend(self, dt: float) -> None:
         """Move on by dt."""
         self.grown = self._grown(dt)
+        self._see_who_comes()
+
+    def _see_who_comes(self) -> None:
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())

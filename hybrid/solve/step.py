@@ -12,7 +12,7 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
-from hybrid.physics.loads import FRICTION, SEABED, WAVES
+from hybrid.physics.loads import FRICTION, ROTARY, SEABED, WAVES
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.physics.seabed import stored
 from hybrid.physics.water import stir
@@ -261,6 +261,30 @@ def lay(sea, e, slip):
         sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
 
 
+@inner
+def rest(line, w, wa, wd):
+    """Take away the spin that all cells of a rod share where no end holds it.
+
+    Without rotary inertia nothing would ever change it, and an acceleration that is left over would turn the
+    sections faster and faster.
+    """
+    n, i = w.size, 0
+    while i < n:
+        j = i
+        while j < n and line.spin[j] == line.spin[i]:
+            j += 1
+        held = i == 0 and line.element[0] and line.kb[0, 2] > 0.0
+        held = held or (j == n and line.element[n] and line.kb[n, 2] > 0.0)
+        if line.spin[i] and not held:
+            m, ma, md = 0.0, 0.0, 0.0
+            for k in range(i, j):
+                m, ma, md = m + w[k], ma + wa[k], md + wd[k]
+            m, ma, md = m / (j - i), ma / (j - i), md / (j - i)
+            for k in range(i, j):
+                w[k], wa[k], wd[k] = w[k] - m, wa[k] - ma, wd[k] - md
+        i = j
+
+
 @kernel
 def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
@@ -332,6 +356,8 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
         else:
             new.wa[i] = 0.0
+    if not line.bits & ROTARY:
+        rest(line, new.w, new.wa, new.wd)
     if outcome == OK:
         turn, cell = widest_turn(old.e, u)
         if not turn < LARGEST_STEP_TURN:
