@@ -12,7 +12,7 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -21,6 +21,7 @@ from hybrid.adapt.manager import UserCriterion
 from hybrid.adapt.table import CRITERIA
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones
+from hybrid.model.coarse import coarser, refined
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times, step_ends
 from hybrid.model.reasons import reasons_against
@@ -205,12 +206,11 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
     try:
-        return solve_statics(
-            model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-            model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape, others=model.other_starts,
-            settle=getattr(scene.initial, "friction", "") == "settled",
-        )  # fmt: skip
+        return _statics(scene, model, t)
     except ComputationError as failed:
+        found = _by_coarser(scene, model, t)
+        if found is not None:
+            return found
         reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))
         if not reasons:
             raise
@@ -218,6 +218,33 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
         tried = f"{len(roads)} ways to an equilibrium were tried, the last: {roads[-1].strip()}"
         because = "\n              ".join([*reasons, tried])
         raise ComputationError(failed.outcome, None, failed.s, because) from None
+
+
+def _statics(scene: Scene, model: Model, t: float) -> Equilibrium:
+    return solve_statics(
+        model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
+        model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape, others=model.other_starts,
+        settle=getattr(scene.initial, "friction", "") == "settled",
+    )  # fmt: skip
+
+
+def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
+    """The equilibrium that begins at that of a coarser mesh, which is found more easily; None: not found either."""
+    fewer = coarser(model)
+    if fewer is None:
+        return None
+    try:
+        coarse: Equilibrium | None = _statics(scene, fewer, t)
+    except ComputationError:
+        coarse = _by_coarser(scene, fewer, t)
+    if coarse is None:
+        return None
+    start = refined(coarse.state, fewer.line, model.line)
+    shape = f"the equilibrium with {fewer.cells} cells"
+    try:
+        return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t)
+    except ComputationError:
+        return None
 
 
 def _first_zones(

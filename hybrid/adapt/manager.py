@@ -54,7 +54,7 @@ class Look(NamedTuple):
     bending_stiffness: Floats
 
 
-# At 1 (N+1,) asks for rod around a node, below 0.5 lets go.
+# (N+1,) at 1 asks for rod around a node, below 0.5 lets go.
 UserCriterion = Callable[[Look], Floats]
 
 
@@ -181,7 +181,11 @@ class DomainManager:
             raise ValueError(
                 f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {self.s.shape}"
             )
+        if not np.isfinite(ratio).all():
+            i = int(np.flatnonzero(~np.isfinite(ratio))[0])
+            raise ValueError(f"the criterion gave {ratio[i]} at t = {t:.6g} s, s = {self.s[i]:.6g} m, expected a number")
         cells = np.maximum(ratio[:-1], ratio[1:])
+        cells[cells == 1.0] = ASKED  # a mask of what must be rod does as well
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
         self.loudest = max(self.loudest, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))

@@ -1,0 +1,239 @@
+"""What a user asks of zones that move: a criterion of their own, criteria as fields, loaded joints, the default model."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from adapt_cases import X, cable, even, on, state_on
+from adapt_cases import still as held
+from adapt_scenes import CELL, DWELL, EI, LENGTH, bending, breathing, changes, comes, goes, output_at, ran, rods, sagging
+from problems import Scene, clamped, pinned, scene
+
+import hybrid
+from hybrid.adapt.joint import Joints
+from hybrid.adapt.manager import HARD, DomainManager
+from hybrid.adapt.table import BEND, CRITERIA
+from hybrid.model.state import no_sea
+
+STEP = 0.02
+
+
+# --- a criterion of the user --------------------------------------------------------------------------
+
+
+def calm(**model):
+    """A cable that asks for nothing."""
+    return breathing(9.0, 8.0, {"tolerance": 0.1} | model, duration=3.0)
+
+
+def test_a_criterion_of_the_user_on_and_off():
+    """1 at t >= 0.5 s around the middle, 0.4 from 1 s on: a rod there, then gone after dwell and blending."""
+    seen = []
+
+    def criterion(look):
+        seen.append(look)
+        level = 0.0 if look.t < 0.5 else 1.2 if look.t < 1.0 else 0.4
+        return np.where(np.abs(look.s - 5.0) < 0.55, level, 0.0)
+
+    result = hybrid.run(calm(), criterion=criterion)
+    (first, *_), gone = comes(result), goes(result)
+    assert first.t == pytest.approx(0.5, abs=STEP) and first.criterion == "given" and first.value == pytest.approx(1.2)
+    assert first.s_a <= 4.4 and first.s_b >= 5.6
+    assert -STEP < gone[0].t - (1.0 + 2 * DWELL) < 0.5 * DWELL + 2 * STEP  # the reviews at which it was calm, and gone
+    assert gone[0].criterion == "given" and gone[0].threshold == 0.5
+    look = seen[-1]
+    assert look.s.shape == look.curvature.shape == look.bending_stiffness.shape == (look.tension.size + 1,)
+    assert look.position.shape == look.velocity.shape == (look.s.size, 3)
+
+
+def test_half_a_criterion_keeps_what_is_there():
+    """Between its `off` of 0.5 and 1 nothing comes and nothing goes."""
+    result = hybrid.run(calm(), criterion=lambda look: np.full(look.s.size, 1.1 if 0.1 < look.t < 0.3 else 0.6))
+    assert comes(result) and not goes(result)
+    assert not changes(hybrid.run(calm(), criterion=lambda look: np.full(look.s.size, 0.99)))
+
+
+def test_what_a_criterion_sees_is_not_its_own():
+    def greedy(look):
+        look.position[:] = 0.0
+        return np.zeros(look.s.size)
+
+    with pytest.raises(ValueError, match="read-only"):
+        hybrid.run(calm(), criterion=greedy)
+
+
+@pytest.mark.parametrize("answer", [1.0, np.zeros(3), np.zeros((5, 2))])
+def test_a_criterion_of_another_shape(answer):
+    with pytest.raises(ValueError, match="expected one number per node"):
+        hybrid.run(calm(), criterion=lambda look: answer)
+
+
+def test_a_criterion_that_is_no_number():
+    with pytest.raises(ValueError, match=r"nan at t = 0 s, s = 5 m, expected a number"):
+        hybrid.run(calm(), criterion=lambda look: np.where(look.s == 5.0, np.nan, 0.0))
+
+
+def test_a_criterion_may_be_a_mask():
+    result = hybrid.run(calm(), criterion=lambda look: look.s > 7.0)
+    assert rods(result, -1)[0][1] == LENGTH
+
+
+def test_a_criterion_needs_zones_that_move():
+    what = calm().model_dump(exclude_none=True) | {"model": "rod"}
+    with pytest.raises(TypeError, match="not adaptive"):
+        hybrid.run(Scene.model_validate(what), criterion=lambda look: np.zeros(look.s.size))
+
+
+# --- criteria as fields ---------------------------------------------------------------------------------
+
+
+def test_criteria_are_fields():
+    """`criteria: true`: what every criterion was, over t and s, and switches happen where one of them is above 1."""
+    what = sagging().model_dump(exclude_none=True)
+    what["output"]["criteria"] = True
+    result = hybrid.run(Scene.model_validate(what))
+    ratios = {x.name: result[f"criteria/{x.name}"] for x in CRITERIA}
+    assert all(x.shape == (result.times.size, result.s.size) and np.isfinite(x).all() for x in ratios.values())
+    for e in comes(result):
+        if e.criterion:
+            k = output_at(result, e.t)
+            near = np.abs(result.s - 0.5 * (e.s_a + e.s_b)) < e.s_b - e.s_a + 10 * CELL
+            assert ratios[e.criterion][k, near].max() >= e.value * (1 - 1e-12), e
+    # slack is what is seen in tension: the floor over it, or over what it will be
+    assert (ratios["slack"] > 0.0).all()
+    assert "criteria/slack" not in ran("deep")
+
+
+# --- the joint -------------------------------------------------------------------------------------------
+
+
+def arc(radius):
+    return lambda s: radius * np.column_stack([np.sin(s / radius), 0 * s, 1.0 - np.cos(s / radius)])
+
+
+@pytest.mark.parametrize("flags", ["CCCCCRRRRR", "RRRRRCCCCC"])
+def test_a_joint_carries_the_moment_of_the_curvature(flags):
+    """On a circle of radius R: EI/R about -y, as a couple on the rod's last cell; no force is added to the line."""
+    radius = 20.0
+    line = on(cable(), even(10, flags))
+    state = state_on(line, arc(radius))
+    joints = Joints(line)
+    dead, stiffness = line.force.copy(), np.full(line.s.size, 2.0)
+    for _ in range(60):  # relaxed: a part of a half in each step
+        joints.load(line, state, stiffness, np.ones(line.s.size), 0.5)
+        joints.unload(line, np.full_like(state.r, 1e-9))
+    joints.load(line, state, stiffness, np.ones(line.s.size), 0.5)
+    more = line.force - dead
+    assert joints.moment[0] == pytest.approx([0.0, -2.0 / radius, 0.0], rel=2e-3, abs=1e-12)
+    assert more.sum(axis=0) == pytest.approx([0, 0, 0], abs=1e-12)
+    couple = np.cross(state.r, more).sum(axis=0)
+    sign = -1.0 if flags[0] == "C" else 1.0  # on the end of the rod that lies after the joint, against its tangent
+    assert couple == pytest.approx(sign * joints.moment[0], rel=1e-9, abs=1e-12)
+    joints.unload(line, np.zeros_like(state.r))
+    assert (line.force == dead).all()
+
+
+@pytest.mark.parametrize("scene", [sagging, bending], ids=["deep", "bend"])
+def test_loaded_joints_stay_within_the_tolerance(scene):
+    """Both joints are approximations of the rod; the energy of both is booked."""
+    rod = hybrid.run(scene(model={"always_rod": [[0, LENGTH]]}))
+    for kind in ("spherical", "curvature"):
+        result = hybrid.run(scene(model={"joint": kind}))
+        far = np.linalg.norm(result.position - rod.position, axis=2).max()
+        assert comes(result) and goes(result)
+        assert far <= result.attributes.get("tolerance", 0.04) * LENGTH, kind
+        own = np.abs(rod["work/scheme"]).max()
+        booked = np.abs(np.diff(result["work/zones"])).sum()
+        assert np.abs(result["work/scheme"]).max() <= 3 * own + 0.1 * booked, kind
+
+
+# --- twist is remembered -----------------------------------------------------------------------------------
+
+
+def test_a_cable_that_becomes_rod_again_has_its_twist():
+    """One end is rolled by a whole turn while the cable is a catenary; as a rod it has the torque of that turn.
+
+    GJ 2 pi/L, as the run that is rod all the time; a cable that forgets would have none, or that of a part of a turn.
+    """
+    length, GJ = 10.0, 0.5
+    end = clamped((10.004, 0, 0), (1, 0, 0), motion={"roll": {"amplitude": 360.0, "period": 8.0}, "ramp": 1.0})
+    what = scene(
+        {"length": length, "mass": 0.1, "bending_stiffness": 0.64, "torsional_stiffness": GJ, "axial_stiffness": 1e5,
+         "damping": {"mass": 3.0}},
+        clamped(), end, cells=20, time={"duration": 3.0, "step": 0.02}, output={"every": 0.1},
+    ).model_dump(exclude_none=True)  # fmt: skip
+    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "dwell": 0.4}
+    result = hybrid.run(Scene.model_validate(what), criterion=lambda look: np.full(look.s.size, float(look.t >= 1.5)))
+    always = hybrid.run(Scene.model_validate(what | {"model": {"kind": "rod"}}))
+    assert rods(result, 0) == [] and rods(result, -1) == [(0.0, length)]
+    turned = 2 * np.pi * np.sin(2 * np.pi * 3.0 / 8.0)
+    assert turned > 4.0
+    assert np.abs(result.torque[-1]) == pytest.approx(GJ * turned / length, rel=0.01)
+    assert result.torque[-1] == pytest.approx(always.torque[-1], rel=0.01)
+
+
+# --- safety ------------------------------------------------------------------------------------------------
+
+
+def test_a_step_that_goes_too_far_is_taken_back():
+    """A blow that no criterion saw coming: the step is repeated with rods, and an event says so, with time and place."""
+    what = breathing(9.0, 3.0, {"tolerance": 0.1, "dwell": 0.05}, period=0.5, duration=0.5, step=0.05)
+    result = hybrid.run(what)
+    again = [e for e in result.events if e.kind == "retry"]
+    assert again
+    assert all("the step is repeated" in e.text or "it is repeated" in e.text for e in again)
+    assert result.status == "complete"
+
+
+def test_a_rod_that_comes_back_is_blended_in_again():
+    """On its way out and half gone, a rod is asked for again: it must get all of its stiffness back, and then rest."""
+    what, zones = cable(), even(10, "R" * 10)
+    manager = DomainManager(what, zones, 0.1, 1.0, np.zeros(10, int), 1.0)
+    line = on(what, zones)
+    state = state_on(line, lambda s: np.outer(s, X), 500.0)
+    still, t = 0.0, 0.0
+
+    def pass_by(seconds, ratio):
+        nonlocal t
+        for _ in range(round(seconds / 0.05)):
+            t += 0.05
+            manager.ratios[BEND] = ratio
+            if manager.blending:
+                manager.blend(0.05)
+            if manager.due(t):
+                manager.review(t, state)
+
+    pass_by(1.6, still)
+    assert manager.leaving.all() and 0.0 < manager.grown.max() < 0.9 and manager.parts().max() < 0.9
+    pass_by(2.0, 0.9)
+    assert not manager.leaving.any() and (manager.grown == 1.0).all() and (manager.parts() == 1.0).all()
+    assert not manager.blending
+
+
+def test_far_beyond_is_no_tension_that_is_only_foreseen():
+    """A tension that falls fast asks for rod; a step is taken back only for what it has become."""
+    what, zones = cable(), even(10, "C" * 10)
+    manager = DomainManager(what, zones, 0.1, 1.0, np.zeros(10, int), 1.0)
+    line, sea = on(what, zones), no_sea(10)
+    for T, dt in ((400.0, 0.0), (100.0, 0.05)):
+        loudest = manager.weigh(line, sea, held(), state_on(line, lambda s: np.outer(s, X), T), dt)
+    assert 1.0 < loudest < HARD and not manager.catenary_beyond.size
+    loudest = manager.weigh(line, sea, held(), state_on(line, lambda s: np.outer(s, X), -1.0), 0.05)
+    assert loudest > HARD and manager.catenary_beyond.size == 10
+
+
+# --- the default ---------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("section, kind", [({"bending_stiffness": EI}, "adaptive"), ({}, "catenary")])
+def test_the_model_of_a_scene_that_does_not_say(section, kind):
+    what = hybrid.validate_scene(
+        {
+            "cable": {"sections": [{"length": 10.0, "mass": 1.0, **section}]},
+            "ends": {"start": pinned(), "end": pinned(8.0, 0, 0)},
+            "initial": {"kind": "equilibrium"},
+            "time": {"duration": 0.2, "step": 0.02},
+        }
+    )
+    assert what.model.kind == kind
+    assert hybrid.run(what).status == "complete"
