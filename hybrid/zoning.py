@@ -9,7 +9,7 @@ import numpy as np
 from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, HASTE, Change, DomainManager, UserCriterion
-from hybrid.adapt.remap import Clamp, Remapped, remap
+from hybrid.adapt.remap import Clamp, Remapped, balance, remap
 from hybrid.errors import ComputationError
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
@@ -19,11 +19,14 @@ from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.physics.seabed import stored
 from hybrid.solve.observe import observe
 from hybrid.solve.statics import Equilibrium, solve_statics
+from hybrid.solve.timestep import Stepper
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many dwell times.
 LETTING_GO = 1.0
 # Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 DWELL, LEAST_DWELL = 0.25, 20
+# Times the tension floor above which tension, not bending, says where new nodes are in balance.
+TAUT = 2.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
 # Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
 STRICTER = (1.0, 0.5, 0.25)
@@ -225,6 +228,13 @@ class Zoning:
         manager.follow(new)
         self.stiff, self.true = target.kb.copy(), target.h.copy()
         target.kb[:] = manager.parts()[:, None] * self.stiff
+        cells = np.repeat(fresh, new.counts)
+        limp = np.append(cells, False) | np.append(False, cells)
+        loose = target._replace(kb=np.where(limp[:, None], 0.0, target.kb))
+        left = Stepper(loose, model.length, model.tension_scale).unbalanced(changed.sea.values, ends, carried.state)
+        bed = _bed_stiffness(target, changed.sea.values, carried.state)
+        taut = TAUT * manager.floor[:-1] < carried.state.T
+        balance(old, new, target, carried, left, bed, taut)
         target.h[:] = carried.lengths
         self.lengths = carried.lengths.copy()
         # new cells go on with the length, and the change of length, that their ends and tension imply
@@ -263,6 +273,14 @@ class Zoning:
             twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
             carried = remap(old, new, line, target, state, kinks, twist, clamps)
         return carried
+
+
+def _bed_stiffness(line: Line, sea: Sea, state: State) -> Floats:
+    """Stiffness (N+1,) N/m that the seabed has under every node."""
+    if not line.bits & SEABED:
+        return np.zeros(line.s.size)
+    deep = sea.offset + 0.5 * sea.onset - state.r @ sea.normal > 0.0
+    return np.where(deep, sea.stiffness * line.hn, 0.0)
 
 
 def _strain(line: Line, ends: Ends, state: State) -> Floats:

@@ -39,6 +39,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "solve": ("errors", "compiled", "physics", "model/state", "solve"),
     "adapt/table": (),
     "adapt/criteria": ("compiled", "physics", "adapt/table"),
+    "adapt/plan": ("compiled", "model/state", "adapt/table"),
     "adapt": ("errors", "physics", "model", "adapt"),
     "zoning": ("errors", "physics", "model", "solve", "adapt"),
     "results/read": ("errors",),

@@ -183,7 +183,9 @@ class DomainManager:
             )
         if not np.isfinite(ratio).all():
             i = int(np.flatnonzero(~np.isfinite(ratio))[0])
-            raise ValueError(f"the criterion gave {ratio[i]} at t = {t:.6g} s, s = {self.s[i]:.6g} m, expected a number")
+            raise ValueError(
+                f"the criterion gave {ratio[i]} at t = {t:.6g} s, s = {self.s[i]:.6g} m, expected a number"
+            )
         cells = np.maximum(ratio[:-1], ratio[1:])
         cells[cells == 1.0] = ASKED  # a mask of what must be rod does as well
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -27,7 +28,7 @@ def coarser(model: Model) -> Model | None:
     kinds = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
     places = np.searchsorted(line.s, np.concatenate([cable.bounds, cable.at]) - 1e-9 * line.s[-1])
     fixed = np.unique(np.concatenate([[0], kinds, places, [line.s.size - 1]]))
-    for a, b in zip(fixed[:-1], fixed[1:], strict=True):
+    for a, b in pairwise(fixed):
         kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1

@@ -261,30 +261,6 @@ def lay(sea, e, slip):
         sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
 
 
-@inner
-def rest(line, w, wa, wd):
-    """Take away the spin that all cells of a rod share where no end holds it.
-
-    Without rotary inertia nothing would ever change it, and an acceleration that is left over would turn the
-    sections faster and faster.
-    """
-    n, i = w.size, 0
-    while i < n:
-        j = i
-        while j < n and line.spin[j] == line.spin[i]:
-            j += 1
-        held = i == 0 and line.element[0] and line.kb[0, 2] > 0.0
-        held = held or (j == n and line.element[n] and line.kb[n, 2] > 0.0)
-        if line.spin[i] and not held:
-            m, ma, md = 0.0, 0.0, 0.0
-            for k in range(i, j):
-                m, ma, md = m + w[k], ma + wa[k], md + wd[k]
-            m, ma, md = m / (j - i), ma / (j - i), md / (j - i)
-            for k in range(i, j):
-                w[k], wa[k], wd[k] = w[k] - m, wa[k] - ma, wd[k] - md
-        i = j
-
-
 @kernel
 def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
@@ -324,10 +300,16 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
             d, _, _ = chord(ei)
             dn, _, _ = chord(en)
             a = transport((old.a1[i, 0], old.a1[i, 1], old.a1[i, 2]), d, dn)
-            a = spin_about(a, dn, dpsi)
-            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
             new.w[i] = old.w[i] + dt * old.wa[i]
             new.wd[i] = (am * old.wa[i] - af * old.wd[i]) / (1.0 - af) + ca * be * dt * dt * old.wa[i]
+            if line.bits & ROTARY:
+                a = spin_about(a, dn, dpsi)
+            else:
+                # without inertia twist is a balance, sought from where it was: a spin that goes on by itself would
+                # pass through that balance turn after turn
+                new.w[i] -= cv * dpsi
+                new.wd[i] -= ca * dpsi
+            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
         else:
             new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = old.a1[i, 0], old.a1[i, 1], old.a1[i, 2]
             new.w[i], new.wd[i] = 0.0, 0.0
@@ -356,8 +338,6 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
         else:
             new.wa[i] = 0.0
-    if not line.bits & ROTARY:
-        rest(line, new.w, new.wa, new.wd)
     if outcome == OK:
         turn, cell = widest_turn(old.e, u)
         if not turn < LARGEST_STEP_TURN:

@@ -157,6 +157,20 @@ class Stepper:
         self.told = self.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
 
+    def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
+        """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
+        rows = np.zeros((self.line.s.size, SIZE * WIDTH))
+        self.u[:] = 0.0
+        if self.line.bits & WAVES:
+            stir(sea, state.r, self.u)
+        if self.line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
+        march(
+            self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
+        )  # fmt: skip
+        return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+
     def feel(self, sea: Sea, ends: Ends, state: State) -> None:
         """The forces and the report of a state as it is, for the books of the step that follows."""
         self.u[:] = 0.0
