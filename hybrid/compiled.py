@@ -18,7 +18,7 @@ from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
-KERNELS = ("physics/*.py", "solve/*.py", "adapt/criteria.py", "adapt/plan.py", "adapt/table.py")
+KERNELS = ("physics/*.py", "solve/*.py", "adapt/blend.py", "adapt/criteria.py", "adapt/plan.py", "adapt/table.py")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 
 

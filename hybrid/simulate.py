@@ -206,11 +206,8 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
     try:
-        return _statics(scene, model, t)
+        return _by_coarser(scene, model, t) or _statics(scene, model, t)
     except ComputationError as failed:
-        found = _by_coarser(scene, model, t)
-        if found is not None:
-            return found
         reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))
         if not reasons:
             raise
@@ -220,29 +217,31 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
-def _statics(scene: Scene, model: Model, t: float) -> Equilibrium:
+def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
     return solve_statics(
         model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-        model.slack_floor, take_slack=model.slack == "warn", shape=model.start_shape, others=model.other_starts,
-        settle=getattr(scene.initial, "friction", "") == "settled",
+        model.slack_floor, take_slack=model.slack == "warn" and not quick, shape=model.start_shape,
+        others=model.other_starts, settle=getattr(scene.initial, "friction", "") == "settled", quick=quick,
     )  # fmt: skip
 
 
 def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
-    """The equilibrium that begins at that of a coarser mesh, which is found more easily; None: not found either."""
+    """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
+
+    None: neither is, or there are few cells.
+    """
     fewer = coarser(model)
     if fewer is None:
         return None
     try:
-        coarse: Equilibrium | None = _statics(scene, fewer, t)
+        return _statics(scene, model, t, quick=True)
     except ComputationError:
-        coarse = _by_coarser(scene, fewer, t)
-    if coarse is None:
-        return None
-    start = refined(coarse.state, fewer.line, model.line)
-    shape = f"the equilibrium with {fewer.cells} cells"
+        pass
     try:
-        return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t)
+        coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
+        start = refined(coarse.state, fewer.line, model.line)
+        shape = f"the equilibrium with {fewer.cells} cells"
+        return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
     except ComputationError:
         return None
 

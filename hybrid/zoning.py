@@ -6,9 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from hybrid.adapt.blend import freed, soften
 from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
-from hybrid.adapt.manager import HARD, HASTE, Change, DomainManager, UserCriterion
+from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
 from hybrid.adapt.remap import Clamp, Remapped, balance, remap
 from hybrid.errors import ComputationError
 from hybrid.model.build import Model
@@ -174,7 +175,7 @@ class Zoning:
             lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.dwell)
             line.h[:] = self.true - lack
         if self.manager.blending:
-            line.kb[:] = self.manager.parts(dt)[:, None] * self.stiff
+            soften(self.manager.parts(dt), self.stiff, line.kb)
         if self.joints is not None:
             self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.dwell)
 
@@ -193,11 +194,10 @@ class Zoning:
             if not self.letting_go:
                 self.relaxing = None
         if manager.blending:
-            more = line.kb - manager.parts()[:, None] * self.stiff
-            if self.strain.size != more.size:
+            if self.strain.shape != line.kb.shape:
                 self.strain = _strain(line, ends, before)
             now = _strain(line, ends, state)
-            booked += 0.25 * float(np.sum(more * (self.strain**2 + now**2)))
+            booked += freed(line.kb, manager.parts(), self.stiff, self.strain, now)
             self.strain = now
             manager.blend(dt)
         else:
@@ -214,20 +214,16 @@ class Zoning:
         line = model.line
         if self.joints is not None:
             self.joints.unload(line, np.zeros_like(state.r))
-        line.kb[:] = manager.parts()[:, None] * self.stiff  # a step that was refused has left others
+        soften(manager.parts(), self.stiff, line.kb)  # a step that was refused has left others
         line.h[:] = self.lengths
         was = _energy(line, sea, ends, state)
         changed = on_layout(model, new)
         target = changed.line
         carried = self._carried(old, new, line, target, ends, state)
         fresh = new.rod & ~old.rod
-        manager.grown[fresh], manager.leaving[fresh] = 0.0, False
-        manager.haste[fresh] = np.where(change.urgent[fresh], HASTE, 1.0)
-        manager.grown[~new.rod], manager.leaving[~new.rod] = 1.0, False
-        manager.calm_since[fresh] = np.inf
-        manager.follow(new)
+        manager.take(new, change.urgent, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()
-        target.kb[:] = manager.parts()[:, None] * self.stiff
+        soften(manager.parts(), self.stiff, target.kb)
         cells = np.repeat(fresh, new.counts)
         limp = np.append(cells, False) | np.append(False, cells)
         loose = target._replace(kb=np.where(limp[:, None], 0.0, target.kb))

@@ -206,12 +206,56 @@ def ran_as(model: str, name: str) -> hybrid.Result:
     return changed(name, f"model={model}")
 
 
+# Rods (m) in equilibrium and at the end, the share of the line that is rod on the mean, and changes of zones in all.
+PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], float, int]] = {
+    "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
+    "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
+    "touchdown": ([], [(85, 125)], 0.13, 29),
+    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 71),
+    "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
+    "irregular_sea": ([], [], 0.066, 136),
+}
+CHANGES = ("split", "grow", "merge", "shrink", "retry")
+
+
+@pytest.mark.parametrize("name", SEA)
+def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
+    """A change here is a change of criteria, of plans or of the mesh: see whether it is meant.
+
+    Exact where rods begin and end; the chain in the irregular sea is thrown about, so its changes are counted to 20 %.
+    """
+    result = ran(name)
+    first, last, share, switches = PLANS[name]
+    rods = [[(z.s_a, z.s_b) for z in zones if z.kind == "rod"] for zones in result.zones]
+    for want, got in ((first, rods[0]), (last, rods[-1])):
+        assert np.ravel(got) == pytest.approx(np.ravel(want), abs=1e-3)
+    assert np.mean([sum(b - a for a, b in x) for x in rods]) / result.s[-1] == pytest.approx(share, rel=0.1)
+    found = sum(e.kind in CHANGES for e in result.events)
+    assert abs(found - switches) <= (0.2 * switches if name == "irregular_sea" else 0)
+
+
+@pytest.mark.parametrize("name, period", [("s_tether", 7.0), ("touchdown", 8.0)])
+def test_zones_breathe_with_the_heave_and_do_not_flicker(name: str, period: float) -> None:
+    """In the last three periods: no more changes than 4 in each, and nothing that has changed changes back within dwell.
+
+    The dwell time is a quarter of the time of a transverse wave, 20 steps at least.
+    """
+    result = ran(name)
+    changes = [e for e in result.events if e.kind in CHANGES]
+    assert sum(e.t > result.times[-1] - 3 * period for e in changes) <= 3 * 4
+    dwell = 20 * 0.05 if name == "s_tether" else 20 * 0.1
+    goes = ("merge", "shrink")
+    for a in changes:
+        for b in changes:
+            reversed_ = (a.kind in goes) != (b.kind in goes) and 0.0 < b.t - a.t < dwell
+            assert not (reversed_ and a.s_a < b.s_b and b.s_a < a.s_b), (a, b)
+
+
 def test_s_tether_needs_bending_where_it_is_nearly_slack() -> None:
     result, rod, catenary = ran("s_tether"), ran_as("rod", "s_tether"), ran_as("catenary", "s_tether")
     arch = (result.s > 30) & (result.s < 46)
     z = result.position[0, :, 2]
     assert z[result.s < 30].min() < -19 and z[arch].max() > -10  # down, up, and down again
-    assert not result.events
     late = settled(result, 32.0)
     radius = [1 / x.curvature[settled(x, 32.0)].max() for x in (result, rod, catenary)]
     assert radius == pytest.approx([1.98, 1.99, 0.93], rel=0.03)
@@ -280,7 +324,7 @@ def test_touchdown_is_that_of_a_catenary_at_rest_and_moves_with_the_fairlead() -
     assert result.touchdown[0, 1] == pytest.approx(length - hanging(H) + rounded, abs=0.5)
     late = settled(result, 52.0)
     end = result.touchdown[late, 1]
-    assert (end.min(), end.max()) == pytest.approx((79.0, 104.0), abs=1.0)
+    assert (end.min(), end.max()) == pytest.approx((79.0, 102.4), abs=0.5)
     fairlead = result.tension[late, -1]
     assert (fairlead.min(), fairlead.max()) == pytest.approx((22.7e3, 41.3e3), rel=0.01)
     assert periods(result.times[late], fairlead - fairlead.mean()).mean() == pytest.approx(8.0, rel=0.01)
@@ -332,7 +376,7 @@ def test_slack_cable_lies_in_a_bight_that_friction_holds() -> None:
     sideways = (result.reaction_start + result.reaction_end)[-1, :2]
     assert 1.0 < np.linalg.norm(sideways) < 0.5 * 30 * w  # the rest of it is friction
     per_metre = np.diff(result.tension[-1, 10:-10]) / np.diff(result.s[10:-10])
-    assert np.abs(per_metre).max() < 1.15 * 0.5 * w  # as tensions between cells are interpolated; bending adds a little
+    assert np.abs(per_metre).max() < 1.2 * 0.5 * w  # as tensions between cells are interpolated; bending adds a little
     assert result.work["friction"][-1] == pytest.approx(-19.2, rel=0.05)
     radius = 1 / result.curvature.max(axis=1)
     assert (radius.min(), radius[-1]) == pytest.approx((1.19, 2.02), rel=0.03)
@@ -350,11 +394,11 @@ def test_buoy_follows_an_irregular_sea() -> None:
     frequency, power = np.fft.rfftfreq(z.size, 0.25), np.abs(np.fft.rfft(z - z.mean())) ** 2
     assert frequency[power.argmax()] == pytest.approx(1 / 9.0, rel=0.15)
     buoy, chain = result.tension[late, -1], result.tension[late][:, result.s < 50]
-    assert (buoy.min(), buoy.max()) == pytest.approx((548, 1466), rel=0.02)
-    assert chain.min() == pytest.approx(-213, rel=0.3)
+    assert (buoy.min(), buoy.max()) == pytest.approx((566, 1466), rel=0.02)  # 574 and 1462 with a rod of 480 cells
+    assert chain.min() == pytest.approx(-133, rel=0.3)
     end = result.touchdown[late, 1]
     assert 32 < end.min() < 34 and 38 < end.max() < 40
-    assert [event.kind for event in result.events] == ["friction left out"]
+    assert result.events[0].kind == "friction left out"
 
 
 def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -38,6 +38,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "solve/shooting": ("errors", "scene", "solve/shooting"),  # the arbiter shares nothing with production but the scene
     "solve": ("errors", "compiled", "physics", "model/state", "solve"),
     "adapt/table": (),
+    "adapt/blend": ("compiled",),
     "adapt/criteria": ("compiled", "physics", "adapt/table"),
     "adapt/plan": ("compiled", "model/state", "adapt/table"),
     "adapt": ("errors", "physics", "model", "adapt"),

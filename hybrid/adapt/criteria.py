@@ -85,6 +85,12 @@ def weigh(
         d1, _, _ = chord(get3(e, i))
         x = sub(d1, d0)
         turn[i] = math.sqrt(dot(x, x))
+        Mt = torque
+        if line.element[i]:
+            b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
+            Mt = line.kb[i, 2] * (math.atan2(dot(cross(carried, b), d1), dot(carried, b)) - line.k0[i, 2])
+        T1 = max(min(T[i - 1], T[i]), floor[i], 1e-300)
+        put(ratios, TORSION, base_of_cell[i - 1], base_of_cell[i], Mt * Mt / (4.0 * EI[i] * T1 * TWISTED))
     d0 = get3(tangents, 1)
     if dot(d0, d0) > 0.0:
         x = sub(d1, d0)
@@ -125,13 +131,6 @@ def weigh(
                 p = depth(sea, r, i) > 0.0
                 if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
                     put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
-            Mt = torque
-            if line.element[i]:
-                da, _, _ = chord(get3(e, i - 1))
-                db, _, _ = chord(get3(e, i))
-                Ra, Rb = frame(get3(a1, i - 1), da), frame(get3(a1, i), db)
-                Mt = line.kb[i, 2] * (log_rotation(relative_rotation(Ra, Rb))[2] - line.k0[i, 2])
-            put(ratios, TORSION, ja, jb, Mt * Mt / (4.0 * EI[i] * T1 * TWISTED))
     loudest = 0.0
     for i in range(n):
         j = base_of_cell[i]

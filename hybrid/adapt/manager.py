@@ -14,6 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.adapt.blend import advance, shares
 from hybrid.adapt.criteria import LOAD, STEP, end_turn, twist_of_rods, weigh
 from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.adapt.table import CRITERIA, GIVEN, SLACK, TORSION
@@ -31,9 +32,8 @@ BUFFER = 2.0
 HORIZON, MOST_AHEAD = 0.125, 2.0
 REVIEWS, SAMPLES = 4, 8  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
-# A rod begins with this part of its stiffness: with none its cells could spin freely.
-FIRST = 1e-3
 HASTE = 8.0  # times as fast bending is blended in where tension is lost
+MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
 
@@ -98,6 +98,7 @@ class DomainManager:
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
+        self.patience, self.released = np.ones(n), np.full(n, -np.inf)
         self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
@@ -122,12 +123,26 @@ class DomainManager:
         self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
         self.base_of_cell = layout.base_of_cell
-        self.turn = np.zeros(s.size)
+        self.turn, self.share = np.zeros((2, s.size))
         self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
         self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
         self._see_who_comes()
         self.past = self.recent = np.zeros(0)
         self.age = self.recent_age = 0.0
+
+    def take(self, new: Layout, urgent: np.ndarray, t: float) -> None:
+        """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
+
+        What comes back within the dwell time after it was let go must be calm twice as long from then on.
+        """
+        fresh, gone = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod
+        soon = fresh & (t - self.released < self.dwell * self.patience)
+        self.patience[soon] = np.minimum(2.0 * self.patience[soon], MOST_PATIENCE)
+        self.released[gone] = t
+        self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
+        self.haste[fresh] = np.where(urgent[fresh], HASTE, 1.0)
+        self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
+        self.follow(new)
 
     # --- watching ------------------------------------------------------------------------------
 
@@ -216,7 +231,9 @@ class DomainManager:
         rod = self.layout.rod
         self._complete()
         rules = self.rules(state)
-        next_, self.calm_since = planned(self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving)
+        next_, self.calm_since = planned(
+            self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
+        )
         next_ &= self.given >= 0
         back, self.leaving = self.going, rod & ~next_
         self.going = bool(self.leaving.any())
@@ -304,7 +321,8 @@ class DomainManager:
                 j = a + int(np.argmax((self.ratios[:, a:b] / OFF[:, None]).max(axis=0)))
                 c = int(np.argmax(self.ratios[:, j] / OFF))
                 name, value, off = CRITERIA[c].name, float(self.ratios[c, j]), float(OFF[c])
-                text = f"calm for {self.dwell:.3g} s and blended out; {name} {value:.3g}, threshold {off:g}"
+                calm = f"calm for {self.dwell * self.patience[j]:.3g} s and blended out"
+                text = f"{calm}; {name} {value:.3g}, threshold {off:g}"
                 out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))
         return out
 
@@ -315,25 +333,17 @@ class DomainManager:
         return self.going or self.coming
 
     def parts(self, dt: float = 0.0) -> Floats:
-        """How much of its stiffness every node has (N+1,), dt from now.
+        """How much of its stiffness every node has (N+1,), dt from now; overwritten by the next call.
 
         Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
         """
-        x = self._grown(dt) if dt else self.grown
-        cells = np.maximum(x * x * (3.0 - 2.0 * x), FIRST)[self.base_of_cell]
-        out = np.empty(cells.size + 1)
-        out[0], out[-1] = cells[0], cells[-1]
-        np.minimum(cells[1:], cells[:-1], out=out[1:-1])
-        return out
-
-    def _grown(self, dt: float) -> Floats:
-        x = self.grown + np.where(self.leaving, -dt, dt * self.haste) / self.dwell
-        return np.minimum(np.maximum(x, 0.0), 1.0)
+        shares(self.grown, self.leaving, self.haste, dt / self.dwell, self.base_of_cell, self.share)
+        return self.share
 
     def blend(self, dt: float) -> None:
         """Move on by dt."""
-        self.grown = self._grown(dt)
+        advance(self.grown, self.leaving, self.haste, dt / self.dwell)
         self._see_who_comes()
 
     def _see_who_comes(self) -> None:

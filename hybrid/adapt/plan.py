@@ -61,18 +61,21 @@ def planned(
     base: Floats,
     rules: Rules,
     leaving: np.ndarray | None = None,
+    patience: Floats | None = None,
 ) -> tuple[np.ndarray, Floats]:
     """What the base cells should be, and since when (s) each rod has been calm (infinity: it is not).
 
     rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
-    whose curvature rises for that reason alone: they are kept only above BACK.
+    whose curvature rises for that reason alone: they are kept only above BACK; patience: (n,) dwell times that each
+    cell must be calm, 1 if it is not said.
     """
     n = rod.size
     calm = calm_since.copy()
     flags = np.zeros((4, n), bool)
     if leaving is not None:
         flags[0] = leaving
-    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, float(rules.shortest), float(rules.dwell), flags)
+    wait = np.full(n, float(rules.dwell)) if patience is None else rules.dwell * patience
+    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, float(rules.shortest), wait, flags)
     return flags[3], calm
 
 
@@ -181,8 +184,8 @@ def _tidy(flags, rod, base, shortest, before):
 
 
 @kernel
-def _plan(ratios, off, rod, calm, t, base, buffer, shortest, dwell, flags):
-    """flags: (4, n) leaving; two to work in; what the base cells should be (written)."""
+def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
+    """wait: (n,) s that rods must be calm; flags: (4, n) leaving, two to work in, what the base cells should be."""
     leaving, asks, near, out = flags[0], flags[1], flags[2], flags[3]
     n = rod.size
     for j in range(n):
@@ -196,5 +199,5 @@ def _plan(ratios, off, rod, calm, t, base, buffer, shortest, dwell, flags):
         asks[j] = _over(ratios, 1.0, j)
     _spread(asks, base, buffer, near)
     for j in range(n):
-        out[j] = near[j] or (rod[j] and t - calm[j] < dwell)
+        out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
     _tidy(out, rod, base, shortest, asks)

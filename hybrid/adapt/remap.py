@@ -63,21 +63,33 @@ def remap(
     new_cells = np.repeat(changed, new.counts)
     middles = 0.5 * (target.s[:-1] + target.s[1:])
     out.T[new_cells] = _tension(middles[new_cells], line.s, state.T, old.base[kinks])
-    # new nodes on a cubic
-    smooth = [(a, b, _slopes(a, line.s, now, kinks)) for a, b in zip(_nodal(state)[:4], _nodal(out)[:4], strict=True)]
-    for j in np.flatnonzero(changed & new.rod):
-        inner = np.arange(then[j] + 1, then[j + 1])
-        H = new.base[j + 1] - new.base[j]
-        x = (target.s[inner] - new.base[j]) / H
-        for nodes, values, slopes in smooth:
-            values[inner] = _hermite(x, nodes[now[j]], nodes[now[j + 1]], H * slopes[1][j], H * slopes[0][j + 1])
-        out.slip[inner] = (1 - x)[:, None] * state.slip[now[j]] + x[:, None] * state.slip[now[j + 1]]
+    _interpolate(old, new, line, target, state, out, kinks)
     chords = np.diff(out.r, axis=0)
     out.e[new_cells] = chords[new_cells]
     _momentum(old, new, line, target, state, out, changed)
     _frames(new, changed, out, target, twist, clamps)
     lengths = line_lengths(out, target, new_cells, line, kept_old, kept_new)
     return Remapped(out, lengths)
+
+
+def _interpolate(
+    old: Layout, new: Layout, line: Line, target: Line, state: State, out: State, kinks: np.ndarray
+) -> None:
+    """What lives on nodes that are new: on cubics through the base nodes; friction's travel linearly."""
+    here = np.flatnonzero(new.rod & ~old.rod)
+    inner = np.concatenate([np.arange(new.first[j] + 1, new.first[j + 1]) for j in here] or [np.zeros(0, int)])
+    if not inner.size:
+        return
+    j = np.repeat(here, new.parts[here] - 1)
+    a, b = old.first[j], old.first[j + 1]
+    H = new.base[j + 1] - new.base[j]
+    x = (target.s[inner] - new.base[j]) / H
+    nodes = np.hstack(_nodal(state)[:4])
+    before, after = _slopes(nodes, line.s, old.first, kinks)
+    values = _hermite(x, nodes[a], nodes[b], H[:, None] * after[j], H[:, None] * before[j + 1])
+    for k, field in enumerate(_nodal(out)[:4]):
+        field[inner] = values[:, 3 * k : 3 * k + 3]
+    out.slip[inner] = (1 - x)[:, None] * state.slip[a] + x[:, None] * state.slip[b]
 
 
 def _nodal(state: State) -> tuple[Floats, ...]:
@@ -173,33 +185,29 @@ def _frames(
     d = out.e / np.linalg.norm(out.e, axis=1)[:, None]
     step = twist[base] * target.h  # from cell to cell, rad
 
-    for a, b in pairwise(edges(rod)):
-        if not rod[a]:
+    for p, q in pairwise(edges(2 * rod + (rod & fresh))):
+        if not (rod[p] and fresh[p]):
             continue
-        known = [(c, out.a1[c], d[c]) for c in range(a, b) if not fresh[c]]
-        if a == 0 and clamps[0] is not None:
-            known.insert(0, (-1, *clamps[0]))
-        if b == rod.size and clamps[1] is not None:
-            known.append((b, *clamps[1]))
-        if not known:
-            out.a1[a] = _across(d[a])
-            known = [(a, out.a1[a], d[a])]
-        begin, director, tangent = known[0]
-        for c in range(begin - 1, a - 1, -1):
-            director = _turned(_carried(director, tangent, d[c]), d[c], -step[c])
-            tangent, out.a1[c] = d[c], director
-        for (left, director, tangent), after in zip(known, [*known[1:], None], strict=True):
-            right = after[0] if after else b
-            for c in range(left + 1, right):
-                # a clamp is half a cell from its neighbour
-                turn = step[c] * (0.5 if left < 0 and c == 0 else 1.0)
-                director, tangent = _turned(_carried(director, tangent, d[c]), d[c], turn), d[c]
+        left = (out.a1[p - 1], d[p - 1]) if p > 0 and rod[p - 1] else clamps[0] if p == 0 else None
+        right = (out.a1[q], d[q]) if q < rod.size and rod[q] else clamps[1] if q == rod.size else None
+        if left is None and right is not None:
+            director, tangent = right
+            for c in range(q - 1, p - 1, -1):
+                director, tangent = _turned(_carried(director, tangent, d[c]), d[c], -step[c]), d[c]
                 out.a1[c] = director
-            if after and right > left + 1:  # what is left of the twist is spread
-                closing = _carried(director, tangent, after[2])
-                angle = np.arctan2(np.cross(closing, after[1]) @ after[2], closing @ after[1])
-                for k, c in enumerate(range(left + 1, right), start=1):
-                    out.a1[c] = _turned(out.a1[c], d[c], angle * k / (right - left))
+            continue
+        if left is None:
+            out.a1[p] = _across(d[p])
+        director, tangent = left or (out.a1[p], d[p])
+        for c in range(p if left else p + 1, q):
+            turn = step[c] * (0.5 if c == 0 else 1.0)  # a clamp is half a cell from its neighbour
+            director, tangent = _turned(_carried(director, tangent, d[c]), d[c], turn), d[c]
+            out.a1[c] = director
+        if left and right:  # what is left of the twist is spread
+            closing = _carried(director, tangent, right[1])
+            angle = np.arctan2(np.cross(closing, right[0]) @ right[1], closing @ right[0])
+            for k, c in enumerate(range(p, q), start=1):
+                out.a1[c] = _turned(out.a1[c], d[c], angle * k / (q - p + 1))
 
 
 def balance(

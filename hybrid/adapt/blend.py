@@ -1,0 +1,61 @@
+"""Bending on its way in and out: how much of its stiffness every node has, and the energy that a change of it frees.
+
+grown: (n,) of base cells, 0 to 1; leaving: (n,) those on their way out; haste: (n,) times as fast as the others
+that some come in.  Times in dwell times.
+"""
+
+from __future__ import annotations
+
+from hybrid.compiled import inner, kernel
+
+# A rod begins with this part of its stiffness: with none its cells could spin freely.
+FIRST = 1e-3
+
+
+@inner
+def moved(x, leaving, haste, dt):
+    x += -dt if leaving else dt * haste
+    return min(max(x, 0.0), 1.0)
+
+
+@kernel
+def advance(grown, leaving, haste, dt):
+    """Move all on by dt."""
+    for j in range(grown.size):
+        grown[j] = moved(grown[j], leaving[j], haste[j], dt)
+
+
+@kernel
+def shares(grown, leaving, haste, dt, base_of_cell, out):
+    """Parts of the stiffness (N+1,) of nodes, dt from now: smooth in time, of the softer cell beside a node."""
+    n = base_of_cell.size
+    before = 1.0
+    for i in range(n):
+        j = base_of_cell[i]
+        x = moved(grown[j], leaving[j], haste[j], dt)
+        part = max(x * x * (3.0 - 2.0 * x), FIRST)
+        out[i] = min(before, part) if i > 0 else part
+        before = part
+    out[n] = before
+
+
+@kernel
+def soften(part, stiff, kb):
+    """kb (N+1, 3) = part (N+1,) of stiff (N+1, 3)."""
+    for i in range(part.size):
+        for k in range(3):
+            kb[i, k] = part[i] * stiff[i, k]
+
+
+@kernel
+def freed(kb, part, stiff, before, after):
+    """Energy, J, that a step puts in whose stiffness kb is not what it was before, `part` of stiff.
+
+    before, after: strains (N+1, 3) rad at the two ends of the step, from what has no stress.
+    """
+    total = 0.0
+    for i in range(part.size):
+        for k in range(3):
+            more = kb[i, k] - part[i] * stiff[i, k]
+            total += more * (before[i, k] ** 2 + after[i, k] ** 2)
+    return 0.25 * total
