@@ -303,12 +303,18 @@ def _plan_table(scene: Scene, plan: Plan) -> Any:
         ledger.add_row()
     zones = Table.grid(padding=(0, 3, 0, 0))
     zones.add_row("zone", "from", "to", "cells", style="bold")
+    moving = plan.base_cells is not None
     for zone, cells in zip(plan.zones, plan.cells, strict=True):
-        zones.add_row(zone.kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", str(cells))
+        kind, count = ("as it comes", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
+        zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
     work = "no time in the scene, so statics only"
+    most = "about" if plan.base_cells is None else "at most about"
     if scene.time is not None:
         asked = scene.time.step
         shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
-        work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, about {span(plan.seconds)} of computing"
+        work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, {most} {span(plan.seconds)} of computing"
     head = [scene.title, ""] if scene.title else []
-    return Group(*head, ledger, zones, "", f"{sum(plan.cells)} cells, {plan.unknowns} unknowns; {work}")
+    size = f"{sum(plan.cells)} cells, {plan.unknowns} unknowns"
+    if moving:
+        size = f"{plan.base_cells} cells where it is catenary, {size} if all of it is rod"
+    return Group(*head, ledger, zones, "", f"{size}; {work}")

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy.linalg import solve_banded
@@ -52,8 +52,7 @@ def remap(
     place = then[:-1]
     changed = old.rod != new.rod
     # what stays, to the last bit
-    kept_old = np.concatenate([np.arange(now[j], now[j + 1]) for j in np.flatnonzero(~changed)] or [np.zeros(0, int)])
-    kept_new = np.concatenate([np.arange(then[j], then[j + 1]) for j in np.flatnonzero(~changed)] or [np.zeros(0, int)])
+    kept_old, kept_new = (np.flatnonzero(np.repeat(~changed, x.counts)) for x in (old, new))
     for a, b in zip(_nodal(state), _nodal(out), strict=True):
         b[place], b[-1] = a[now[:-1]], a[-1]
         b[kept_new] = a[kept_old]
@@ -260,5 +259,5 @@ def _carried(a: Floats, d: Floats, to: Floats) -> Floats:
     return np.asarray(b / np.linalg.norm(b))
 
 
-def _turned(a: Floats, d: Floats, angle: float) -> Floats:
+def _turned(a: Floats, d: Floats, angle: Any) -> Floats:
     return np.asarray(np.cos(angle) * a + np.sin(angle) * np.cross(d, a)) if angle else a

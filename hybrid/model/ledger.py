@@ -66,29 +66,31 @@ def _watched(scene: Scene) -> Iterator[Entry]:
         yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)
 
 
+def _fixed(zones: Sequence[Zone]) -> Iterator[Entry]:
+    """Zones that stay what they are."""
+    kinds = {z.kind for z in zones}
+    for kind, what in (
+        ("catenary", "catenary cells (6th order)"),
+        ("rod", "rod cells: bending, torsion (12th order)"),
+    ):
+        yield Entry(what, kind in kinds, "model" if kind in kinds else f"no {kind} zone in model")
+    joints = sum(a.kind != b.kind for a, b in pairwise(zones))
+    why = "a rod zone meets a catenary zone" if joints else "rod and catenary do not meet"
+    yield Entry(f"spherical joints: {joints}", joints > 0, why)
+
+
+def _moving(model: AdaptiveModel) -> Iterator[Entry]:
+    """Zones that come and go."""
+    yield Entry("rod cells: bending, torsion (12th order)", True, "model; where a criterion asks for them")
+    yield Entry("catenary cells (6th order)", True, "model; where none does")
+    carry = "no moment" if model.joint == "spherical" else "the moment of the catenary's curvature"
+    yield Entry(f"joints that carry {carry}", True, "model.joint; where rod and catenary meet")
+
+
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
     """What is on and who asked for it, what is off and what would switch it on."""
     kinds = {z.kind for z in zones}
-    entries = [
-        Entry(
-            "catenary cells (6th order)",
-            "catenary" in kinds,
-            "model" if "catenary" in kinds else "no catenary zone in model",
-        ),
-        Entry(
-            "rod cells: bending, torsion (12th order)",
-            "rod" in kinds,
-            "model" if "rod" in kinds else "no rod zone in model",
-        ),
-    ]
-    joints = sum(a.kind != b.kind for a, b in pairwise(zones))
-    entries.append(
-        Entry(
-            f"spherical joints: {joints}",
-            joints > 0,
-            "a rod zone meets a catenary zone" if joints else "rod and catenary do not meet",
-        )
-    )
+    entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
     extensible = [x.axial_stiffness is not None for x in scene.cable.sections]
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if "rod" in kinds:

@@ -20,6 +20,7 @@ class Plan:
     ledger: tuple[Entry, ...]
     zones: tuple[Zone, ...]
     cells: tuple[int, ...]  # per zone
+    base_cells: int | None  # where zones move: cells if all were catenary; `cells` are those if all were rod
     unknowns: int
     steps: int
     step: float  # s, of most steps: the scene's, shortened to fit between outputs
@@ -88,5 +89,6 @@ def plan(scene: Scene) -> Plan:
         steps, step = count_steps(scene), every / parts(every, scene.time.step)
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     return Plan(
-        model.ledger, model.zones, cells, model.unknowns, steps, step, steps * (USUAL_ITERATIONS * each + COST_STEP)
-    )
+        model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
+        steps * (USUAL_ITERATIONS * each + COST_STEP),
+    )  # fmt: skip
