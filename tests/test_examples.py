@@ -211,9 +211,9 @@ PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], flo
     "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
     "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
     "touchdown": ([], [(85, 125)], 0.13, 29),
-    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 71),
+    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 57),
     "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
-    "irregular_sea": ([], [], 0.066, 136),
+    "irregular_sea": ([], [(33.333, 40)], 0.08, 99),
 }
 CHANGES = ("split", "grow", "merge", "shrink", "retry")
 
@@ -395,7 +395,7 @@ def test_buoy_follows_an_irregular_sea() -> None:
     assert frequency[power.argmax()] == pytest.approx(1 / 9.0, rel=0.15)
     buoy, chain = result.tension[late, -1], result.tension[late][:, result.s < 50]
     assert (buoy.min(), buoy.max()) == pytest.approx((566, 1466), rel=0.02)  # 574 and 1462 with a rod of 480 cells
-    assert chain.min() == pytest.approx(-133, rel=0.3)
+    assert chain.min() == pytest.approx(-178, rel=0.3)
     end = result.touchdown[late, 1]
     assert 32 < end.min() < 34 and 38 < end.max() < 40
     assert result.events[0].kind == "friction left out"

@@ -2,7 +2,7 @@
 
 Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
 rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
-bending out would make are lengths, and count against the tolerance (m) of the scene (docs/theory.md, 6).
+bending out would make are lengths, and count against the tolerance (m) of the scene (docs/theory.md, 13).
 
     symbol   meaning                                          shape  unit
     EI       bending stiffness at a node                      -      N m2
