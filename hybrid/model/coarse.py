@@ -8,6 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.model.build import Model
+from hybrid.model.ends import first_director
 from hybrid.model.line import line_on
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import FRICTION, ROTARY, SEABED
@@ -17,7 +18,7 @@ FEWEST = 80  # cells below which a line is coarse enough
 
 
 def coarser(model: Model) -> Model | None:
-    """The model with a quarter of its cells and with its own start; None: it has few already.
+    """The model with a quarter of its cells and with its own start; None: it has few already, or folds in that start.
 
     Zones, sections and point loads keep their nodes.
     """
@@ -33,8 +34,10 @@ def coarser(model: Model) -> Model | None:
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
     new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
-    others = tuple((name, _picked(state, at)) for name, state in model.other_starts)
     start = _picked(model.start, at)
+    if start is None:
+        return None
+    others = tuple((name, x) for name, state in model.other_starts if (x := _picked(state, at)) is not None)
     return replace(model, line=new, sea=model.sea.on(rod.size), start=start, other_starts=others, layout=None)
 
 
@@ -50,11 +53,13 @@ def refined(state: State, coarse: Line, line: Line) -> State:
     return out
 
 
-def _picked(state: State, at: np.ndarray) -> State:
-    """The state at some of its nodes."""
+def _picked(state: State, at: np.ndarray) -> State | None:
+    """The state at some of its nodes; None: two of them lie at the same place."""
     out = blank_state(at.size - 1)
     out.r[:], out.v[:] = state.r[at], state.v[at]
     out.e[:] = np.add.reduceat(state.e, at[:-1], axis=0)
+    if not out.e.any(axis=1).all():
+        return None
     out.T[:] = np.add.reduceat(state.T, at[:-1]) / np.diff(at)
     _directors(out, state.a1[at[:-1]])
     return out
@@ -64,6 +69,8 @@ def _directors(state: State, a: Floats) -> None:
     """First directors: these, made normal to the chords."""
     d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
     a = a - np.einsum("ij,ij->i", a, d)[:, None] * d
+    for i in np.flatnonzero(np.linalg.norm(a, axis=1) < 1e-3):  # along the chord: any will do
+        a[i] = first_director(d[i])
     state.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
 
 

@@ -22,9 +22,11 @@ kill, looks at no row beyond it.
 
 from __future__ import annotations
 
+import atexit
 import difflib
 import io
 import time
+import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -128,6 +130,16 @@ class ZoneHistory(Sequence[list[Zone]]):
         return f"<zones at {self._count} outputs; {_joined(sets, '; ')}>"
 
 
+# HDF5 calls Python to close a file in memory, which crashes the interpreter when that happens while it shuts down.
+_ALIVE: weakref.WeakSet[Result] = weakref.WeakSet()
+
+
+@atexit.register
+def _close_all() -> None:
+    for result in list(_ALIVE):
+        result.close()
+
+
 class Result:
     """The recorded answer of one run.
 
@@ -138,6 +150,7 @@ class Result:
     def __init__(self, source: Path | io.BytesIO) -> None:
         self._source = source
         self._open()
+        _ALIVE.add(self)
 
     def _open(self) -> None:
         self._file = _open_file(self._source)

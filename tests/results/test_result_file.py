@@ -398,3 +398,22 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
         "hybrid.results.read",
         "hybrid.results.record",
     }
+
+
+def test_results_in_memory_are_closed_before_the_interpreter_goes() -> None:
+    """HDF5 would call Python when there is none any more: some scripts ended with a segmentation fault."""
+    script = """
+import atexit, hybrid
+end = {"kind": "free"}
+scene = hybrid.validate_scene({
+    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
+    "initial": {"kind": "straight", "direction": [0, 0, -1]}, "time": {"duration": 0.1, "step": 0.05},
+})
+result = hybrid.run(scene)
+assert result._file
+atexit._run_exitfuncs()
+assert not result._file
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
