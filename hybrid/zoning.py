@@ -37,18 +37,29 @@ MOST_ROUNDS = 10
 
 @dataclass
 class Relaxing:
-    """Cells on their way to their true length: what they lacked (N,) m, its rate (N,) m/s, when it began (N,) s."""
+    """Cells on their way to their true length: what they lacked (N,) m, its rate (N,) m/s, when it began (N,) s.
+
+    Cells of catenaries keep (N,) what they lack: it is what the chord of an arc is shorter by.
+    """
 
     lack: Floats
     rate: Floats
     since: Floats
+    keeps: np.ndarray
 
     def at(self, t: float, duration: float) -> tuple[Floats, bool]:
         """What they lack at t, and whether any still lacks something: a quintic from value and slope to rest."""
         x = np.clip((t - self.since) / duration, 0.0, 1.0)
-        value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+        value = np.where(self.keeps, 1.0, 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
         slope = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
         return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
+
+    def speed(self, t: float, duration: float) -> Floats:
+        """Rate (N,) m/s at which what they lack grows."""
+        x = np.clip((t - self.since) / duration, 0.0, 1.0)
+        value = np.where(self.keeps, 0.0, -30.0 * x * x * (1.0 - x) ** 2)
+        slope = (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+        return np.asarray(self.lack * value / duration + self.rate * slope)
 
 
 def manager_for(
@@ -233,16 +244,21 @@ class Zoning:
         balance(old, new, target, carried, left, bed, taut)
         target.h[:] = carried.lengths
         self.lengths = carried.lengths.copy()
-        # new cells go on with the length, and the change of length, that their ends and tension imply
+        # new cells go on with the length, and the change of length, that their ends and tension imply, but for what
+        # tension makes of it
         kept_now, kept_then = (np.repeat(old.rod == new.rod, x.counts) for x in (new, old))
-        d = carried.state.e / np.linalg.norm(carried.state.e, axis=1)[:, None]
-        rate = -np.einsum("ij,ij->i", d, np.diff(carried.state.v, axis=0)) / (1.0 + target.ck * carried.state.T)
+        shares = target.h / np.diff(new.base)[new.base_of_cell]
+        elastic = _lengthening(state)
+        if self.relaxing is not None:
+            elastic += (1.0 + line.ck * state.T) * self.relaxing.speed(t, LETTING_GO * manager.dwell)
+        elastic = np.add.reduceat(elastic, old.first[:-1])[new.base_of_cell] * shares
+        rate = (elastic - _lengthening(carried.state)) / (1.0 + target.ck * carried.state.T)
         lack, since = self.true - carried.lengths, np.full(target.h.size, t)
-        lack[kept_now], rate[kept_now], since[kept_now] = 0.0, 0.0, -np.inf
+        rate[kept_now], since[kept_now] = 0.0, -np.inf
         if self.relaxing is not None:  # what was on its way goes on
             for mine, its in ((lack, self.relaxing.lack), (rate, self.relaxing.rate), (since, self.relaxing.since)):
                 mine[kept_now] = its[kept_then]
-        self.relaxing = Relaxing(lack, rate, since)
+        self.relaxing = Relaxing(lack, rate, since, ~new.rod_cells)
         self.model, self.strain = changed, NO_STRAIN
         if self.joints is not None:
             self.joints = self.joints.on(target)
@@ -269,6 +285,12 @@ class Zoning:
             twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
             carried = remap(old, new, line, target, state, kinks, twist, clamps)
         return carried
+
+
+def _lengthening(state: State) -> Floats:
+    """Rate (N,) m/s at which cells grow longer."""
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    return np.asarray(np.einsum("ij,ij->i", d, np.diff(state.v, axis=0)))
 
 
 def _bed_stiffness(line: Line, sea: Sea, state: State) -> Floats:
