@@ -22,6 +22,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
+from hybrid.errors import ZONE_EVENTS
 
 if TYPE_CHECKING:
     from hybrid.live import Voice
@@ -102,7 +103,10 @@ def run(
         pace = "compilation included" if cold else f"{speed(duration / wall)} x real time"
         text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
         say.events(result.events)
-        say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall)
+        facts = _zones_over_time(result) if asked.model.kind == "adaptive" else {}
+        if facts:
+            say.show(lambda: _zones_said(facts, target))
+        say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
 
 @app.command()
@@ -249,6 +253,7 @@ def _equilibrium(result: Result) -> dict[str, Any]:
         "tension_min": {"value": float(tension[low]), "s": float(s[low])},
         "lowest": {"position": position[bottom].tolist(), "s": float(s[bottom])},
         "force": force,
+        "zones": [zone._asdict() if hasattr(zone, "_asdict") else asdict(zone) for zone in result.zones[-1]],
     } | _on_the_seabed(result)
 
 
@@ -282,9 +287,30 @@ def _equilibrium_table(facts: dict[str, Any]) -> Any:
         table.add_row("contact force", f"{facts['contact_force']:.5g} N")
     elif "grounded_length" in facts:
         table.add_row("on the seabed", "nothing")
+    if len(facts["zones"]) > 1:
+        table.add_row("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"]))
     table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")
     table.columns[0].style = "bold"
     return table
+
+
+def _zones_over_time(result: Result) -> dict[str, Any]:
+    """What zones that move have done: shares of the line that were rod, and changes."""
+    length = float(result.s[-1])
+    shares = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / length for zones in result.zones]
+    changes = sum(e.kind in ZONE_EVENTS for e in result.events)
+    rod = {"least": min(shares), "mean": sum(shares) / len(shares), "most": max(shares)}
+    return {"rod": rod, "zone_changes": changes}
+
+
+def _zones_said(facts: dict[str, Any], file: Path) -> str:
+    """The same in a line."""
+    rod, changes = facts["rod"], facts["zone_changes"]
+    if not changes:
+        return f"rod: {rod['mean']:.0%} of the line, all the time"
+    times = f"{changes} change{'s' * (changes > 1)} of zones"
+    part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on the mean"
+    return f"{part}; {times}: hybrid plot --zones {file}"
 
 
 def _plan_table(scene: Scene, plan: Plan) -> Any:

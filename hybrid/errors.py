@@ -96,9 +96,14 @@ EVENTS_BY_WEIGHT = (
     "ignored",
     "undamped",
     "not judged",
+    "clamp left out",
     "friction left out",
     "turned in",
 )
+
+
+# Kinds of events of zones that change: they tell of the run as it should be.
+ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 
 
 def weight_of_event(kind: str) -> int:

@@ -25,7 +25,7 @@ from rich.segment import ControlType
 from rich.text import Text
 
 import hybrid
-from hybrid.errors import weight_of_event
+from hybrid.errors import ZONE_EVENTS, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
@@ -234,17 +234,18 @@ class Voice:
         return tell
 
     def events(self, events: list[Event]) -> None:
-        """The first event of each kind, those that matter most first."""
+        """The first event of each kind, those that matter most first; changes of zones only in JSON."""
         kinds: dict[str, list[Event]] = {}
         for event in sorted(events, key=lambda e: (weight_of_event(e.kind), e.t)):
             kinds.setdefault(event.kind, []).append(event)
         for shown, found in enumerate(kinds.values()):
             self.json("note", **found[0]._asdict(), count=len(found))
             more = f" ({len(found) - 1} more like this)" if len(found) > 1 else ""
-            if shown < KINDS_SHOWN:
+            if found[0].kind not in ZONE_EVENTS and shown < KINDS_SHOWN:
                 self.note(f"note: t = {found[0].t:.4g} s: {found[0].text}{more}")
-        if len(kinds) > KINDS_SHOWN:
-            self.note(f"note: also {', '.join(list(kinds)[KINDS_SHOWN:])}; see the events of the result")
+        rest = [kind for kind in list(kinds)[KINDS_SHOWN:] if kind not in ZONE_EVENTS]
+        if rest:
+            self.note(f"note: also {', '.join(rest)}; see the events of the result")
 
     def done(self, text: str, *files: Path | None, **facts: Any) -> None:
         """The closing line."""

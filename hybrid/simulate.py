@@ -36,7 +36,7 @@ from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.timestep import POWERS
 from hybrid.watch import Watch
-from hybrid.zoning import Zoning, first_zones, manager_for
+from hybrid.zoning import Zoning, first_zones, manager_for, zones_of_start
 
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
@@ -111,7 +111,7 @@ def run(
         True,
         model.attached,
         kinds,
-        [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria else (),
+        [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zoning else (),
     )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
@@ -257,6 +257,8 @@ def _first_zones(
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t, _equilibrium(scene, model, t))
+    else:
+        model = zones_of_start(model, manager)
     return model, equilibrium, Zoning(model, manager, loaded=asked.joint == "curvature")
 
 
@@ -284,10 +286,33 @@ def _recorder(
         fixed.append(
             (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
         )
-    return Recorder(
+    recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=overwrite,
     )  # fmt: skip
+    for s, text in _clamps_left_out(scene, model):
+        recorder.event(0.0, s, s, "clamp left out", text)
+    return recorder
+
+
+def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
+    """Clamps that lie in a catenary zone because they hardly shift the cable; who wants their moment has to ask."""
+    if model.layout is None:
+        return
+    line = model.line
+    for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
+        if end.kind not in ("clamped", "guided") or line.spin[cell]:
+            continue
+        s, far = float(line.s[cell]), float(line.s[-1])
+        bend = float(model.cable.B[cell, :2].mean())
+        weight = max(abs(float(model.cable.weight[cell])), 1e-9 * model.tension_scale / far)
+        reach = min(4.0 * (bend / weight) ** (1.0 / 3.0), far)
+        stretch = f"[0, {reach:.3g}]" if cell == 0 else f"[{far - reach:.5g}, {far:.5g}]"
+        text = (
+            f"the clamp at ends.{name} shifts the cable by less than the tolerance: it is left out, and has no moment, "
+            f"as long as a catenary zone ends there; for its moment: always_rod: [{stretch}] in model"
+        )
+        yield s, text
 
 
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:

@@ -73,7 +73,9 @@ def manager_for(
     """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
     assert model.layout is not None
     wait = dwell if dwell is not None else max(DWELL * model.time_scale, LEAST_DWELL * step)
-    return DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale, user)
+    manager = DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale, user)
+    manager.loaded = model.ends.moments
+    return manager
 
 
 def on_layout(model: Model, layout: Layout) -> Model:
@@ -90,6 +92,12 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
     the tolerance (criteria are estimates, and slack has many equilibria) more becomes rod, in the end all.
     """
     assert model.layout is not None
+    most, equilibrium = model, found
+    free = manager.given >= 0
+    if not free.all():  # the most rod that the scene lets it have
+        most = on_layout(model, model.layout._replace(rod=free))
+        equilibrium = _equilibrium(most, t, _picked(found.state, model.layout.nodes, most.line))
+    assert most.layout is not None
     allowed = manager.tolerance
     try:
         for part in STRICTER:
@@ -98,12 +106,23 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
             answer = _zones_within(model, found, manager, t)
             if answer is None:
                 break
-            if _apart(found.state, model.layout, answer) <= allowed:
+            if _apart(equilibrium.state, most.layout, answer) <= allowed:
                 return answer
     finally:
         manager.tolerance = allowed
-    manager.follow(model.layout)
-    return model, found
+    manager.follow(most.layout)
+    return most, equilibrium
+
+
+def zones_of_start(model: Model, manager: DomainManager) -> Model:
+    """A start that is no equilibrium is rod, but for what the scene wants to be catenary."""
+    assert model.layout is not None
+    free = manager.given >= 0
+    if free.all():
+        return model
+    new = on_layout(model, model.layout._replace(rod=free))
+    manager.follow(model.layout._replace(rod=free))
+    return replace(new, start=_picked(model.start, model.layout.nodes, new.line))
 
 
 def _zones_within(
@@ -115,7 +134,7 @@ def _zones_within(
     manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
     rod = manager.first(full)
     for _ in range(MOST_ROUNDS):
-        if rod.all():
+        if rod[manager.given >= 0].all():
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
@@ -150,7 +169,7 @@ def _picked(state: State, s: Floats, line: Line) -> State:
     """The state at the nodes of a coarser line, a subset of the nodes s."""
     at = np.searchsorted(s, line.s - 1e-9 * s[-1])
     out = blank_state(line.h.size)
-    out.r[:] = state.r[at]
+    out.r[:], out.v[:] = state.r[at], state.v[at]
     out.e[:] = np.diff(out.r, axis=0)
     out.T[:] = state.T[at[:-1]]
     d = out.e / np.linalg.norm(out.e, axis=1)[:, None]

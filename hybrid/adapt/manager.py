@@ -15,9 +15,9 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.adapt.blend import advance, shares
-from hybrid.adapt.criteria import LOAD, STEP, end_turn, twist_of_rods, weigh
+from hybrid.adapt.criteria import LOAD, MOST, STEP, end_turn, twist_of_rods, weigh
 from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
-from hybrid.adapt.table import CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.adapt.table import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
 from hybrid.model.state import Ends, Floats, Line, Sea, State
@@ -30,9 +30,9 @@ FLOOR = 0.2
 BUFFER = 2.0
 # How far ahead a falling tension is seen, in dwell times; the past it is judged by is a sample or two old.
 HORIZON, MOST_AHEAD = 0.125, 2.0
-REVIEWS, SAMPLES = 4, 8  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
+REVIEWS, SAMPLES = 4, 16  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
-HASTE = 8.0  # times as fast bending is blended in where tension is lost
+HASTE = 16.0  # times as fast bending is blended in where tension is lost
 MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
@@ -98,11 +98,13 @@ class DomainManager:
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
+        self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
         self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
+        self.loaded = False  # whether a moment may be given at an end
         self.twisted = all(cable.held_twist) and all(cable.held_tangent)
         self.total_twist = 0.0
         self.follow(layout)
@@ -157,6 +159,8 @@ class DomainManager:
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
         ahead = min(HORIZON * self.dwell / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
         torque = self._torque(line, ends, state) if self.twisted else 0.0
+        if self.loaded:
+            self._weigh_moments(ends, state)
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
             self.EI, self.w, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free, self.turn,
@@ -165,6 +169,14 @@ class DomainManager:
         if self.user is not None:
             self._ask_user(line, state, t)
         return self.loudest
+
+    def _weigh_moments(self, ends: Ends, state: State) -> None:
+        """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does."""
+        for k, node in ((0, 0), (-1, -1)):
+            moment = float(np.linalg.norm(ends.moment[k]))
+            T = max(float(state.T[k]), float(self.floor[node]), 1e-300)
+            ratio = self.ratios[CLAMP]
+            ratio[k] = max(ratio[k], min(moment / (T * self.tolerance), MOST))
 
     def remember(self, state: State) -> None:
         """The state that was weighed is accepted: its tensions will be the past."""
@@ -235,10 +247,13 @@ class DomainManager:
             self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
         )
         next_ &= self.given >= 0
-        back, self.leaving = self.going, rod & ~next_
+        back, before, self.leaving = self.going, self.leaving, rod & ~next_
         self.going = bool(self.leaving.any())
         if back or self.going:
             self._see_who_comes()  # perhaps one that was on its way out
+            now = self.leaving & ~before
+            self.calmed[0, now] = loudest = np.argmax(self.ratios[:, now] / OFF[:, None], axis=0)
+            self.calmed[1, now] = np.take_along_axis(self.ratios[:, now], loudest[None], axis=0)[0]
         wait, new = 1.0 / REVIEWS, next_
         if self.going:
             wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
@@ -318,9 +333,10 @@ class DomainManager:
                 else:
                     out.append(Reason(a, b, kind, "closes a gap"))
             else:
-                j = a + int(np.argmax((self.ratios[:, a:b] / OFF[:, None]).max(axis=0)))
-                c = int(np.argmax(self.ratios[:, j] / OFF))
-                name, value, off = CRITERIA[c].name, float(self.ratios[c, j]), float(OFF[c])
+                which, ratios = self.calmed[0, a:b].astype(int), self.calmed[1, a:b]
+                j = a + int(np.argmax(ratios / OFF[which]))
+                c, value = int(self.calmed[0, j]), float(self.calmed[1, j])
+                name, off = CRITERIA[c].name, float(OFF[c])
                 calm = f"calm for {self.dwell * self.patience[j]:.3g} s and blended out"
                 text = f"{calm}; {name} {value:.3g}, threshold {off:g}"
                 out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))

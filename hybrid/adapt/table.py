@@ -24,7 +24,7 @@ class Criterion:
 CRITERIA: tuple[Criterion, ...] = (
     Criterion("bend", "bending length EI kappa/T over the tolerance", 0.25),
     Criterion("slack", "tension floor over tension, now or as it will be a horizon ahead", 0.5),
-    Criterion("clamp", "lambda times the angle between clamp and cable, over the tolerance", 0.25),
+    Criterion("clamp", "lambda times the angle at a clamp, or moment at an end over T, over the tolerance", 0.25),
     Criterion("point", "lambda times the kink at a point load, a jump of section or a joint, over the tolerance", 0.25),
     Criterion("edge", "EI w/T^2 where contact with the seabed begins, over the tolerance", 0.25),
     Criterion("torsion", "torque^2/(4 EI T), over a half", 0.25),

@@ -76,6 +76,11 @@ class EndConditions:
         self.set_loads(0.0)
         self.at(np.inf)
 
+    @property
+    def moments(self) -> bool:
+        """Whether a moment is given at an end at any time."""
+        return any(x.what == "moment" for x in self._loads)
+
     def set_loads(self, t: float) -> None:
         """Choose the loads that act just after t."""
         self._acting = [x for x in self._loads if t < x.until]

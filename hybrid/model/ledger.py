@@ -116,6 +116,8 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                 entries.append(Entry(what, True, why, event="implausible"))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
+    elif scene.output.criteria:
+        entries.append(Entry("criteria as fields", False, "only zones that move have criteria", event="ignored"))
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]

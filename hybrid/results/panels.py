@@ -50,6 +50,7 @@ if TYPE_CHECKING:
 _RANGE, _WATER, _LEVEL = "#E8E8E8", "#EFF6FA", "#4A90C2"
 _POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 AXES = ("x", "y", "z")
+MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
 
 
 def plot_shape(
@@ -167,7 +168,7 @@ def plot_history(
     for k, point in enumerate(s):
         ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
     changes = np.unique(result["zones/t"])[1:]
-    for k, t in enumerate(changes if len(changes) <= 40 else ()):  # more would hide the curves
+    for k, t in enumerate(changes if len(changes) <= MOST_CHANGES else ()):
         ax.axvline(t, color=GREY, lw=0.9, ls=":", zorder=1, label="_" * (k > 0) + "zones changed")  # one entry
     title = f"{label} over time" if component is None else f"{label} since t = {result.times[0]:.4g} s"
     style(ax, title, "t (s)", f"{label} ({unit})")

@@ -66,6 +66,11 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
         here: Place = ("cable", "sections", i)
         if not section.weakest_bending:
             fix = "add `bending_stiffness: ...` (N m^2), or make that stretch a catenary"
+            if isinstance(model, AdaptiveModel):
+                fix = (
+                    "add `bending_stiffness: ...` (N m^2; small for a chain), "
+                    "or fix the zones: `model: {kind: zones, zones: [...]}`"
+                )
             yield Finding((*here, "bending_stiffness"), f"a number > 0, in N m^2, because {over}", fix)
         if section.torsional_stiffness == 0:
             fix = "give a number > 0 (N m^2), or leave it out and it is chosen"
@@ -85,18 +90,16 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
                 yield Finding(("model", key, i), "a stretch apart from those of always_rod", "let them end before")
 
 
-def _zones_that_move(model: Model, output: Output, solver: str) -> Iterator[Finding]:
-    if isinstance(model, AdaptiveModel):
-        if solver == "shooting":
-            yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
-    elif output.criteria:
-        expected = "false, because only zones that move have criteria"
-        yield Finding(("output", "criteria"), expected, "write `model: adaptive`, or leave it out")
+def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
+    if isinstance(model, AdaptiveModel) and solver == "shooting":
+        yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
 
 
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
-    if isinstance(model, RodModel | AdaptiveModel):
+    if isinstance(model, AdaptiveModel):
+        return f"zones move (model) and cable.sections[{i}] may become a rod"
+    if isinstance(model, RodModel):
         return f"the whole cable is a rod (model), cable.sections[{i}] included"
     if not isinstance(model, ZonesModel):
         return ""

@@ -17,6 +17,7 @@ from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Environment, Scene, Time
 from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
 from hybrid.scene.table import Finding, dotted
+from hybrid.scene.task import usual_model
 from hybrid.scene.words import explain
 
 
@@ -124,6 +125,8 @@ def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
                 tables[name] = _adapters()[name].validate_python(data[name])
             except ValidationError:
                 continue
+        elif name == "model":
+            tables[name] = usual_model(tables.get("cable"))
         elif not field.is_required():
             tables[name] = field.default
     return tables

@@ -196,11 +196,12 @@ def by_kind(value: Any) -> str | None:
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
 
-    `usual` names what to advise someone who says nothing.
+    `usual` names what to advise someone who says nothing; `implied`: keys that only one kind has, and that kind.
     """
 
     names: tuple[str, ...]
     usual: tuple[str, ...]
+    implied: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
         return core_schema.no_info_before_validator_function(self.check, handler(source))
@@ -222,7 +223,9 @@ class Kinds:
             value = {"kind": value}
         if not isinstance(value, Mapping):
             self._refuse_table(None)
-        kind = value.get("kind")
+        kind = value.get("kind") or next((kind for key, kind in self.implied if key in value), None)
+        if kind is not None and "kind" not in value:
+            value = {"kind": kind, **value}
         expected = f"one of: {', '.join(self.names)}"
         if kind is None:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"

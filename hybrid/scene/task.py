@@ -229,7 +229,11 @@ Model = Annotated[
     | Annotated[ZonesModel, Tag("<zones>")]
     | Annotated[AdaptiveModel, Tag("<adaptive>")],
     Discriminator(by_kind),
-    Kinds(("rod", "catenary", "zones", "adaptive"), usual=("adaptive", "rod", "catenary")),
+    Kinds(
+        ("rod", "catenary", "zones", "adaptive"),
+        usual=("adaptive", "rod", "catenary"),
+        implied=(("zones", "zones"), *((key, "adaptive") for key in AdaptiveModel.model_fields if key != "kind")),
+    ),
 ]
 
 

@@ -6,6 +6,7 @@ unions, which show as ``<tag>`` in pydantic's locations and are dropped from the
 
 from __future__ import annotations
 
+import re
 import types
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -242,6 +243,8 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
     context = error.get("ctx") or {}
     if kind == "findings":
         return [(Finding((*path, *f.at), f.expected, f.fix, f.given), False) for f in context["findings"]]
+    if kind == "default_factory_not_called":
+        return []  # a key that is absent, and whose default waits for a table that is wrong
     if kind == "too_short" and isinstance(value, list | tuple) and len(value) >= context.get("min_length", 0):
         return []  # pydantic counts only the entries that are right; those that are wrong speak for themselves
     spot = follow(root, loc)
@@ -344,6 +347,10 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     return ""
 
 
+# What stands before a unit, and what it is worth.
+_PREFIXES = {"": 1.0, "m": 1e-3, "c": 1e-2, "k": 1e3, "M": 1e6, "G": 1e9}
+
+
 def _number_in_text(text: str, unit: str) -> str:
     words = text.split()
     if not words:
@@ -352,8 +359,13 @@ def _number_in_text(text: str, unit: str) -> str:
         return f"write {text.strip()} without quotes"
     if _is_number(text.replace(",", ".")):
         return decimal_comma(text)
-    if len(words) == 2 and _is_number(words[0]):
-        return f"write the number alone, {words[0]}" + (f"; the unit is {unit}" if unit else "")
+    quantity = re.fullmatch(r"\s*([-+0-9.eE]+?)\s*([a-zA-Zµ%°].*)", text)
+    if quantity and _is_number(quantity[1]):
+        number, word = float(quantity[1]), quantity[2].strip()
+        if not unit:
+            return f"write a number alone: it is a part of 1, without a unit ({word})"
+        scale = next((k for prefix, k in _PREFIXES.items() if word == prefix + unit), None)
+        return f"write the number alone, {number if scale is None else number * scale:.12g}; the unit is {unit}"
     return ""
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from adapt_scenes import CELL, DWELL, LENGTH, changes, comes, goes, output_at, ran, sagging
+from problems import Scene, pinned, scene
 
 import hybrid
 
@@ -116,6 +117,32 @@ def test_no_axial_stiffness_rings(stiffness):
         assert np.abs(one - rod).max() <= 0.02 * rod.mean(), (
             f"{pull}: {100 * np.abs(one - rod).max() / rod.mean():.1f} %"
         )
+
+
+@pytest.mark.parametrize("stiffness", [2e3, 1e5, None], ids=["soft", "stiff", "inextensible"])
+def test_a_switch_while_tension_rises_is_not_felt(stiffness):
+    """A taut cable is pulled and let go again, and is made rod and catenary on the way: the pull stays the rod's.
+
+    How fast a cell grows longer is mostly its tension's doing; a switch that took that for slack to be taken in would
+    be felt at once, and for good.
+    """
+    section = {"length": 10.0, "mass": 0.2, "bending_stiffness": 0.05, "damping": {"mass": 1.0}}
+    if stiffness:
+        section["axial_stiffness"] = stiffness
+    reach = 0.005 if stiffness else 0.0005
+    motion = {"surge": {"amplitude": reach, "period": 2.0}, "ramp": 1.0}
+    what = scene(
+        section, pinned(), pinned(10.0 if stiffness else 9.99, 0, 0, motion=motion), cells=20, gravity=10.0,
+        time={"duration": 5.0, "step": 0.01}, output={"every": 0.1},
+    ).model_dump(exclude_none=True)  # fmt: skip
+    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "dwell": 0.2}
+    asks = hybrid.run(Scene.model_validate(what), criterion=lambda look: np.full(look.s.size, look.t % 1.5 < 0.5) * 1.1)
+    what["model"] |= {"always_rod": [[0, 10]]}
+    rod = hybrid.run(Scene.model_validate(what))
+    assert len(switches(asks)) >= 6
+    for pull in PULLS:
+        off = np.interp(rod.steps["t"], asks.steps["t"], asks.steps[pull]) - rod.steps[pull]
+        assert np.abs(off).max() < 0.01 * rod.steps[pull].mean(), f"{np.abs(off).max() / rod.steps[pull].mean():.2%}"
 
 
 @pytest.mark.parametrize("step", [0.02, 0.01])

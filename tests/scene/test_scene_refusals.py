@@ -151,7 +151,6 @@ CASES = {
     "decimal comma in a vector": (SUSPENSION, PINNED, "{kind: pinned, position: §[0,5, 0, 0]}", "ends.start.position", "not a comma"),
     "straight, a word": (SUSPENSION, STRAIGHT, "§straight", "initial.direction", "`{kind: straight, direction: [1, 0, 0]}`"),
     "zones, a word": (SUSPENSION, MODEL, "§zones", "model.zones", "`{kind: zones, zones: [{rod: ...}, {catenary: ...}]}`"),
-    "criteria of nothing": (SUSPENSION, "output: {", "output: {criteria: §true, ", "output.criteria", "write `model: adaptive`"),
     "missing end": (SUSPENSION, f"start: {PINNED}", "", "ends.start", "add `start: {kind: pinned, position: [x, y, z]}`"),
     "too fast for the step": (OCEAN, "step: 0.02", "step: §2", "time.step", "a sixth of the shortest period, 1.33 s, of ends.end.motion.heave"),
     "no time at all": (EVERYTHING, "until: 3.0", "until: §0", "ends.end.force.until", "> 0"),
