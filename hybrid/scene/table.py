@@ -223,9 +223,9 @@ class Kinds:
             value = {"kind": value}
         if not isinstance(value, Mapping):
             self._refuse_table(None)
-        kind = value.get("kind") or next((kind for key, kind in self.implied if key in value), None)
-        if kind is not None and "kind" not in value:
-            value = {"kind": kind, **value}
+        if "kind" not in value:
+            value = {"kind": kind for key, kind in self.implied if key in value} | dict(value)
+        kind = value.get("kind")
         expected = f"one of: {', '.join(self.names)}"
         if kind is None:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"

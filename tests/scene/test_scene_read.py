@@ -291,3 +291,10 @@ def test_override_refused(override: str) -> None:
 
 def test_all_overrides_are_judged() -> None:
     assert len(complaints(SUSPENSION, ("tme.step=1", "time.step=-1", "nothing"))) == 3
+
+
+def test_a_table_of_a_model_may_imply_its_kind() -> None:
+    """Keys that only one kind of model has say which it is."""
+    for text, kind in (("{tolerance: 1.0e-4}", "adaptive"), ("{zones: [{catenary: 1.5}, {rod: 0.5}]}", "zones")):
+        model = "model: {kind: zones, zones: [{catenary: 1.5}, {rod: 0.5}]}"
+        assert parse_scene(SUSPENSION.replace(model, f"model: {text}")).model.kind == kind
