@@ -97,6 +97,7 @@ EVENTS_BY_WEIGHT = (
     "undamped",
     "not judged",
     "clamp left out",
+    "zones held",
     "friction left out",
     "turned in",
 )

@@ -38,6 +38,10 @@ from hybrid.solve.timestep import POWERS
 from hybrid.watch import Watch
 from hybrid.zoning import Zoning, first_zones, manager_for, zones_of_start
 
+HELD = (
+    "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
+    "more mesh.cells, or a larger model.tolerance, let them move"
+)
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
 STEP_FIELDS = (
@@ -115,6 +119,8 @@ def run(
     )
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
+    if zoning and zoning.manager.held:
+        recorder.event(0.0, 0.0, model.length, "zones held", HELD)
     with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
         motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning)
         motion.save()

@@ -22,10 +22,12 @@ from hybrid.solve.observe import observe
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.timestep import Stepper
 
-# A stretch that has become chords, or arcs, is let go to its true length over this many dwell times.
+# A stretch that has become chords, or arcs, is let go to its true length over this many paces.
 LETTING_GO = 1.0
 # Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 DWELL, LEAST_DWELL = 0.25, 20
+# Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
+SLOWEST, FASTEST = 2.0, 10
 # Times the tension floor above which tension, not bending, says where new nodes are in balance.
 TAUT = 2.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
@@ -72,9 +74,20 @@ def manager_for(
 ) -> DomainManager:
     """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
     assert model.layout is not None
-    wait = dwell if dwell is not None else max(DWELL * model.time_scale, LEAST_DWELL * step)
-    manager = DomainManager(model.cable, model.layout, tolerance * model.length, wait, given, model.tension_scale, user)
-    manager.loaded = model.ends.moments
+    pace = max(DWELL * model.time_scale, LEAST_DWELL * step)
+    wait = dwell if dwell is not None else pace
+    manager = DomainManager(
+        model.cable,
+        model.layout,
+        tolerance * model.length,
+        wait,
+        given,
+        model.tension_scale,
+        user,
+        min(max(wait, FASTEST * step), SLOWEST * pace),
+    )
+    manager.moments = model.ends.moments
+    manager.loaded = bool(manager.moments.any())
     return manager
 
 
@@ -89,7 +102,8 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
     """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
 
     found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than
-    the tolerance (criteria are estimates, and slack has many equilibria) more becomes rod, in the end all.
+    the tolerance (criteria are estimates, and slack has many equilibria) criteria become stricter, for all of the run;
+    where that does not help, zones stay rod.
     """
     assert model.layout is not None
     most, equilibrium = model, found
@@ -108,7 +122,11 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
                 break
             if _apart(equilibrium.state, most.layout, answer) <= allowed:
                 return answer
-    finally:
+        else:
+            manager.held = True
+    except ComputationError:
+        manager.held = True
+    if manager.held:
         manager.tolerance = allowed
     manager.follow(most.layout)
     return most, equilibrium
@@ -128,7 +146,7 @@ def zones_of_start(model: Model, manager: DomainManager) -> Model:
 def _zones_within(
     model: Model, found: Equilibrium, manager: DomainManager, t: float
 ) -> tuple[Model, Equilibrium] | None:
-    """Zones that satisfy the criteria in their own equilibrium; None: all rod, or there is no such equilibrium."""
+    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     assert model.layout is not None
     full = found.state
     manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
@@ -138,10 +156,7 @@ def _zones_within(
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        try:
-            answer = _equilibrium(new, t, _picked(full, model.layout.nodes, new.line))
-        except ComputationError:
-            return None
+        answer = _equilibrium(new, t, _picked(full, model.layout.nodes, new.line))
         manager.follow(layout)
         manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
         more = rod | manager.first(answer.state)
@@ -202,12 +217,12 @@ class Zoning:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
         line = self.model.line
         if self.relaxing is not None:
-            lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.dwell)
+            lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.pace)
             line.h[:] = self.true - lack
         if self.manager.blending:
             soften(self.manager.parts(dt), self.stiff, line.kb)
         if self.joints is not None:
-            self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.dwell)
+            self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.pace)
 
     def weigh(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
         """Weigh the criteria after a step of dt to t; catenary cells that are beyond their hard bound."""
@@ -269,7 +284,7 @@ class Zoning:
         shares = target.h / np.diff(new.base)[new.base_of_cell]
         elastic = _lengthening(state)
         if self.relaxing is not None:
-            elastic += (1.0 + line.ck * state.T) * self.relaxing.speed(t, LETTING_GO * manager.dwell)
+            elastic += (1.0 + line.ck * state.T) * self.relaxing.speed(t, LETTING_GO * manager.pace)
         elastic = np.add.reduceat(elastic, old.first[:-1])[new.base_of_cell] * shares
         rate = (elastic - _lengthening(carried.state)) / (1.0 + target.ck * carried.state.T)
         lack, since = self.true - carried.lengths, np.full(target.h.size, t)

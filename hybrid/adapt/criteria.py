@@ -62,16 +62,17 @@ def depth(sea, r, i):
 
 @kernel
 def weigh(
-    line, sea, tangents, r, e, T, a1, past, a, EI, w, node, floor, tolerance, torque, base_of_cell, free, turn, ratios
+    line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
+    turn, twisting, ratios
 ):  # fmt: skip
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
     Returns the largest ratio among base cells that are catenary and free to change.
 
     tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
-    change since then goes on; EI, w, node, floor: (N+1,) bending stiffness, weight per length, what sits there,
-    tension floor; torque: of the whole line as far as its rods do not know it, N m; free: (n,) of base
-    cells; turn: (N+1,) to work in.
+    change since then goes on; EI, w, bent, node, floor: (N+1,) bending stiffness, weight per length, curvature without
+    stress, what sits there, tension floor; torque: of the whole line as far as its rods do not know it, N m;
+    free: (n,) of base cells; turn, twisting: (N+1,) turns, and torques, N m, of nodes (written).
     """
     n = e.shape[0]
     turn[0], turn[n] = 0.0, 0.0
@@ -85,16 +86,18 @@ def weigh(
         d1, _, _ = chord(get3(e, i))
         x = sub(d1, d0)
         turn[i] = math.sqrt(dot(x, x))
-        Mt = torque
+        twisting[i] = torque
         if line.element[i]:
             b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
-            Mt = line.kb[i, 2] * (math.atan2(dot(cross(carried, b), d1), dot(carried, b)) - line.k0[i, 2])
-        T1 = max(min(T[i - 1], T[i]), floor[i], 1e-300)
-        put(ratios, TORSION, base_of_cell[i - 1], base_of_cell[i], Mt * Mt / (4.0 * EI[i] * T1 * TWISTED))
+            angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
+            twisting[i] = line.kb[i, 2] * (angle - line.k0[i, 2])
     d0 = get3(tangents, 1)
     if dot(d0, d0) > 0.0:
         x = sub(d1, d0)
         turn[n] = math.sqrt(dot(x, x))
+    whole = 0.0
+    for i in range(n + 1):
+        whole += turn[i]
     for i in range(n + 1):
         ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
         jb = base_of_cell[i] if i < n else base_of_cell[n - 1]
@@ -116,7 +119,15 @@ def weigh(
         if i == 0 or i == n:
             put(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
         else:
-            bend = EI[i] * turn[i] / (line.hn[i] * T1 * tolerance)
+            bend = EI[i] * (turn[i] / line.hn[i] + bent[i]) / (T1 * tolerance)
+            Mt = twisting[i]
+            put(
+                ratios,
+                TORSION,
+                ja,
+                jb,
+                max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance) / (2.0 * T1),
+            )
             if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
                 smooth = 0.0  # what is left of the turn without what the curvature on both sides makes of it
                 if i > 1:

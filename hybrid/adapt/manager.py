@@ -28,9 +28,9 @@ FLOOR = 0.2
 # Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
 # is what straightens a cable.
 BUFFER = 2.0
-# How far ahead a falling tension is seen, in dwell times; the past it is judged by is a sample or two old.
+# How far ahead a falling tension is seen, in paces; the past it is judged by is a sample or two old.
 HORIZON, MOST_AHEAD = 0.125, 2.0
-REVIEWS, SAMPLES = 4, 16  # in a dwell time: reviews when nothing asks, what happens in between is remembered; pasts
+REVIEWS, SAMPLES = 4, 16  # in a pace: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 HASTE = 16.0  # times as fast bending is blended in where tension is lost
 MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
@@ -90,10 +90,15 @@ class DomainManager:
         given: np.ndarray,
         scale: float,
         user: UserCriterion | None = None,
+        pace: float | None = None,
     ) -> None:
-        """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N."""
+        """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N.
+
+        dwell: s, for which a rod must have been calm; pace: s, in which bending comes and goes (None: dwell).
+        """
         n = layout.rod.size
         self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
+        self.pace, self.held = pace or dwell, False
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
@@ -104,7 +109,7 @@ class DomainManager:
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
-        self.loaded = False  # whether a moment may be given at an end
+        self.moments, self.loaded = np.zeros((2, 3)), False  # N m, given at the ends
         self.twisted = all(cable.held_twist) and all(cable.held_tangent)
         self.total_twist = 0.0
         self.follow(layout)
@@ -125,7 +130,9 @@ class DomainManager:
         self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
         self.base_of_cell = layout.base_of_cell
-        self.turn, self.share = np.zeros((2, s.size))
+        bent = np.linalg.norm(cable.kappa[of, :2], axis=1)
+        self.bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
+        self.turn, self.twisting, self.share = np.zeros((3, s.size))
         self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
         self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
         self._see_who_comes()
@@ -157,30 +164,37 @@ class DomainManager:
             self.past = self.recent = state.T.copy()
             self.age = self.recent_age = 0.0
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
-        ahead = min(HORIZON * self.dwell / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
+        ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
         torque = self._torque(line, ends, state) if self.twisted else 0.0
         if self.loaded:
-            self._weigh_moments(ends, state)
+            torque += self._weigh_moments(state)
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
-            self.EI, self.w, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free, self.turn,
-            self.ratios,
+            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free,
+            self.turn, self.twisting, self.ratios,
         )  # fmt: skip
         if self.user is not None:
             self._ask_user(line, state, t)
         return self.loudest
 
-    def _weigh_moments(self, ends: Ends, state: State) -> None:
-        """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does."""
+    def _weigh_moments(self, state: State) -> float:
+        """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does; of its full size.
+
+        Returns the torque, N m, that it has along the cable, 0 where rods carry all of it.
+        """
+        torque = 0.0
         for k, node in ((0, 0), (-1, -1)):
-            moment = float(np.linalg.norm(ends.moment[k]))
+            moment = float(np.linalg.norm(self.moments[k]))
             T = max(float(state.T[k]), float(self.floor[node]), 1e-300)
             ratio = self.ratios[CLAMP]
             ratio[k] = max(ratio[k], min(moment / (T * self.tolerance), MOST))
+            along = float(self.moments[k] @ state.e[k] / np.linalg.norm(state.e[k]))
+            torque = max(torque, abs(along))
+        return 0.0 if self.layout.rod.all() else torque
 
     def remember(self, state: State) -> None:
         """The state that was weighed is accepted: its tensions will be the past."""
-        if self.recent_age * SAMPLES >= self.dwell:
+        if self.recent_age * SAMPLES >= self.pace:
             self.past, self.age = self.recent, self.recent_age
             self.recent, self.recent_age = state.T.copy(), 0.0
 
@@ -246,7 +260,7 @@ class DomainManager:
         next_, self.calm_since = planned(
             self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
         )
-        next_ &= self.given >= 0
+        next_ = (next_ | (rod & self.held)) & (self.given >= 0)
         back, before, self.leaving = self.going, self.leaving, rod & ~next_
         self.going = bool(self.leaving.any())
         if back or self.going:
@@ -258,7 +272,7 @@ class DomainManager:
         if self.going:
             wait = max(min(float(self.grown[self.leaving].min()), wait), 0.0)
             new = next_ | (self.leaving & (self.grown > 0.0))
-        self.next_review = t + (wait - 1e-9) * self.dwell
+        self.next_review = t + (wait - 1e-9) * self.pace
         change = None
         if (new != rod).any():
             urgent = spread(self.ratios[SLACK] > 1.0, self.layout.base, rules.buffer)
@@ -292,7 +306,7 @@ class DomainManager:
     def _complete(self) -> None:
         """What is not of a place: the scene's wishes, and torque, which needs rods from end to end."""
         self.ratios[GIVEN, self.given > 0] = ASKED
-        if self.twisted:
+        if self.twisted or self.loaded:
             self.ratios[TORSION] = self.ratios[TORSION].max()
 
     def _forget(self) -> None:
@@ -351,15 +365,15 @@ class DomainManager:
     def parts(self, dt: float = 0.0) -> Floats:
         """How much of its stiffness every node has (N+1,), dt from now; overwritten by the next call.
 
-        Over a dwell time: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
+        Over a pace: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
         """
-        shares(self.grown, self.leaving, self.haste, dt / self.dwell, self.base_of_cell, self.share)
+        shares(self.grown, self.leaving, self.haste, dt / self.pace, self.base_of_cell, self.share)
         return self.share
 
     def blend(self, dt: float) -> None:
         """Move on by dt."""
-        advance(self.grown, self.leaving, self.haste, dt / self.dwell)
+        advance(self.grown, self.leaving, self.haste, dt / self.pace)
         self._see_who_comes()
 
     def _see_who_comes(self) -> None:

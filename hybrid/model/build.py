@@ -117,7 +117,7 @@ def build(scene: Scene) -> Model:
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    line = line_on(cable, s, rod, touch)
+    line = line_on(cable, s, rod, touch, sections_turn=layout is None)  # rods that come and go have no such inertia
     h, compliance = line.h, line.ck
 
     start = blank_state(n)

@@ -77,9 +77,13 @@ class EndConditions:
         self.at(np.inf)
 
     @property
-    def moments(self) -> bool:
-        """Whether a moment is given at an end at any time."""
-        return any(x.what == "moment" for x in self._loads)
+    def moments(self) -> Floats:
+        """The moments (2, 3) N m that are given at the ends, when they have grown to their full size."""
+        out = np.zeros((2, 3))
+        for x in self._loads:
+            if x.what == "moment":
+                out[x.end] += x.value
+        return out
 
     def set_loads(self, t: float) -> None:
         """Choose the loads that act just after t."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import pi
 
@@ -121,6 +121,9 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]
+    if isinstance(scene.model, AdaptiveModel):
+        why = "rods that come and go have none; fixed zones and `model: rod` do"
+        entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = getattr(end, "motion", None) is not None
         entries.append(Entry(f"ends.{name}: {end.kind}{', moving' if moving else ''}", True, f"ends.{name}"))

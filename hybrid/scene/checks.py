@@ -43,6 +43,16 @@ def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Find
             yield Finding((*here, "diameter"), expected, "add `diameter: ...` (m)")
 
 
+def _sections_that_come_and_go(cable: Cable, model: Model) -> Iterator[Finding]:
+    if not isinstance(model, AdaptiveModel):
+        return
+    for i, section in enumerate(cable.sections):
+        if section.rotary_inertia is not None and section.rotary_inertia not in (0, (0, 0)):
+            expected = "nothing or 0, because zones move (model), and rods that come and go have no rotary inertia"
+            fix = "leave it out, or write `model: rod`"
+            yield Finding(("cable", "sections", i, "rotary_inertia"), expected, fix)
+
+
 def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:
     if not isinstance(model, ZonesModel):
         return
@@ -152,6 +162,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _rods_can_bend,
     _stretches_on_cable,
     _zones_that_move,
+    _sections_that_come_and_go,
     _mesh_spans,
     _output_on_cable,
 )

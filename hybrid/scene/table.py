@@ -224,7 +224,8 @@ class Kinds:
         if not isinstance(value, Mapping):
             self._refuse_table(None)
         if "kind" not in value:
-            value = {"kind": kind for key, kind in self.implied if key in value} | dict(value)
+            implied = [kind for key, kind in self.implied if key in value]
+            value = {"kind": implied[0], **value} if implied else value
         kind = value.get("kind")
         expected = f"one of: {', '.join(self.names)}"
         if kind is None:

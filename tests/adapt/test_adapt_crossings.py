@@ -312,10 +312,14 @@ def test_everything_asks_is_a_rod(how):
     same(result, fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
 
 
-def test_rotary_inertia_is_kept():
-    """A rod with rotary inertia stays one when its zones may move: all rod is `model: rod`."""
-    what = sagging(model={"always_rod": [[0, LENGTH]]}, rotary_inertia=0.01)
-    same(hybrid.run(what), fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
+def test_rods_that_come_and_go_have_no_rotary_inertia():
+    """What a section gives is refused, what a diameter implies is left out, from the beginning: all rod has none either."""
+    with pytest.raises(ValueError, match="rods that come and go have no rotary inertia"):
+        sagging(rotary_inertia=0.01)
+    what = sagging(model={"always_rod": [[0, LENGTH]]}, diameter=0.2)
+    same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
+    plan = {x.what: x for x in hybrid.plan(what).ledger}
+    assert not plan["rotary inertia"].on and "come and go" in plan["rotary inertia"].why
 
 
 def test_what_the_scene_gives_is_so():

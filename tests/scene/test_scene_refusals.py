@@ -271,5 +271,3 @@ ACCEPTED = {
 @pytest.mark.parametrize("name", ACCEPTED)
 def test_accepted(name: str) -> None:
     assert complaints(change(*ACCEPTED[name])) == []
-
-
