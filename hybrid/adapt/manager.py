@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.adapt.blend import advance, shares
-from hybrid.adapt.criteria import LOAD, MOST, STEP, end_turn, twist_of_rods, weigh
+from hybrid.adapt.criteria import LOAD, MOST, STEP, TWISTED, end_turn, twist_of_rods, weigh
 from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.adapt.table import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.model.layout import Layout, edges
@@ -167,7 +167,7 @@ class DomainManager:
         ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
         torque = self._torque(line, ends, state) if self.twisted else 0.0
         if self.loaded:
-            torque += self._weigh_moments(state)
+            self._weigh_moments(state)
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
             self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free,
@@ -177,20 +177,21 @@ class DomainManager:
             self._ask_user(line, state, t)
         return self.loudest
 
-    def _weigh_moments(self, state: State) -> float:
+    def _weigh_moments(self, state: State) -> None:
         """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does; of its full size.
 
-        Returns the torque, N m, that it has along the cable, 0 where rods carry all of it.
+        What of it turns about the cable is a torque, whether rods feel it already or not.
         """
-        torque = 0.0
         for k, node in ((0, 0), (-1, -1)):
             moment = float(np.linalg.norm(self.moments[k]))
             T = max(float(state.T[k]), float(self.floor[node]), 1e-300)
             ratio = self.ratios[CLAMP]
             ratio[k] = max(ratio[k], min(moment / (T * self.tolerance), MOST))
             along = float(self.moments[k] @ state.e[k] / np.linalg.norm(state.e[k]))
-            torque = max(torque, abs(along))
-        return 0.0 if self.layout.rod.all() else torque
+            loosest = max(float(state.T.min()), float(self.floor.min()), 1e-300)
+            twisting = along**2 / (2.0 * float(self.EI.min()) * TWISTED)
+            torsion = max(twisting, abs(along) * float(self.turn.sum()) / self.tolerance) / (2.0 * loosest)
+            np.maximum(self.ratios[TORSION], min(torsion, MOST), out=self.ratios[TORSION])
 
     def remember(self, state: State) -> None:
         """The state that was weighed is accepted: its tensions will be the past."""

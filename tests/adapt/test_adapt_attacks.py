@@ -1,0 +1,139 @@
+"""Scenes with which others have broken zones that move, each held against the rod of the same scene."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+from adapt_scenes import changes, rods
+from problems import clamped, free, pinned
+
+import hybrid
+
+Text = dict[str, Any]
+
+
+def scene(section: Text, start: Text, end: Text, **more: Any) -> Text:
+    text: Text = {
+        "cable": {"sections": [section]}, "ends": {"start": start, "end": end}, "initial": {"kind": "equilibrium"},
+        "model": {"kind": "adaptive"}, "time": {"duration": 10.0, "step": 0.02}, "output": {"every": 0.25},
+    }  # fmt: skip
+    return text | more
+
+
+def compared(text: Text) -> tuple[hybrid.Result, hybrid.Result, np.ndarray]:
+    """The run, that of the rod, and the largest distance at every output over the tolerance."""
+    L = text["cable"]["sections"][0]["length"]
+    a = hybrid.run(hybrid.validate_scene(text))
+    r = hybrid.run(hybrid.validate_scene(text | {"model": text["model"] | {"always_rod": [[0, L]]}}))
+    far = np.linalg.norm(a.position - r.position, axis=2).max(axis=1)
+    return a, r, far / L / text["model"].get("tolerance", 1e-3)
+
+
+@pytest.mark.parametrize("moment, tolerance", [(100.0, 1e-3), (400.0, 1e-3), (400.0, 1e-4)])
+def test_a_moment_that_grows_at_a_free_end(moment, tolerance):
+    """M/T is what it holds the cable off its catenary by; it grows from nothing, so no equilibrium knows of it."""
+    section = {"length": 20, "mass": 1, "bending_stiffness": 50, "axial_stiffness": 1e6, "damping": {"mass": 0.5}}
+    end = free(force=[200, 0, -800], moment={"value": [0, moment, 0], "ramp": 5})
+    a, r, far = compared(scene(section, pinned(), end, model={"kind": "adaptive", "tolerance": tolerance}))
+    assert far.max() < 1.0
+    assert a.bending_moment[-1, -3:] == pytest.approx(r.bending_moment[-1, -3:], rel=1e-3)
+
+
+def test_a_torque_that_grows_at_a_free_end_needs_rods_all_along():
+    section = {
+        "length": 20, "mass": 1, "bending_stiffness": 50, "torsional_stiffness": 400, "axial_stiffness": 1e6,
+        "damping": {"mass": 0.5},
+    }  # fmt: skip
+    end = free(force=[800, 0, 0], moment={"value": [200, 0, 0], "ramp": 5})
+    a, r, far = compared(scene(section, clamped(), end))
+    assert far.max() < 1.0 and rods(a, 0) == rods(a, -1) == [(0.0, 20.0)]
+    assert a.torque[-1] == pytest.approx(r.torque[-1], rel=1e-3)
+
+
+def test_a_torque_in_a_curved_cable_is_held_against_the_tolerance():
+    """M turn/(2 T): a twisted cable leaves its plane long before it could go into a loop (M^2/(4 EI T) is 0.07 here)."""
+    section = {"length": 20, "mass": 0.5, "bending_stiffness": 5.0, "axial_stiffness": 1e6, "damping": {"mass": 0.5}}
+    roll = {"roll": {"amplitude": 1440.0, "period": 40.0}, "ramp": 2.0}
+    end = clamped((19, 0, 0), (1, 0, 0.35), motion=roll)
+    a, r, far = compared(scene(section, clamped((0, 0, 0), (1, 0, -0.35)), end))
+    assert far.max() < 1.0
+    assert rods(a, -1) == [(0.0, 20.0)] and any(e.criterion == "torsion" for e in changes(a))
+    assert a.torque[-1] == pytest.approx(r.torque[-1], rel=0.01)
+    assert np.abs(r.position[-1, :, 1]).max() > 0.02  # what a catenary would have missed: the tolerance
+
+
+@pytest.mark.parametrize("cells, span, tolerance", [(8, 60, 1e-3), (3, 90, 1e-3), (3, 60, 1e-2)])
+def test_what_the_comparison_at_rest_has_shown_is_kept(cells, span, tolerance):
+    """Base cells so long that a catenary of them is far from the rod: zones stay rod, and the result says why."""
+    section = {"length": 100, "mass": 2, "bending_stiffness": 50, "axial_stiffness": 1e6}
+    model = {"kind": "adaptive", "tolerance": tolerance}
+    a, _, far = compared(scene(section, pinned(), pinned(span, 0, 0), mesh={"cells": cells}, model=model))
+    assert far.max() < 0.1 and np.abs(a.velocity).max() < 1e-9
+    assert [e.kind for e in a.events] == ["zones held"]
+
+
+def test_curvature_without_stress_bends_a_straight_cable():
+    section = {
+        "length": 20, "mass": 5, "bending_stiffness": 50, "torsional_stiffness": 40, "axial_stiffness": 1e6,
+        "intrinsic_curvature": (2.0, 0, 0), "damping": {"mass": 0.5},
+    }  # fmt: skip
+    ends = clamped((0, 0, 0), (1, 0, -0.4)), clamped((19, 0, 0), (1, 0, 0.4))
+    a, _, far = compared(scene(section, *ends, time={"duration": 4.0, "step": 0.02}))
+    assert far.max() < 1.0 and np.abs(a.velocity).max() < 1e-6
+
+
+@pytest.mark.parametrize("dwell", [1e-3, 0.05, None, 100.0])
+def test_dwell_is_no_blending_time(dwell):
+    """However short or long a rod must be calm, bending comes and goes in a time of the line's own."""
+    section = {
+        "length": 60, "mass": 1.5, "bending_stiffness": 5, "axial_stiffness": 1e6, "diameter": 0.03,
+        "drag": {"normal": 1.2, "tangential": 0.1}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    end = pinned(52, 0, -3, motion={"surge": {"amplitude": 5.0, "period": 6.0}, "ramp": 6.0})
+    water = {
+        "environment": {"fluid": {"density": 1025}},
+        "model": {"kind": "adaptive"} | ({"dwell": dwell} if dwell else {}),
+    }
+    a, r, far = compared(scene(section, pinned(), end, **water, time={"duration": 20.0, "step": 0.02}))
+    assert far.max() < 1.0
+    assert np.abs(a["work/scheme"]).max() < 1.5 * np.abs(r["work/scheme"]).max()
+
+
+def test_an_inextensible_cable_that_snaps_creates_no_energy():
+    """Zones come and go twice, then it snaps taut again and again."""
+    section = {
+        "length": 100, "mass": 2, "bending_stiffness": 50, "diameter": 0.03, "drag": {"normal": 1.2},
+        "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    end = pinned(90, 0, 0, motion={"surge": {"amplitude": 8.0, "period": 6.0}, "ramp": 12.0})
+    more = {"environment": {"fluid": {"density": 1025}}, "time": {"duration": 40.0, "step": 0.02}}
+    a, r, _ = compared(scene(section, pinned(), end, **more))
+    assert changes(a)
+    assert np.abs(a["work/scheme"]).max() < 1.2 * np.abs(r["work/scheme"]).max()
+
+
+def test_always_catenary_is_so_from_the_beginning():
+    section = {"length": 60, "mass": 1, "bending_stiffness": 100, "axial_stiffness": 1e6}
+    model = {"kind": "adaptive", "tolerance": 1e-5, "always_catenary": [[20, 40]]}
+    text = scene(section, pinned(), pinned(55, 0, 0), model=model, time={"duration": 1.0, "step": 0.02})
+    a = hybrid.run(hybrid.validate_scene(text))
+    for k in (0, -1):
+        assert all(not (z.s_a < 40 and z.s_b > 20) for z in a.zones[k] if z.kind == "rod")
+    assert rods(a, 0) and not changes(a)
+    start = text | {"initial": {"kind": "straight", "direction": (0, 0, -1)}}
+    start["ends"] = {"start": pinned(), "end": free()}
+    del section["axial_stiffness"]  # or weight, there at once, would send waves along it
+    a = hybrid.run(hybrid.validate_scene(start))
+    assert rods(a, 0) == [(0.0, 20.0), (40.0, 60.0)]
+
+
+def test_a_clamp_that_is_left_out_is_said():
+    section = {"length": 500, "mass": 1.2, "bending_stiffness": 20, "axial_stiffness": 3e6}
+    text = scene(section, pinned(), clamped((400, 0, -100)), time={"duration": 0.2, "step": 0.02})
+    a = hybrid.run(hybrid.validate_scene(text))
+    (said,) = [e for e in a.events if e.kind == "clamp left out"]
+    assert said.s_a == 500.0 and "always_rod: [[4" in said.text
+    asked = text | {"model": {"kind": "adaptive", "always_rod": [[490, 500]]}}
+    assert not [e for e in hybrid.run(hybrid.validate_scene(asked)).events if e.kind == "clamp left out"]
