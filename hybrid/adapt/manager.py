@@ -166,13 +166,13 @@ class DomainManager:
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
         ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
         torque = self._torque(line, ends, state) if self.twisted else 0.0
-        if self.loaded:
-            self._weigh_moments(state)
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
             self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free,
             self.turn, self.twisting, self.ratios,
         )  # fmt: skip
+        if self.loaded:
+            self._weigh_moments(state)
         if self.user is not None:
             self._ask_user(line, state, t)
         return self.loudest
@@ -192,6 +192,9 @@ class DomainManager:
             twisting = along**2 / (2.0 * float(self.EI.min()) * TWISTED)
             torsion = max(twisting, abs(along) * float(self.turn.sum()) / self.tolerance) / (2.0 * loosest)
             np.maximum(self.ratios[TORSION], min(torsion, MOST), out=self.ratios[TORSION])
+        quiet = self.layout.rod | (self.given < 0)
+        asked = self.ratios[[CLAMP, TORSION]].max(axis=0)
+        self.loudest = max(self.loudest, float(np.max(asked, where=~quiet, initial=0.0)))
 
     def remember(self, state: State) -> None:
         """The state that was weighed is accepted: its tensions will be the past."""
