@@ -54,7 +54,7 @@ TAIL = """\
 
 Everything below is said at once, with file, line, column, the value, what was expected and what to try:
 unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
-cable is long; zones that do not add up to the length; a rod zone over a section without bending stiffness; drag,
+cable is long; zones that do not add up to the length; a rod zone, or zones that move, over a section without bending stiffness; zones that move with rotary inertia; drag,
 added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
 an initial shape that misses a held end; a normal along its tangent; waves without a surface, or so steep that they
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
@@ -176,6 +176,31 @@ ends: {start: free, end: {kind: body, mass: 10}}
 initial: {kind: equilibrium, points: [[0, 0, -20], [6, 0, -20], [6, 4, -20]]}
 model: catenary
 ```
+
+## Zones that move
+
+`model: adaptive`, or no `model` for a cable that bends: rod where bending, torsion or slack ask for it, catenary
+elsewhere, at every step anew; docs/zones.md says by which criteria.
+`tolerance` is a part of the length; `always_rod` and `always_catenary` take whole base cells and, for rods, a buffer;
+base cells are `mesh.cells` (60) or `mesh.nodes`, and each is divided into 1 to 32 rod cells no longer than `rod_cell`.
+
+```yaml
+environment: {fluid: {density: 1025}}
+cable:
+  sections: [{length: 100, mass: 0.8, diameter: 0.025, axial_stiffness: 2.0e+6, bending_stiffness: 20, drag: {normal: 1.2}}]
+ends:
+  start: {kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1.0, period: 8.0}, ramp: 16}}
+  end: {kind: clamped, position: [40, 0, -60], tangent: [1, 0, 0.5]}
+initial: equilibrium
+model: {kind: adaptive, tolerance: 5.0e-4, always_rod: [[95, 100]]}
+time: {duration: 60, step: 0.05}
+output: {every: 0.25, criteria: true}
+```
+
+Every change is an event: `split` (a rod within a catenary), `grow`, `merge` (a rod goes), `shrink`, and `retry` (a step
+was taken back because a catenary would have gone too far in it), each with the criterion, its value and threshold, and
+the energy that the change put in.
+`zones held` and `clamp left out` say what the program decided at the start.
 
 ## Steps and outputs
 

@@ -211,9 +211,9 @@ PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], flo
     "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
     "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
     "touchdown": ([], [(85, 125)], 0.13, 29),
-    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 57),
+    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 56),
     "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
-    "irregular_sea": ([], [(33.333, 40)], 0.08, 99),
+    "irregular_sea": ([], [(33.333, 40)], 0.082, 95),
 }
 CHANGES = ("split", "grow", "merge", "shrink", "retry")
 
