@@ -160,6 +160,18 @@ class Stepper:
     def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
         """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
         rows = np.zeros((self.line.s.size, SIZE * WIDTH))
+        self._march_as_it_is(sea, ends, state, rows)
+        return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+
+    def feel(self, sea: Sea, ends: Ends, state: State) -> None:
+        """The forces and the report of a state as it is, for the books of the step that follows."""
+        self._march_as_it_is(sea, ends, state, self.rows)
+        if self.line.bits & SEABED:
+            self.report[28] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
+        self.told = self.report.tolist()
+
+    def _march_as_it_is(self, sea: Sea, ends: Ends, state: State, rows: Floats) -> None:
         self.u[:] = 0.0
         if self.line.bits & WAVES:
             stir(sea, state.r, self.u)
@@ -169,23 +181,6 @@ class Stepper:
             self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
             0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
         )  # fmt: skip
-        return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
-
-    def feel(self, sea: Sea, ends: Ends, state: State) -> None:
-        """The forces and the report of a state as it is, for the books of the step that follows."""
-        self.u[:] = 0.0
-        if self.line.bits & WAVES:
-            stir(sea, state.r, self.u)
-        if self.line.bits & FRICTION:
-            lay(sea, state.e, state.slip)
-        march(
-            self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
-            0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
-        )  # fmt: skip
-        if self.line.bits & SEABED:
-            self.report[28] = stored(self.line, sea, state.r)
-            state.bed[:] = sea.bed
-        self.told = self.report.tolist()
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""

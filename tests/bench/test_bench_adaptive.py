@@ -112,6 +112,7 @@ def test_adaptive_random() -> None:
 def test_adaptive_suspension() -> None:
     """Error asked and achieved, rod share, CPU time; the suspension of Goyal and Perkins, let go from a straight line."""
     text = example("02_suspension") | {"mesh": {"cells": 40}}
+    run(text)  # once for the compiler
     r = run(text, kind="adaptive", always_rod=[[0, 2.0]])
     print("\nsuspension   asked (L)  achieved: at rest, on the way   rod share: begin, mean, end   CPU, all rod = 1")
     for asked in (1e-1, 5e-2, 2e-2, 1e-2, 3e-3, 1e-3):
