@@ -376,7 +376,7 @@ def test_adaptive_slack() -> None:
     out = (750.0 - float(np.hypot(60, 100)) - 185.0) / 2
     points = [[0, 0, -100], [50, 0, -100], [50, out, -100], [90, out, -100], [90, 0, -100], [145, 0, -100], [205, 0, 0]]
     text |= {
-        "initial": {"kind": "equilibrium", "points": points},
+        "initial": {"kind": "equilibrium", "points": points, "friction": "settled"},
         "model": {"kind": "adaptive"},
         "output": {"every": 1.0},
     }
