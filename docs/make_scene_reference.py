@@ -54,7 +54,8 @@ TAIL = """\
 
 Everything below is said at once, with file, line, column, the value, what was expected and what to try:
 unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
-cable is long; zones that do not add up to the length; a rod zone, or zones that move, over a section without bending stiffness; zones that move with rotary inertia; drag,
+cable is long; zones that do not add up to the length; a rod zone, or zones that move, over a section without
+bending stiffness; zones that move with rotary inertia; drag,
 added mass or buoyancy without fluid or diameter; a motion that does not start from rest or whose velocity jumps;
 an initial shape that misses a held end; a normal along its tangent; waves without a surface, or so steep that they
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
@@ -187,7 +188,8 @@ base cells are `mesh.cells` (60) or `mesh.nodes`, and each is divided into 1 to 
 ```yaml
 environment: {fluid: {density: 1025}}
 cable:
-  sections: [{length: 100, mass: 0.8, diameter: 0.025, axial_stiffness: 2.0e+6, bending_stiffness: 20, drag: {normal: 1.2}}]
+  sections:
+    - {length: 100, mass: 0.8, diameter: 0.025, axial_stiffness: 2.0e+6, bending_stiffness: 20, drag: {normal: 1.2}}
 ends:
   start: {kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1.0, period: 8.0}, ramp: 16}}
   end: {kind: clamped, position: [40, 0, -60], tangent: [1, 0, 0.5]}
