@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybrid.adapt.blend import freed, soften
+from hybrid.adapt.blend import freed, soften, still_lacking
 from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
@@ -48,13 +48,6 @@ class Relaxing:
     rate: Floats
     since: Floats
     keeps: np.ndarray
-
-    def at(self, t: float, duration: float) -> tuple[Floats, bool]:
-        """What they lack at t, and whether any still lacks something: a quintic from value and slope to rest."""
-        x = np.clip((t - self.since) / duration, 0.0, 1.0)
-        value = np.where(self.keeps, 1.0, 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x))
-        slope = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
-        return self.lack * value + duration * self.rate * slope, bool((x < 1.0).any())
 
     def speed(self, t: float, duration: float) -> Floats:
         """Rate (N,) m/s at which what they lack grows."""
@@ -217,8 +210,10 @@ class Zoning:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
         line = self.model.line
         if self.relaxing is not None:
-            lack, self.letting_go = self.relaxing.at(end, LETTING_GO * self.manager.pace)
-            line.h[:] = self.true - lack
+            x = self.relaxing
+            self.letting_go = still_lacking(
+                x.lack, x.rate, x.since, x.keeps, end, LETTING_GO * self.manager.pace, self.true, line.h
+            )
         if self.manager.blending:
             soften(self.manager.parts(dt), self.stiff, line.kb)
         if self.joints is not None:

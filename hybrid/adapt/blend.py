@@ -40,6 +40,26 @@ def shares(grown, leaving, haste, dt, base_of_cell, out):
 
 
 @kernel
+def still_lacking(lack, rate, since, keeps, t, duration, true, h):
+    """Lengths h (N,) m at t of cells on their way to their true ones; whether any is still under way.
+
+    A quintic from value and rate at `since` to rest at nothing, or, where `keeps`, at the value, after `duration`.
+    """
+    going = False
+    for c in range(h.size):
+        x = (t - since[c]) / duration
+        if x < 1.0:
+            going = True
+            x = max(x, 0.0)
+            y = (1.0 - x) ** 3
+            value = 1.0 if keeps[c] else 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+            h[c] = true[c] - lack[c] * value - duration * rate[c] * x * y * (1.0 + 3.0 * x)
+        else:
+            h[c] = true[c] - (lack[c] if keeps[c] else 0.0)
+    return going
+
+
+@kernel
 def soften(part, stiff, kb):
     """kb (N+1, 3) = part (N+1,) of stiff (N+1, 3)."""
     for i in range(part.size):

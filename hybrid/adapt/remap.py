@@ -238,11 +238,11 @@ def balance(
     size = np.linalg.norm(shift, axis=1)
     shift *= np.minimum(1.0, FARTHEST * np.append(l, l[-1]) / np.maximum(size, 1e-300))[:, None]
     state.r[:] += shift
-    for c in np.flatnonzero(fresh[1:] | fresh[:-1]):
-        state.e[c] += shift[c + 1] - shift[c]
-        l[c] = np.linalg.norm(state.e[c])
-        state.a1[c] = _carried(state.a1[c], d[c], state.e[c] / l[c])
-        lengths[c] = l[c] / (1.0 + target.ck[c] * state.T[c])
+    c = np.flatnonzero(fresh[1:] | fresh[:-1])
+    state.e[c] += shift[c + 1] - shift[c]
+    l = np.linalg.norm(state.e[c], axis=1)
+    state.a1[c] = _all_carried(state.a1[c], d[c], state.e[c] / l[:, None])
+    lengths[c] = l / (1.0 + target.ck[c] * state.T[c])
 
 
 def _across(d: Floats) -> Floats:
@@ -257,6 +257,17 @@ def _carried(a: Floats, d: Floats, to: Floats) -> Floats:
     b = a - (a @ to) / c * (d + to) if c > 1e-12 else a
     b = b - (b @ to) * to
     return np.asarray(b / np.linalg.norm(b))
+
+
+def _all_carried(a: Floats, d: Floats, to: Floats) -> Floats:
+    """The same for many (k, 3) that turn by less than half a turn."""
+
+    def dot(x: Floats, y: Floats) -> Floats:
+        return np.asarray(np.einsum("ij,ij->i", x, y)[:, None])
+
+    b = a - dot(a, to) / (1.0 + dot(d, to)) * (d + to)
+    b = b - dot(b, to) * to
+    return np.asarray(b / np.linalg.norm(b, axis=1)[:, None])
 
 
 def _turned(a: Floats, d: Floats, angle: Any) -> Floats:
