@@ -348,7 +348,7 @@ def test_adaptive_speed(name: str) -> None:
 
 def test_adaptive_joints() -> None:
     """Spherical joints against joints that carry EI kappa of the catenary, on every example that has any."""
-    print("\ndistance to all rod (1e-3 L), CPU (s), changes     spherical                  curvature")
+    print("\ndistance to all rod (1e-3 L), CPU (all rod: s), changes     spherical                  curvature")
     names = ("02_suspension", "s_tether", "rov_tether", "touchdown", "laying", "slack_on_seabed", "irregular_sea")
     for name in names:
         for tolerance in (3e-3, 1e-3, 3e-4):
@@ -362,7 +362,7 @@ def test_adaptive_joints() -> None:
                 cells.append(
                     f"{1e3 * apart(a[0], r) / L:8.3f} {median(cpu(x) for x in a):8.2f} {len(changes(a[0])):6d}"
                 )
-            print(f"  {name:16s} tolerance {tolerance:6g}   {cells[0]}   {cells[1]}")
+            print(f"  {name:16s} tolerance {tolerance:6g}, all rod {cpu(r):5.2f} s   {cells[0]}   {cells[1]}")
 
 
 # --- slack that others cannot do ------------------------------------------------------------------------------------
