@@ -181,7 +181,7 @@ class Motion:
         if rescues >= MOST_RESCUES or not cells.size:
             return False
         change = self.zoning.manager.insist(cells, why)
-        if (change.rod == self.zoning.manager.layout.rod).all():
+        if (change.rod == self.zoning.manager.layout.rod).all() and not change.stiff.any():
             return False
         self._switch(change)
         return True
@@ -191,7 +191,7 @@ class Motion:
         assert self.zoning is not None
         why = f"steps fail here, however small ({taken.outcome.cause}); repeated with rods everywhere"
         change = self.zoning.manager.insist(np.arange(self.model.cells), why)
-        if (change.rod == self.zoning.manager.layout.rod).all():
+        if (change.rod == self.zoning.manager.layout.rod).all() and not change.stiff.any():
             return False
         self._switch(change)
         return True

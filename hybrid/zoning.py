@@ -261,7 +261,7 @@ class Zoning:
         target = changed.line
         carried = self._carried(old, new, line, target, ends, state)
         fresh = new.rod & ~old.rod
-        manager.take(new, change.urgent, t)
+        manager.take(new, change, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()
         soften(manager.parts(), self.stiff, target.kb)
         cells = np.repeat(fresh, new.counts)

@@ -29,10 +29,12 @@ FLOOR = 0.2
 # is what straightens a cable.
 BUFFER = 2.0
 # How far ahead a falling tension is seen, in paces; the past it is judged by is a sample or two old.
-HORIZON, MOST_AHEAD = 0.125, 2.0
+HORIZON, MOST_AHEAD = 0.2, 3.0
 REVIEWS, SAMPLES = 4, 16  # in a pace: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 HASTE = 16.0  # times as fast bending is blended in where tension is lost
+SOON = 4.0  # dwell times within which a catenary is not worth the two switches that it takes
+LOST = 0.3  # part of the tension that is left of what is lost
 MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
@@ -76,6 +78,7 @@ class Change(NamedTuple):
     rod: np.ndarray
     reasons: tuple[Reason, ...]
     urgent: np.ndarray
+    stiff: np.ndarray  # rods that get all of their stiffness at once
 
 
 class DomainManager:
@@ -139,15 +142,17 @@ class DomainManager:
         self.past = self.recent = np.zeros(0)
         self.age = self.recent_age = 0.0
 
-    def take(self, new: Layout, urgent: np.ndarray, t: float) -> None:
+    def take(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
 
-        What comes back within the dwell time after it was let go must be calm twice as long from then on.
+        What comes back soon after it was let go must be calm twice as long from then on, and else half as long.
         """
-        fresh, gone = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod
-        soon = fresh & (t - self.released < self.dwell * self.patience)
-        self.patience[soon] = np.minimum(2.0 * self.patience[soon], MOST_PATIENCE)
+        fresh, gone, urgent = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod, change.urgent
+        soon = t - self.released < SOON * self.dwell * self.patience
+        self.patience[fresh] *= np.where(soon, 2.0, 0.5)[fresh]
+        self.patience = np.minimum(np.maximum(self.patience, 1.0), MOST_PATIENCE)
         self.released[gone] = t
+        self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
         self.haste[fresh] = np.where(urgent[fresh], HASTE, 1.0)
         self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
@@ -279,8 +284,8 @@ class DomainManager:
         self.next_review = t + (wait - 1e-9) * self.pace
         change = None
         if (new != rod).any():
-            urgent = spread(self.ratios[SLACK] > 1.0, self.layout.base, rules.buffer)
-            change = Change(new, tuple(self._reasons(rod, new)), urgent)
+            urgent = spread((self.ratios[SLACK] > 1.0) | self._losing(state), self.layout.base, rules.buffer)
+            change = Change(new, tuple(self._reasons(rod, new)), urgent, np.zeros_like(rod))
         self._forget()
         return change
 
@@ -299,8 +304,20 @@ class DomainManager:
         for j in np.unique(self.base_of_cell[cells]):
             new[max(j - 1, 0) : j + 2] = True
         new &= self.given >= 0
-        reasons = (r._replace(kind="retry") for r in self._reasons(self.layout.rod, new, why))
-        return Change(new, tuple(reasons), new)
+        reasons = [r._replace(kind="retry") for r in self._reasons(self.layout.rod, new, why)]
+        stiff = new & self.layout.rod & (self.grown < 1.0)
+        for a, b in pairwise(edges(stiff)):
+            if stiff[a]:
+                reasons.append(Reason(a, b, "retry", f"{why}, with all of its stiffness"))
+        return Change(new, tuple(reasons), new, stiff)
+
+    def _losing(self, state: State) -> np.ndarray:
+        """Base cells (n,) that lose most of their tension within a pace."""
+        if not self.age > 0.0:
+            return np.zeros(self.layout.rod.size, bool)
+        T = state.T + self.pace / self.age * (state.T - self.past)
+        falls = (T < LOST * state.T) & (self.past > state.T)
+        return np.asarray(np.logical_or.reduceat(falls, self.layout.first[:-1]))
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""

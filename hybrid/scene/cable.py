@@ -147,6 +147,11 @@ class Section(Table):
         return isinstance(self.bending_stiffness, tuple) and self.bending_stiffness[0] != self.bending_stiffness[1]
 
     @property
+    def turns(self) -> bool:
+        """Whether its cross-sections are given an inertia of their own."""
+        return self.rotary_inertia is not None and self.rotary_inertia not in (0, (0, 0))
+
+    @property
     def weakest_bending(self) -> float | None:
         """The smaller bending stiffness [N m^2], None if none is given."""
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness

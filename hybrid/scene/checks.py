@@ -47,10 +47,13 @@ def _sections_that_come_and_go(cable: Cable, model: Model) -> Iterator[Finding]:
     if not isinstance(model, AdaptiveModel):
         return
     for i, section in enumerate(cable.sections):
-        if section.rotary_inertia is not None and section.rotary_inertia not in (0, (0, 0)):
+        here: Place = ("cable", "sections", i)
+        if section.turns:
             expected = "nothing or 0, because zones move (model), and rods that come and go have no rotary inertia"
-            fix = "leave it out, or write `model: rod`"
-            yield Finding(("cable", "sections", i, "rotary_inertia"), expected, fix)
+            yield Finding((*here, "rotary_inertia"), expected, "leave it out, or write `model: rod`")
+        if section.anisotropic:
+            expected = "one number, because zones move (model), and a catenary does not know which way its sections lie"
+            yield Finding((*here, "bending_stiffness"), expected, "give one number, or write `model: rod`")
 
 
 def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:

@@ -70,7 +70,7 @@ class Scene(Table):
     model: Model = Field(
         default_factory=lambda data: usual_model(data.get("cable")),
         description="where the cable is a rod and where a catenary; absent: adaptive for a cable with bending "
-        "stiffness, else catenary",
+        "stiffness (rod, if it bends differently in two directions or has a rotary_inertia), else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")

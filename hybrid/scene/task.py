@@ -218,9 +218,11 @@ class AdaptiveModel(Table):
 
 
 def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
-    """The model of a scene that names none: zones that move, if the cable can bend."""
-    stiff = [x.bending_stiffness is not None for x in getattr(cable, "sections", ())]
-    return AdaptiveModel() if any(stiff) else CatenaryModel()
+    """The model of a scene that names none: zones that move, if the cable can bend; a rod, if they cannot hold it."""
+    sections = getattr(cable, "sections", ())
+    if not any(x.bending_stiffness is not None for x in sections):
+        return CatenaryModel()
+    return RodModel() if any(x.anisotropic or x.turns for x in sections) else AdaptiveModel()
 
 
 Model = Annotated[
