@@ -210,10 +210,10 @@ def ran_as(model: str, name: str) -> hybrid.Result:
 PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], float, int]] = {
     "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
     "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
-    "touchdown": ([], [(85, 125)], 0.13, 29),
-    "laying": ([(0, 186.667)], [(0, 186.667)], 0.24, 56),
+    "touchdown": ([], [(82.5, 125)], 0.144, 14),
+    "laying": ([(0, 186.667)], [(0, 213.333)], 0.26, 11),
     "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
-    "irregular_sea": ([], [(33.333, 40)], 0.082, 95),
+    "irregular_sea": ([], [(31.667, 41.667)], 0.108, 76),
 }
 CHANGES = ("split", "grow", "merge", "shrink", "retry")
 
@@ -236,13 +236,13 @@ def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
 
 @pytest.mark.parametrize("name, period", [("s_tether", 7.0), ("touchdown", 8.0)])
 def test_zones_breathe_with_the_heave_and_do_not_flicker(name: str, period: float) -> None:
-    """In the last three periods: no more changes than 4 in each, and nothing that has changed changes back within dwell.
+    """In the last three periods: no changes any more, and nothing has ever changed back within dwell.
 
     The dwell time is a quarter of the time of a transverse wave, 20 steps at least.
     """
     result = ran(name)
     changes = [e for e in result.events if e.kind in CHANGES]
-    assert sum(e.t > result.times[-1] - 3 * period for e in changes) <= 3 * 4
+    assert not [e for e in changes if e.t > result.times[-1] - 3 * period]
     dwell = 20 * 0.05 if name == "s_tether" else 20 * 0.1
     goes = ("merge", "shrink")
     for a in changes:

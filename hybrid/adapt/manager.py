@@ -29,12 +29,12 @@ FLOOR = 0.2
 # is what straightens a cable.
 BUFFER = 2.0
 # How far ahead a falling tension is seen, in paces; the past it is judged by is a sample or two old.
-HORIZON, MOST_AHEAD = 0.2, 3.0
+HORIZON, MOST_AHEAD = 0.125, 2.0
 REVIEWS, SAMPLES = 4, 16  # in a pace: reviews when nothing asks, what happens in between is remembered; pasts
 HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
 HASTE = 16.0  # times as fast bending is blended in where tension is lost
 SOON = 4.0  # dwell times within which a catenary is not worth the two switches that it takes
-LOST = 0.3  # part of the tension that is left of what is lost
+LOST, WEIGHTLESS = 0.3, 1e-3  # part of the tension that is left of what is lost; floor over tension scale of no weight
 MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
@@ -132,6 +132,7 @@ class DomainManager:
         self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, 0).astype(np.int8)
         self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
+        self.weightless = bool((self.floor < WEIGHTLESS * self.scale).any())
         self.base_of_cell = layout.base_of_cell
         bent = np.linalg.norm(cable.kappa[of, :2], axis=1)
         self.bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
@@ -145,12 +146,11 @@ class DomainManager:
     def take(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
 
-        What comes back soon after it was let go must be calm twice as long from then on, and else half as long.
+        What comes back soon after it was let go must be calm much longer from then on, and else half as long.
         """
         fresh, gone, urgent = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod, change.urgent
         soon = t - self.released < SOON * self.dwell * self.patience
-        self.patience[fresh] *= np.where(soon, 2.0, 0.5)[fresh]
-        self.patience = np.minimum(np.maximum(self.patience, 1.0), MOST_PATIENCE)
+        self.patience[fresh] = np.where(soon, MOST_PATIENCE, np.maximum(0.5 * self.patience, 1.0))[fresh]
         self.released[gone] = t
         self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
@@ -312,11 +312,11 @@ class DomainManager:
         return Change(new, tuple(reasons), new, stiff)
 
     def _losing(self, state: State) -> np.ndarray:
-        """Base cells (n,) that lose most of their tension within a pace."""
-        if not self.age > 0.0:
+        """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a pace."""
+        if not (self.weightless and self.age > 0.0):
             return np.zeros(self.layout.rod.size, bool)
         T = state.T + self.pace / self.age * (state.T - self.past)
-        falls = (T < LOST * state.T) & (self.past > state.T)
+        falls = (T < LOST * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
         return np.asarray(np.logical_or.reduceat(falls, self.layout.first[:-1]))
 
     def rules(self, state: State) -> Rules:

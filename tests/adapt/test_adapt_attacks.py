@@ -137,3 +137,25 @@ def test_a_clamp_that_is_left_out_is_said():
     assert said.s_a == 500.0 and "always_rod: [[4" in said.text
     asked = text | {"model": {"kind": "adaptive", "always_rod": [[490, 500]]}}
     assert not [e for e in hybrid.run(hybrid.validate_scene(asked)).events if e.kind == "clamp left out"]
+
+
+def test_sections_that_lie_one_way_or_the_other_are_refused():
+    """A catenary does not know how its sections lie: rods came back on their stiff axis."""
+    section = {"length": 60, "mass": 1.5, "bending_stiffness": (200, 20), "torsional_stiffness": 20}
+    with pytest.raises(hybrid.SceneError, match="does not know which way its sections lie"):
+        hybrid.validate_scene(scene(section, pinned(), pinned(52, 0, 0)))
+    silent = scene(section, clamped(), pinned(52, 0, 0))
+    del silent["model"]
+    assert hybrid.validate_scene(silent).model.kind == "rod"
+
+
+def test_a_step_that_fails_gets_all_of_the_stiffness_back():
+    """Rods half blended out are no less a cause than catenaries: they are stiff again before a step is given up."""
+    section = {
+        "length": 60, "mass": 1.5, "bending_stiffness": 50.0, "torsional_stiffness": 20, "axial_stiffness": 1e6,
+        "diameter": 0.03, "intrinsic_curvature": (0.3, 0, 0.5), "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    end = clamped((52, 0, -3), (1, 0, 0.5), motion={"surge": {"amplitude": 3.0, "period": 6.0}, "ramp": 6.0})
+    more = {"environment": {"fluid": {"density": 1025}}, "time": {"duration": 8.0, "step": 0.02}}
+    a = hybrid.run(hybrid.validate_scene(scene(section, clamped((0, 0, 0), (1, 0, -0.5)), end, **more)))
+    assert a.status == "complete"

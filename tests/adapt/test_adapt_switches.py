@@ -139,7 +139,7 @@ def test_a_switch_while_tension_rises_is_not_felt(stiffness):
     asks = hybrid.run(Scene.model_validate(what), criterion=lambda look: np.full(look.s.size, look.t % 1.5 < 0.5) * 1.1)
     what["model"] |= {"always_rod": [[0, 10]]}
     rod = hybrid.run(Scene.model_validate(what))
-    assert len(switches(asks)) >= 6
+    assert len(switches(asks)) >= 4
     for pull in PULLS:
         off = np.interp(rod.steps["t"], asks.steps["t"], asks.steps[pull]) - rod.steps[pull]
         assert np.abs(off).max() < 0.01 * rod.steps[pull].mean(), f"{np.abs(off).max() / rod.steps[pull].mean():.2%}"
