@@ -316,7 +316,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         stretch = f"[0, {reach:.3g}]" if cell == 0 else f"[{far - reach:.5g}, {far:.5g}]"
         text = (
             f"the clamp at ends.{name} shifts the cable by less than the tolerance: it is left out, and has no moment, "
-            f"as long as a catenary zone ends there; for its moment, and near resonance: always_rod: [{stretch}] in model"
+            f"as long as a catenary zone ends there; for its moment, and near resonance, say always_rod: [{stretch}]"
         )
         yield s, text
 
