@@ -8,6 +8,7 @@ output points are their nodes and middles, at every step: catenary tensions are 
 from __future__ import annotations
 
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -219,3 +220,14 @@ def rods(result: Result, output: int) -> list[tuple[float, float]]:
 
 def output_at(result: Result, t: float) -> int:
     return int(np.argmin(np.abs(result.times - t)))
+
+
+def bump(file: Path, column: str, height: float, over: float, duration: float) -> str:
+    """A motion file: a rotation (deg) that rises smoothly to a height and falls back, then rests."""
+    t = np.linspace(0.0, duration + 1.0, round(200 * (duration + 1.0)) + 1)
+    x = np.clip(t / over, 0.0, 1.0)
+    columns = {name: np.zeros_like(t) for name in ("rx", "ry", "rz")}
+    columns[column] = height * 64.0 * x**3 * (1.0 - x) ** 3
+    rows = np.column_stack([t, *columns.values()])
+    np.savetxt(file, rows, delimiter=",", header="t,rx,ry,rz", comments="", fmt="%.12g")
+    return str(file)

@@ -25,12 +25,14 @@ from adapt_scenes import (
     bend,
     bending,
     breathing,
+    bump,
     changes,
     comes,
     easing,
     goes,
     kink,
     kinking,
+    lowering,
     nodding,
     output_at,
     ran,
@@ -181,6 +183,41 @@ def test_off(name):
     last = [result.times[np.flatnonzero((x * is_rod).max(axis=1) > 1.0)[-1]] for x in (least, most)]
     assert merges[-1].t - last[0] >= DWELL - 2 * DT
     assert merges[-1].t - last[1] <= 2.6 * DWELL + 2 * DT
+    assert rods(result, -1) == []
+
+
+def told(what: Scene) -> hybrid.Result:
+    """The run with its criteria as fields: the largest at every step."""
+    text = what.model_dump(exclude_none=True)
+    text["output"]["criteria"] = True
+    return hybrid.run(Scene.model_validate(text))
+
+
+@pytest.mark.parametrize("name", ["clamp", "edge", "torsion"])
+def test_off_as_the_manager_saw_it(name, tmp_path):
+    """On when the criterion passes 1; off a dwell after all criteria are below their `off`, and blended out.
+
+    A clamp that nods and comes back, a cable that is laid down and lifted, a clamp that is rolled and rolled back.
+    """
+    if name == "edge":
+        result = told(lowering())
+    else:
+        text = (nodding() if name == "clamp" else turning(model={})).model_dump(exclude_none=True)
+        end, column, height = ("start", "rz", 20.0) if name == "clamp" else ("end", "rx", 720.0)
+        file = bump(tmp_path / "motion.csv", column, height, 4.0, 8.0)
+        text["ends"][end]["motion"] = {"file": file}
+        text["time"]["duration"] = 8.0
+        result = told(Scene.model_validate(text))
+    came, gone = comes(result), goes(result)
+    assert came[0].criterion == name and all(e.value <= e.threshold for e in gone)
+    ratio = result[f"criteria/{name}"].max(axis=1)
+    assert came[0].t == pytest.approx(result.times[np.flatnonzero(ratio > 1.0)[0]], abs=2 * DT)
+    loud = np.max([result[f"criteria/{k}"] / off for k, off in OFF.items()], axis=0)
+    is_rod = np.array([flags_of(rods(result, k)) for k in range(len(result.times))])
+    held = np.maximum(loud[:, :-1:2], loud[:, 2::2]) * is_rod  # in the base cells that are rod
+    before = result.times < gone[-1].t - 0.5 * DWELL  # while bending goes, ratios may rise again, to twice that
+    last = result.times[np.flatnonzero((held.max(axis=1) > 1.0) & before)[-1]]
+    assert DWELL - 2 * DT <= gone[-1].t - last <= 2.6 * DWELL + 2 * DT
     assert rods(result, -1) == []
 
 
