@@ -107,11 +107,12 @@ class Watch:
             first, tension = float(line.h[cell]), float(state.T[cell])
             stiffness = float(line.kb[node, :2].max() * line.hn[node])
             leaving = np.sqrt(stiffness / tension) if tension > 0.0 else np.inf
-            finer = min(0.25 * float(leaving), 0.3 * first / bend)
+            finer = 0.25 * float(leaving) if leaving <= first else 0.3 * first / bend
             how = f"the cable leaves its end at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
             if leaving > first:
                 how = f"the bend at the end s = {s:g} m is sharper than the mesh"
-        return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do (`ratio` grades them)"
+        ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
+        return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
 
     def strain(self, t: float, state: State) -> None:
         """A cable that is stretched more than cables are."""

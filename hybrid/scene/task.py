@@ -23,6 +23,7 @@ from hybrid.scene.table import (
     by_kind,
     number_or_list,
     refuse,
+    unwrap,
 )
 
 _RATIO = "length of the last cell over the length of the first, geometric grading; absent: 1 [-]"
@@ -187,7 +188,14 @@ class ZonesModel(Table):
     slack: Slack = Field(default="stop", description=_SLACK)
 
 
-Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1)]
+def _are_stretches(value: Any) -> Any:
+    if isinstance(value, list | tuple) and value and all(isinstance(unwrap(x), int | float) for x in value):
+        said = ", ".join(f"{unwrap(x):g}" for x in value)
+        refuse([Finding((), "a list of stretches [s_a, s_b], in m", f"write [[{said}]]")])
+    return value
+
+
+Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), BeforeValidator(_are_stretches)]
 
 
 class AdaptiveModel(Table):

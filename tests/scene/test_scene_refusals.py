@@ -66,6 +66,7 @@ CASES = {
     "kind is a list": (SUSPENSION, PINNED, "{kind: §[pinned], position: [0, 0, 0]}", "ends.start.kind", "pinned"),
     "a tolerance of everything": (SUSPENSION, MODEL, "{kind: adaptive, tolerance: §1}", "model.tolerance", "<= 0.1"),
     "rod and catenary at once": (SUSPENSION, MODEL, "{kind: adaptive, always_rod: [[0, 1]], always_catenary: [§[0.5, 2]]}", "model.always_catenary[0]", "always_rod"),
+    "one stretch for a list": (SUSPENSION, MODEL, "{kind: adaptive, always_rod: §[0, 1]}", "model.always_rod", "write [[0, 1]]"),
     "a stretch off the cable": (SUSPENSION, MODEL, "{kind: adaptive, always_rod: [§[0, 7]]}", "model.always_rod[0]", "2 m"),
     "end is a number": (SUSPENSION, PINNED, "§3", "ends.start", "kind: pinned"),
     "zone of no kind": (SUSPENSION, ZONES, "[{catenary: 1.5}, §{rood: 0.5}]", "model.zones[1]", "{rod: length}"),
