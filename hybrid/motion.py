@@ -180,17 +180,18 @@ class Motion:
             rescues *= MOST_RESCUES  # once; after that, a smaller step
         if rescues >= MOST_RESCUES or not cells.size:
             return False
-        change = self.zoning.manager.insist(cells, why)
-        if (change.rod == self.zoning.manager.layout.rod).all() and not change.stiff.any():
-            return False
-        self._switch(change)
-        return True
+        return self._insist(cells, why)
 
     def _all_rod(self, taken: Taken) -> bool:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; False if it is."""
         assert self.zoning is not None
         why = f"steps fail here, however small ({taken.outcome.cause}); repeated with rods everywhere"
-        change = self.zoning.manager.insist(np.arange(self.model.cells), why)
+        return self._insist(np.arange(self.model.cells), why)
+
+    def _insist(self, cells: np.ndarray, why: str) -> bool:
+        """Make cells rod, with all of their stiffness; False if they are."""
+        assert self.zoning is not None
+        change = self.zoning.manager.insist(cells, why)
         if (change.rod == self.zoning.manager.layout.rod).all() and not change.stiff.any():
             return False
         self._switch(change)

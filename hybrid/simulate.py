@@ -26,7 +26,7 @@ from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times, step_ends
 from hybrid.model.reasons import reasons_against
 from hybrid.motion import Motion
-from hybrid.physics.loads import SEABED, SURFACE
+from hybrid.physics.loads import FRICTION, SEABED, SURFACE
 from hybrid.results.probes import Observer, output_points
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
@@ -231,13 +231,19 @@ def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equil
     )  # fmt: skip
 
 
+def _settles(scene: Scene, model: Model, t: float) -> bool:
+    """Whether friction holds the cable where it starts, so that no other start will do."""
+    asked = getattr(scene.initial, "friction", "") == "settled"
+    return bool(model.line.bits & FRICTION) and (asked or not model.ends.at(t).held.any())
+
+
 def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
     """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
 
     None: neither is, or there are few cells.
     """
     fewer = coarser(model)
-    if fewer is None:
+    if fewer is None or _settles(scene, model, t):
         return None
     try:
         return _statics(scene, model, t, quick=True)

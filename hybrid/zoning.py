@@ -11,11 +11,12 @@ from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
 from hybrid.adapt.remap import Clamp, Remapped, balance, remap
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
+from hybrid.model.coarse import picked
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
-from hybrid.model.state import Ends, Floats, Line, Sea, State, blank_state
+from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.physics.seabed import stored
 from hybrid.solve.observe import observe
@@ -103,7 +104,7 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, _picked(found.state, model.layout.nodes, most.line))
+        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.rubbed)
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -133,7 +134,7 @@ def zones_of_start(model: Model, manager: DomainManager) -> Model:
         return model
     new = on_layout(model, model.layout._replace(rod=free))
     manager.follow(model.layout._replace(rod=free))
-    return replace(new, start=_picked(model.start, model.layout.nodes, new.line))
+    return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
 
 
 def _zones_within(
@@ -149,7 +150,7 @@ def _zones_within(
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _picked(full, model.layout.nodes, new.line))
+        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.rubbed)
         manager.follow(layout)
         manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
         more = rod | manager.first(answer.state)
@@ -166,25 +167,20 @@ def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium]) -> fl
     return float(np.linalg.norm(full.r[layout.first] - answer[1].state.r[other.first], axis=1).max())
 
 
-def _equilibrium(model: Model, t: float, start: State) -> Equilibrium:
+def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
+    """rubbed: whether friction took part in what it is compared with."""
     return solve_statics(
         model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
-        shape=model.start_shape,
+        shape=model.start_shape, settle=rubbed,
     )  # fmt: skip
 
 
-def _picked(state: State, s: Floats, line: Line) -> State:
-    """The state at the nodes of a coarser line, a subset of the nodes s."""
-    at = np.searchsorted(s, line.s - 1e-9 * s[-1])
-    out = blank_state(line.h.size)
-    out.r[:], out.v[:] = state.r[at], state.v[at]
-    out.e[:] = np.diff(out.r, axis=0)
-    out.T[:] = state.T[at[:-1]]
-    d = out.e / np.linalg.norm(out.e, axis=1)[:, None]
-    a = state.a1[at[:-1]]
-    a = a - np.einsum("ij,ij->i", a, d)[:, None] * d
-    out.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
-    return out
+def _on_fewer(state: State, s: Floats, line: Line) -> State:
+    """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
+    found = picked(state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
+    if found is None:
+        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
+    return found
 
 
 class Zoning:

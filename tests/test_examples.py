@@ -12,6 +12,7 @@ import pytest
 from numpy.typing import NDArray
 
 import hybrid
+from hybrid.errors import ZONE_EVENTS
 
 EXAMPLES = Path(__file__).parents[1] / "examples"
 Floats = NDArray[np.float64]
@@ -215,7 +216,6 @@ PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], flo
     "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
     "irregular_sea": ([], [(31.667, 41.667)], 0.108, 76),
 }
-CHANGES = ("split", "grow", "merge", "shrink", "retry")
 
 
 @pytest.mark.parametrize("name", SEA)
@@ -230,7 +230,7 @@ def test_the_plan_of_an_example_is_what_it_was(name: str) -> None:
     for want, got in ((first, rods[0]), (last, rods[-1])):
         assert np.ravel(got) == pytest.approx(np.ravel(want), abs=1e-3)
     assert np.mean([sum(b - a for a, b in x) for x in rods]) / result.s[-1] == pytest.approx(share, rel=0.1)
-    found = sum(e.kind in CHANGES for e in result.events)
+    found = sum(e.kind in ZONE_EVENTS for e in result.events)
     assert abs(found - switches) <= (0.2 * switches if name == "irregular_sea" else 0)
 
 
@@ -241,7 +241,7 @@ def test_zones_breathe_with_the_heave_and_do_not_flicker(name: str, period: floa
     The dwell time is a quarter of the time of a transverse wave, 20 steps at least.
     """
     result = ran(name)
-    changes = [e for e in result.events if e.kind in CHANGES]
+    changes = [e for e in result.events if e.kind in ZONE_EVENTS]
     assert not [e for e in changes if e.t > result.times[-1] - 3 * period]
     dwell = 20 * 0.05 if name == "s_tether" else 20 * 0.1
     goes = ("merge", "shrink")

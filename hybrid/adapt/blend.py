@@ -1,7 +1,7 @@
 """Bending on its way in and out: how much of its stiffness every node has, and the energy that a change of it frees.
 
 grown: (n,) of base cells, 0 to 1; leaving: (n,) those on their way out; haste: (n,) times as fast as the others
-that some come in.  Times in dwell times.
+that some come in.  Times in paces of the manager.
 """
 
 from __future__ import annotations

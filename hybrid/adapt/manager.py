@@ -15,7 +15,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.adapt.blend import advance, shares
-from hybrid.adapt.criteria import LOAD, MOST, STEP, TWISTED, end_turn, twist_of_rods, weigh
+from hybrid.adapt.criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, twist_of_rods, weigh
 from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.adapt.table import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.model.layout import Layout, edges
@@ -73,7 +73,7 @@ class Reason(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A proposal: what the base cells should be, why, and which have no time to be blended in slowly."""
+    """A proposal, (n,) of base cells: what they should be, why, and which have no time to be blended in slowly."""
 
     rod: np.ndarray
     reasons: tuple[Reason, ...]
@@ -129,7 +129,7 @@ class DomainManager:
         weight = np.abs(cable.weight - np.nan_to_num(cable.buoy))
         self.s, self.EI = s, np.maximum(EI[pad[:-1]], EI[pad[1:]])
         self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
-        self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, 0).astype(np.int8)
+        self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, SMOOTH).astype(np.int8)
         self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
         self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
         self.weightless = bool((self.floor < WEIGHTLESS * self.scale).any())

@@ -34,10 +34,10 @@ def coarser(model: Model) -> Model | None:
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
     new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
-    start = _picked(model.start, at)
+    start = picked(model.start, at)
     if start is None:
         return None
-    others = tuple((name, x) for name, state in model.other_starts if (x := _picked(state, at)) is not None)
+    others = tuple((name, x) for name, state in model.other_starts if (x := picked(state, at)) is not None)
     return replace(model, line=new, sea=model.sea.on(rod.size), start=start, other_starts=others, layout=None)
 
 
@@ -53,7 +53,7 @@ def refined(state: State, coarse: Line, line: Line) -> State:
     return out
 
 
-def _picked(state: State, at: np.ndarray) -> State | None:
+def picked(state: State, at: np.ndarray) -> State | None:
     """The state at some of its nodes; None: two of them lie at the same place."""
     out = blank_state(at.size - 1)
     out.r[:], out.v[:] = state.r[at], state.v[at]

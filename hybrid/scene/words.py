@@ -365,7 +365,9 @@ def _number_in_text(text: str, unit: str) -> str:
         if not unit:
             return f"write a number alone: it is a part of 1, without a unit ({word})"
         scale = next((k for prefix, k in _PREFIXES.items() if word == prefix + unit), None)
-        return f"write the number alone, {number if scale is None else number * scale:.12g}; the unit is {unit}"
+        if scale is None:
+            return f"write the number alone; the unit is {unit}"
+        return f"write the number alone, {number * scale:.12g}; the unit is {unit}"
     return ""
 
 
