@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import tempfile
 import time as clock
+from collections.abc import Iterator
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -14,11 +15,13 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
+from hybrid.model.plan import step_ends
 from hybrid.physics.loads import SEABED
 from hybrid.results.probes import Observer
 from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
+from hybrid.solve.control import Controller
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.timestep import POWERS, Stepper, Taken
 from hybrid.watch import Stop, Watch
@@ -41,14 +44,17 @@ class Motion:
         target: Path | io.BytesIO,
         equilibrium: Equilibrium | None,
         zoning: Zoning | None = None,
+        control: Controller | None = None,
     ) -> None:
+        """control: chooses the steps; None: they are as they come, and halved where they fail."""
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
         self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
         self.watch = Watch(recorder, model)
-        self.zoning, self._stale = zoning, False
+        self.zoning, self.control, self._stale = zoning, control, False
         self.t, self.steps, self.iterations = 0.0, 0, 0
+        self.dt = 0.0  # s, of the last step; 0 after a start
         self.cpu = clock.process_time()
         self.work = [0.0] * len(POWERS)
         self._loaded = [any(abs(x - s) < 1e-9 * model.length for x in model.attached) for s in (0.0, model.length)]
@@ -72,10 +78,11 @@ class Motion:
             recorder.event(0.0, 0.0, model.length, "undamped", text)
 
     def advance(self, until: float) -> None:
-        """To the time `until`: in one step if all is well, else in halves of halves."""
+        """To the time `until`: in one step if all is well, else in halves of halves; with a controller, towards it."""
         assert self.scene.time is not None
-        begin, dt = self.t, until - self.t
-        smallest = dt * 0.5**HALVINGS
+        begin, control = self.t, self.control
+        dt = until - self.t
+        smallest = dt * 0.5**HALVINGS if control is None else control.smallest
         repeats = wasted = rescues = 0
         while self.t < until:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
@@ -83,14 +90,21 @@ class Motion:
             if self.zoning is not None:
                 self.zoning.prepare(end, end - self.t, self.state)
             taken = self.stepper.step(
-                self.model.sea.at(end), ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf
-            )
+                self.model.sea.at(end), ends, self.state, self.spare, end - self.t, self.scene.time.rho_inf,
+                end - self.t if control is None else self.dt,
+            )  # fmt: skip
             if self.zoning is not None and self._rescued(taken, end, rescues):
                 rescues += 1
                 wasted += taken.iterations
+            elif taken.outcome == Outcome.OK and control is not None and not control.accepts(end - self.t, taken.error):
+                wasted += taken.iterations
+                repeats += 1
+                dt = control.next
             elif taken.outcome == Outcome.OK:
                 self._accept(taken, end, repeats, wasted)
                 wasted = rescues = 0
+                if control is not None:
+                    break
             elif self.zoning is not None and 0.5 * dt < smallest and self._all_rod(taken):
                 dt, wasted = until - self.t, wasted + taken.iterations
             elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
@@ -99,9 +113,18 @@ class Motion:
             else:
                 wasted += taken.iterations
                 repeats += 1
-                dt *= 0.5
+                dt = 0.5 * dt if control is None else control.fails(end - self.t)
         if repeats and self.model.line.bits & SEABED:
             self._forget_blow(until - begin)
+
+    def ends_of_steps(self, stop: float) -> Iterator[float]:
+        """Where steps should end on the way to `stop`."""
+        assert self.scene.time is not None
+        if self.control is None:
+            yield from step_ends(self.t, stop, self.scene.time.step)
+            return
+        while self.t < stop:
+            yield self.control.until(self.t, stop)
 
     def _forget_blow(self, dt: float) -> None:
         """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a step."""
@@ -132,12 +155,14 @@ class Motion:
         """A load has just stopped: accelerations jump, so find consistent ones."""
         self.model.ends.set_loads(self.t)
         self._ignite()
+        if self.control is not None:
+            self.control.restart()
         self.power = self._powers()
 
     def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:
         dt = end - self.t
         self.state, self.spare = self.spare, self.state
-        self.t, self.steps, self.iterations = end, self.steps + 1, taken.iterations
+        self.t, self.dt, self.steps, self.iterations = end, dt, self.steps + 1, taken.iterations
         power = self._powers()
         half = 0.5 * dt
         for k, (a, b) in enumerate(zip(self.power, power, strict=True)):
@@ -151,7 +176,7 @@ class Motion:
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
-                "residual": taken.residual, "repeats": repeats, "pull_start": self._pull(0), "pull_end": self._pull(1),
+                "residual": taken.residual, "repeats": repeats, "error": taken.error, "pull_start": self._pull(0), "pull_end": self._pull(1),
                 "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
@@ -252,6 +277,7 @@ class Motion:
         acceleration = ends.acceleration(self.t, 1e-3 * self.scene.time.step)
         self._stored = 0.0
         taken = self.stepper.ignite(self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state)
+        self.dt = 0.0
         if taken.outcome != Outcome.OK:
             self._stop(taken, 0.0)
         self._stored = self.stepper.told[28]

@@ -23,7 +23,7 @@ from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones
 from hybrid.model.coarse import coarser, refined
 from hybrid.model.mesh import Zone
-from hybrid.model.plan import output_times, step_ends
+from hybrid.model.plan import output_times
 from hybrid.model.reasons import reasons_against
 from hybrid.motion import Motion
 from hybrid.physics.loads import FRICTION, SEABED, SURFACE
@@ -33,6 +33,7 @@ from hybrid.results.record import Field, Recorder
 from hybrid.scene.motion import check_motions
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
+from hybrid.solve.control import Controller
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.timestep import POWERS
 from hybrid.watch import Watch
@@ -53,6 +54,7 @@ STEP_FIELDS = (
     ),
     Field("residual", "N", "largest force out of balance at a node before the last correction"),
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
+    Field("error", "m", "local error of position that the step makes, by the change of acceleration in it"),
     Field("pull_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
     Field("pull_end", "N", "the same at the end; of an end body: tension of the last cell"),
     Field("cpu", "s", "processor time since the start of the run"),
@@ -122,10 +124,15 @@ def run(
     if zoning and zoning.manager.held:
         recorder.event(0.0, 0.0, model.length, "zones held", HELD)
     with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
-        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning)
+        import os
+
+        control = None
+        if os.environ.get("TOL"):
+            control = Controller(float(os.environ["TOL"]), scene.time.duration, 1e-9)
+        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning, control)
         motion.save()
         for stop in stops:
-            for until in step_ends(motion.t, stop, scene.time.step):
+            for until in motion.ends_of_steps(stop):
                 motion.advance(until)
                 told(motion)
                 if interrupted():

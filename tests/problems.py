@@ -118,7 +118,15 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
     steps = round(time.duration / time.step)
     for k in range(1, steps + 1):
         t = k * time.duration / steps
-        taken = stepper.step(model.sea.at(t), model.ends.at(t), old, new, time.duration / steps, time.rho_inf)
+        taken = stepper.step(
+            model.sea.at(t),
+            model.ends.at(t),
+            old,
+            new,
+            time.duration / steps,
+            time.rho_inf,
+            (k > 1) * time.duration / steps,
+        )
         assert taken.outcome == Outcome.OK, f"{taken} at t = {t}"
         old, new = new, old
         yield t, old

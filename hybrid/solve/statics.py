@@ -294,7 +294,7 @@ def _relax(solver: _Solver, ends: Ends, state: State) -> State:
     dt = 1e-3 * time_scale
     calm = 0
     for _ in range(RELAXING_STEPS):
-        taken = stepper.step(solver.sea, ends, old, new, dt, 0.0)
+        taken = stepper.step(solver.sea, ends, old, new, dt, 0.0, dt)
         solver.total += taken.iterations
         if taken.outcome != Outcome.OK:
             dt *= 0.25

@@ -45,6 +45,12 @@ LARGEST_STEP_TURN = 1.0
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
+# Least distance in time, in steps, between the moments that two algorithmic accelerations stand for: below, the weights
+# of a step that is much longer than the one before grow without bound where rho_inf is small.
+LEAST_SPAN = 1.0 / 3.0
+# A step shorter than the one before by more than this is weighted as if by this: steps that change at random by as much
+# stay stable up to rho_inf = 0.9 (tests/solve/test_time_control.py), by 2.5 at every other step they do not.
+STEEPEST = 2.0
 
 
 @kernel
@@ -261,18 +267,49 @@ def lay(sea, e, slip):
         sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
 
 
-@kernel
-def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
-    """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
+@inner
+def weights(rho, ratio):
+    """am, af, ga, be of a step that is 1/ratio as long as the one before, and the constant of its local error.
 
-    Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
-    A step whose prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused:
-    it has missed the motion, and Newton may end on a branch that has nothing to do with it.
+    At equal steps a stands for the acceleration theta dt later, and v is delta dt^2 a' off; a step of another length
+    has weights that carry both over to its own (docs/theory.md, 2), so that tension does not feel the change.  ratio 0:
+    a and v are exact, as after a start.  The error of a step is then error dt^2 |a' - a|.
     """
     am = (2.0 * rho - 1.0) / (rho + 1.0)
     af = rho / (rho + 1.0)
-    ga = 0.5 - am + af
-    be = 0.25 * (ga + 0.5) ** 2
+    theta = am - af
+    delta = (1.0 - 3.0 * theta) / 6.0 - 0.25 * (1.0 - theta) ** 2
+    ratio = min(ratio, STEEPEST)
+    if theta < 0.0:
+        ratio = max(ratio, 1.0 + (1.0 - LEAST_SPAN) / theta)
+    span = 1.0 + theta * (1.0 - ratio)  # between the moments that a and a' stand for, in dt
+    be = (1.0 / 6.0 - delta * ratio * ratio - 0.5 * theta * ratio) / span
+    ga = (0.5 + delta * (1.0 - ratio * ratio) - theta * ratio) / span
+    return am / span, af, ga, be, abs(delta) / span
+
+
+@inner
+def unrest(old, new):
+    """Largest change of the algorithmic acceleration in a step, m/s2, and its node."""
+    worst, where = 0.0, 0
+    for i in range(old.a.shape[0]):
+        x, y, z = new.a[i, 0] - old.a[i, 0], new.a[i, 1] - old.a[i, 1], new.a[i, 2] - old.a[i, 2]
+        size = x * x + y * y + z * z
+        if not size <= worst:
+            worst, where = size, i
+    return math.sqrt(worst), where
+
+
+@kernel
+def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, gaps, W, X, x, report, rows):
+    """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
+
+    Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.  before: s, the length of
+    the step that led to `old`, 0 if none did.
+    A step whose prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused:
+    it has missed the motion, and Newton may end on a branch that has nothing to do with it.
+    """
+    am, af, ga, be, slip = weights(rho, before / dt)
     cv = ga / (be * dt)
     ca = (1.0 - am) / ((1.0 - af) * be * dt * dt)
     n = old.e.shape[0]
@@ -344,6 +381,8 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
             outcome, where = TURNED_TOO_FAR, cell
         report[22], report[23], report[24], report[25] = sharpest(line, ends, new.e, new.T, new.a1)
         report[26], report[27] = lowest(line, new.T)
+        change, place = unrest(old, new)
+        report[29], report[30] = slip * dt * dt * change, place
         if line.bits & SEABED:
             for i in range(n + 1):  # force times way: bounded by the energy of a blow, however short the step is not
                 b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),

@@ -36,13 +36,14 @@ POWERS = (
 @dataclass(frozen=True)
 class Taken:
     """How one step went: outcome, Newton iterations, predicted next correction (relative), the cell or node where
-    it was worst, and the largest force out of balance before the last correction (N)."""
+    it was worst, the largest force out of balance before the last correction (N), and the local error (m)."""
 
     outcome: Outcome
     iterations: int
     correction: float
     where: int
     residual: float
+    error: float = 0.0
 
 
 def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
@@ -82,16 +83,19 @@ class Stepper:
         self.u = np.zeros((n + 1, 3))
         self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
 
-    def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float) -> Taken:
-        """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time."""
+    def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
+        """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
+
+        before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
+        """
         outcome, iterations, left, where = advance(
-            self.line, sea, ends, old, new, self.u, dt, rho, self.reach, self.scale, MOST_ITERATIONS,
+            self.line, sea, ends, old, new, self.u, dt, before, rho, self.reach, self.scale, MOST_ITERATIONS,
             self.gaps, self.W, self.X, self.x, self.report, self.rows,
         )  # fmt: skip
         self.told = told = self.report.tolist()
         if outcome == OK and not told[26] > self.floor:
             outcome, where = Outcome.SLACK, int(told[27])
-        return Taken(OUTCOMES[outcome], iterations, left, where, told[15])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[15], told[29])
 
     def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
