@@ -42,7 +42,7 @@ def static_shooting(scene: Scene, output: str | Path | None, overwrite: bool) ->
 
 def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Result:
     """A run by literal shooting; outputs are its states nearest to the output times asked for."""
-    step = scene.require_time().step
+    step = scene.require_time().step or 0.0  # a scene without one is refused
     target = _target(output)
     due = [0.0, *output_times(scene)]
     with _recorder(scene, target, overwrite, _STEP_FIELDS) as recorder:

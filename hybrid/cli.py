@@ -336,7 +336,7 @@ def _plan_table(scene: Scene, plan: Plan) -> Any:
     work = "no time in the scene, so statics only"
     most = "about" if plan.base_cells is None else "at most about"
     if scene.time is not None:
-        asked = scene.time.step
+        asked = scene.time.step or plan.step
         shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
         work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, {most} {span(plan.seconds)} of computing"
     head = [scene.title, ""] if scene.title else []

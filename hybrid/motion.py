@@ -15,8 +15,10 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
+from hybrid.model.effort import Effort
 from hybrid.model.plan import step_ends
 from hybrid.physics.loads import SEABED
+from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer
 from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
@@ -27,6 +29,7 @@ from hybrid.solve.timestep import POWERS, Stepper, Taken
 from hybrid.watch import Stop, Watch
 from hybrid.zoning import Zoning
 
+LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 MOST_RESCUES = 20  # of one step, by more rod
 CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
@@ -39,20 +42,21 @@ class Motion:
         self,
         scene: Scene,
         model: Model,
+        effort: Effort,
         observer: Observer,
-        recorder: Recorder,
-        target: Path | io.BytesIO,
+        recorder: Recorder | Notebook,
+        target: Path | io.BytesIO | None,
         equilibrium: Equilibrium | None,
         zoning: Zoning | None = None,
-        control: Controller | None = None,
     ) -> None:
-        """control: chooses the steps; None: they are as they come, and halved where they fail."""
+        """target: the file of the result, beside which a failure leaves a snapshot; None: it leaves none."""
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
         self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
         self.watch = Watch(recorder, model)
-        self.zoning, self.control, self._stale = zoning, control, False
+        self.zoning, self.effort, self._stale = zoning, effort, False
+        self.control = None if effort.local is None else Controller(effort.local, effort.step, effort.shortest)
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.dt = 0.0  # s, of the last step; 0 after a start
         self.cpu = clock.process_time()
@@ -121,10 +125,17 @@ class Motion:
         """Where steps should end on the way to `stop`."""
         assert self.scene.time is not None
         if self.control is None:
-            yield from step_ends(self.t, stop, self.scene.time.step)
+            yield from step_ends(self.t, stop, self.effort.step)
             return
         while self.t < stop:
+            self.control.most = self._most
             yield self.control.until(self.t, stop)
+
+    @property
+    def _most(self) -> float:
+        """The longest step, s, while bending is coming or going somewhere."""
+        manager = self.zoning.manager if self.zoning is not None else None
+        return LONGEST_IN_PACE * manager.pace if manager is not None and manager.blending else np.inf
 
     def _forget_blow(self, dt: float) -> None:
         """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a step."""
@@ -143,6 +154,8 @@ class Motion:
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
         self.watch.mesh(self.t, self.state)
+        if self.target is None:
+            return
         self.watch.rest(self.t, ends, values, self.state)
         self._look(self.watch.energy(self.t, values, np.array(self.work), self.state))
 
@@ -176,7 +189,8 @@ class Motion:
         self.recorder.log(
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
-                "residual": taken.residual, "repeats": repeats, "error": taken.error, "pull_start": self._pull(0), "pull_end": self._pull(1),
+                "residual": taken.residual, "repeats": repeats, "error": taken.error,
+                "pull_start": self._pull(0), "pull_end": self._pull(1),
                 "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
@@ -274,7 +288,7 @@ class Motion:
     def _ignite(self) -> None:
         assert self.scene.time is not None
         ends = self.model.ends
-        acceleration = ends.acceleration(self.t, 1e-3 * self.scene.time.step)
+        acceleration = ends.acceleration(self.t, 1e-3 * self.effort.step)
         self._stored = 0.0
         taken = self.stepper.ignite(self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state)
         self.dt = 0.0
@@ -312,6 +326,8 @@ class Motion:
 
     def _snapshot(self, dt: float, taken: Taken) -> Path | None:
         """The last good state with all that a repetition of the failed step needs; None when it cannot be written."""
+        if self.target is None:
+            return None
         if isinstance(self.target, Path):
             path = self.target.with_suffix(".snapshot.npz")
         else:

@@ -10,30 +10,44 @@ import io
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
+from hybrid.accuracy import (
+    COMPARED,
+    SURVEY_CELLS,
+    SURVEY_POINTS,
+    SURVEY_STEPS,
+    Climb,
+    Errors,
+    Sketch,
+    summary,
+    survey_grading,
+)
 from hybrid.adapt.manager import UserCriterion
 from hybrid.adapt.table import CRITERIA
 from hybrid.errors import ComputationError, SceneError
-from hybrid.model.build import Model, build, given_zones
+from hybrid.model.build import Model, build, given_zones, rod_cells
 from hybrid.model.coarse import coarser, refined
+from hybrid.model.effort import Effort, asked, first_effort, wants_errors
+from hybrid.model.grade import Grading
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times
 from hybrid.model.reasons import reasons_against
+from hybrid.model.state import Floats
 from hybrid.motion import Motion
 from hybrid.physics.loads import FRICTION, SEABED, SURFACE
+from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer, output_points
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
-from hybrid.scene.motion import check_motions
+from hybrid.results.record import Field, Recorder, amend
+from hybrid.scene.motion import check_motions, ramp_ends
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
-from hybrid.solve.control import Controller
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.timestep import POWERS
 from hybrid.watch import Watch
@@ -98,59 +112,158 @@ def run(
         from hybrid.arbitrate import run_shooting
 
         return run_shooting(scene, output, overwrite)
-    model = build(scene)
-    zoning = None
-    if criterion is not None and model.layout is None:
+    if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    if model.layout is not None:
-        model, equilibrium, zoning = _first_zones(scene, model, 0.0, criterion)
-    else:
-        equilibrium = _equilibrium(scene, model, 0.0) if scene.initial.kind == "equilibrium" else None
-    outputs = output_times(scene)
-    stops = sorted({*outputs, *(b for b in model.ends.breaks if b < outputs[-1])})
-    kinds = {"rod", "catenary"} if zoning else None
-    observer = Observer(
-        model.line,
-        model.sea.values,
-        model.zones,
-        output_points(scene.output.points, model.length),
-        True,
-        model.attached,
-        kinds,
-        [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zoning else (),
-    )
-    target = _target(output)
-    recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
-    if zoning and zoning.manager.held:
-        recorder.event(0.0, 0.0, model.length, "zones held", HELD)
-    with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
-        import os
+    job = Job(scene, criterion)
+    target, effort = _target(output), first_effort(scene)
+    with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
+        job.told, job.interrupted = told, interrupted
+        if not wants_errors(scene):
+            job.record(effort, target, overwrite)
+            return open_result(target)
+        climb = Climb(
+            asked(scene), scene.mesh is None, scene.time.controlled and scene.time.tolerance is None, True,
+            job.sketch, lambda effort: job.record(effort, target, overwrite), told.say,
+        )  # fmt: skip
+        final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
+        _amend(target, scene, final, errors, climb)
+    return open_result(target)
 
-        control = None
-        if os.environ.get("TOL"):
-            control = Controller(float(os.environ["TOL"]), scene.time.duration, 1e-9)
-        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning, control)
+
+class Job:
+    """One scene, computed as often and as finely as it takes."""
+
+    def __init__(self, scene: Scene, criterion: UserCriterion | None) -> None:
+        self.scene, self.criterion = scene, criterion
+        self.told: _Told
+        self.interrupted: Callable[[], bool] = lambda: False
+
+    def record(self, effort: Effort, target: Path | io.BytesIO, overwrite: bool) -> Sketch:
+        """Compute the result into a file, or memory; what is to be compared of it."""
+        if isinstance(target, io.BytesIO):
+            target.seek(0)
+            target.truncate()
+        begin = clock.process_time()
+        model, equilibrium, zoning = self._model(effort)
+        observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
+        outputs = output_times(self.scene)
+        recorder = _recorder(self.scene, model, observer, target, overwrite, len(outputs), equilibrium)
+        if zoning and zoning.manager.held:
+            recorder.event(0.0, 0.0, model.length, "zones held", HELD)
+        with recorder:
+            motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning)
+            self._move(motion, outputs)
+            recorder.close("complete", f"{motion.steps} steps")
+        if not wants_errors(self.scene):
+            return Sketch(effort, {}, motion.steps, 0.0)
+        with open_result(target) as result:
+            values = {name: np.array(result[name]) for name in COMPARED if name in result}
+            model_error = (
+                {k: np.array(x) for k, x in result["errors/model"].items()} if "errors/model" in result else {}
+            )
+            unresolved = any(event.kind == "unresolved bend" for event in result.events)
+        spent = clock.process_time() - begin
+        return Sketch(effort, values, motion.steps, spent, 1, unresolved, model_error)
+
+    def sketch(self, effort: Effort, points: Floats | None = None) -> Sketch:
+        """Compute for comparison only; points: places, m, instead of those of the result.
+
+        An effort with longer steps has as many times fewer outputs, so that these do not shorten its steps.
+        """
+        begin = clock.process_time()
+        model, equilibrium, zoning = self._model(effort)
+        s = output_points(self.scene.output.points, model.length) if points is None else points
+        observer = self._observer(model, zoning, s, COMPARED)
+        notebook = Notebook()
+        times = output_times(self.scene)
+        if effort.every > 1:
+            times = [*times[effort.every - 1 : -1 : effort.every], times[-1]]
+        motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning)
+        self._move(motion, times)
+        values = {name: notebook[name] for name in COMPARED if name in notebook}
+        return Sketch(effort, values, motion.steps, clock.process_time() - begin, effort.every)
+
+    def survey(self, effort: Effort) -> Grading | None:
+        """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
+        if self.scene.mesh is not None:
+            return None
+        coarse = effort.coarser(SURVEY_CELLS, SURVEY_STEPS)
+        model = build(self.scene, coarse)
+        s = np.linspace(0.0, model.length, SURVEY_POINTS)
+        try:
+            seen = self.sketch(coarse, s)
+        except ComputationError:
+            return None
+        cells = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
+        return survey_grading(model, s, seen.values, cells)
+
+    def _model(self, effort: Effort) -> tuple[Model, Equilibrium | None, Zoning | None]:
+        model = build(self.scene, effort)
+        if model.layout is not None:
+            return _first_zones(self.scene, model, effort, 0.0, self.criterion)
+        found = _equilibrium(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None
+        return model, found, None
+
+    def _observer(self, model: Model, zoning: Zoning | None, s: Floats, only: Sequence[str] | None = None) -> Observer:
+        kinds = {"rod", "catenary"} if zoning else None
+        criteria = [(x.name, x.ratio) for x in CRITERIA] if self.scene.output.criteria and zoning and not only else ()
+        return Observer(model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only)
+
+    def _move(self, motion: Motion, outputs: Sequence[float]) -> None:
+        """The loop over time."""
+        breaks = motion.model.ends.breaks
+        stops = {*outputs, *(t for t in breaks if t < outputs[-1])}
+        if motion.control is not None:
+            stops |= {t for t in ramp_ends(self.scene) if t < outputs[-1]}
         motion.save()
-        for stop in stops:
+        for stop in sorted(stops):
             for until in motion.ends_of_steps(stop):
                 motion.advance(until)
-                told(motion)
-                if interrupted():
-                    recorder.close("interrupted", f"stopped from outside at t = {motion.t:.6g} s")
+                self.told(motion)
+                if self.interrupted():
+                    motion.recorder.close("interrupted", f"stopped from outside at t = {motion.t:.6g} s")
                     raise KeyboardInterrupt
             if stop in outputs:
                 motion.save()
-            if stop in model.ends.breaks:
+            if stop in breaks:
                 motion.restart()
-        told(motion, finished=True)
-        recorder.close("complete", f"{motion.steps} steps")
-    return open_result(target)
+        self.told(motion, finished=True)
+
+
+def _amend(target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb) -> None:
+    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file."""
+    effort = final.effort
+    attributes: dict[str, str | float | int] = {
+        "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
+        "effort_cpu": sum(run.cpu for run in climb.runs), "effort_step": effort.step,
+    }  # fmt: skip
+    if effort.local is not None:
+        attributes["effort_step_error"] = effort.local
+    if isinstance(scene.model, AdaptiveModel):
+        attributes["effort_zones"] = effort.zones
+    if climb.asked is not None:
+        attributes["accuracy_asked"] = climb.asked.text
+    fields: list[tuple[Field, np.ndarray]] = []
+    if errors is not None:
+        attributes |= summary(errors)
+        for kind, quantities in errors.fields.items():
+            for name, values in quantities.items():
+                unit, dims = UNITS_OF_ERRORS[name], ("s",) if values.ndim == 2 else ()
+                text = f"{WORDS_OF_ERRORS[kind]} of {name.replace('_', ' ')}, estimated"
+                fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
+    amend(target, fields, attributes, climb.notes)
+
+
+UNITS_OF_ERRORS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", "pull_start": "N", "pull_end": "N",
+}  # fmt: skip
+WORDS_OF_ERRORS = {"mesh": "error by the mesh", "time": "error by the time step", "total": "error by all causes"}
 
 
 class _Told:
     """Calls `progress` now and then, and closes a live line however the run ends."""
 
-    def __init__(self, progress: bool | Callable[[Progress], None], duration: float, zones: tuple[Zone, ...]) -> None:
+    def __init__(self, progress: bool | Callable[[Progress], None], duration: float) -> None:
         self._tell: Callable[[Progress], None] | None = None
         if progress is True:
             from hybrid.live import live_line
@@ -158,7 +271,7 @@ class _Told:
             self._tell = live_line()
         elif progress:
             self._tell = progress
-        self._duration, self._zones = duration, zones
+        self._duration = duration
         self._begin = clock.perf_counter()
         self._last = 0.0
 
@@ -169,6 +282,12 @@ class _Told:
         close = getattr(self._tell, "close", None)
         if close is not None:
             close()
+
+    def say(self, text: str) -> None:
+        """Something that the live line should say above itself."""
+        say = getattr(self._tell, "say", None)
+        if say is not None:
+            say(text)
 
     def __call__(self, motion: Motion, finished: bool = False) -> None:
         if self._tell is None:
@@ -188,7 +307,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         return static_shooting(scene, output, overwrite)
     model = build(scene)
     if model.layout is not None:
-        model, equilibrium, _ = _first_zones(scene, model, np.inf, None, at_rest=True)
+        model, equilibrium, _ = _first_zones(scene, model, first_effort(scene), np.inf, None, at_rest=True)
         assert equilibrium is not None
         found = equilibrium
     else:
@@ -266,19 +385,20 @@ def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
 
 
 def _first_zones(
-    scene: Scene, model: Model, t: float, criterion: UserCriterion | None, at_rest: bool = False
+    scene: Scene, model: Model, effort: Effort, t: float, criterion: UserCriterion | None, at_rest: bool = False
 ) -> tuple[Model, Equilibrium | None, Zoning]:
     """Zones, equilibrium if one is asked for, and what will move the zones."""
-    asked = scene.model
-    assert isinstance(asked, AdaptiveModel) and model.layout is not None
+    wanted = scene.model
+    assert isinstance(wanted, AdaptiveModel) and model.layout is not None
     given = given_zones(scene, model.layout)
-    manager = manager_for(model, asked.tolerance, asked.dwell, given, scene.time.step if scene.time else 0.0, criterion)
+    step = effort.step if effort.local is None else 0.0
+    manager = manager_for(model, effort.zones, wanted.dwell, given, step, criterion)
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t, _equilibrium(scene, model, t))
     else:
         model = zones_of_start(model, manager)
-    return model, equilibrium, Zoning(model, manager, loaded=asked.joint == "curvature")
+    return model, equilibrium, Zoning(model, manager, loaded=wanted.joint == "curvature")
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

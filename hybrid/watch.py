@@ -15,6 +15,7 @@ from hybrid.errors import Outcome
 from hybrid.model.build import Model
 from hybrid.model.state import Ends, Floats, State
 from hybrid.physics.loads import FRICTION, SEABED
+from hybrid.results.notebook import Notebook
 from hybrid.results.record import Recorder
 from hybrid.solve.statics import Equilibrium, is_stable
 from hybrid.solve.step import lowest, sharpest
@@ -43,7 +44,7 @@ Stop = tuple[Outcome, int] | None
 class Watch:
     """The watches of one run or one static solve."""
 
-    def __init__(self, recorder: Recorder, model: Model) -> None:
+    def __init__(self, recorder: Recorder | Notebook, model: Model) -> None:
         self._recorder, self._model = recorder, model
         self._bend = self._twist = UNRESOLVED
         self._strain = STRETCHED

@@ -8,17 +8,19 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from typing import Literal
 
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.model.effort import Effort, first_effort
 from hybrid.model.ends import EndConditions
 from hybrid.model.layout import Layout
 from hybrid.model.ledger import Entry, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
-from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes
+from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, thinned
 from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import corners, ends_and_frames, hung, initial_nodes, spare_shapes
@@ -82,8 +84,8 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
     return (ZonePlan("rod" if isinstance(model, AdaptiveModel) else model.kind, scene.length),)
 
 
-def build(scene: Scene) -> Model:
-    """Make the model that a scene requires.
+def build(scene: Scene, effort: Effort | None = None) -> Model:
+    """Make the model that a scene requires; effort: how finely, None: as it asks for.
 
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
@@ -91,17 +93,15 @@ def build(scene: Scene) -> Model:
     cable = material(scene)
     plans = zone_plans(scene)
     cuts = sorted({*cable.cuts, *corners(scene)})
-    mesh = scene.mesh
+    effort = effort or first_effort(scene)
     layout = None
     if isinstance(scene.model, AdaptiveModel):
         wanted = (*(scene.model.always_rod or ()), *(scene.model.always_catenary or ()))
         edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
-        layout = _layout(scene, cable, sorted({*cuts, *edges}))
+        layout = _layout(scene, cable, sorted({*cuts, *edges}), effort)
         s, zones = layout.nodes, layout.zones
-    elif mesh is not None and mesh.nodes is not None:
-        s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
-        s, zones = place_nodes(plans, cuts, mesh.cells if mesh else None, mesh.ratio if mesh else None)
+        s, zones = _placed(scene, plans, cuts, effort, DEFAULT_CELLS)
     n = s.size - 1
     middle = 0.5 * (s[:-1] + s[1:])
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
@@ -159,6 +159,7 @@ def build(scene: Scene) -> Model:
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
 # over which a cable without tension bends under its weight; the most rod cells in a base cell.
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
+FEWEST_CELLS = 4  # of a zone, however little is asked
 
 
 def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
@@ -172,23 +173,45 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
     return given
 
 
-def _layout(scene: Scene, cable: Material, cuts: Sequence[float]) -> Layout:
-    """Base cells, all rod."""
-    model, mesh = scene.model, scene.mesh
-    assert isinstance(model, AdaptiveModel)
-    whole = (ZonePlan("rod", scene.length),)
-    if mesh is not None and mesh.nodes is not None:
-        base, _ = given_nodes(mesh.nodes, whole, cuts)
+def _placed(
+    scene: Scene, plans: tuple[ZonePlan, ...], cuts: Sequence[float], effort: Effort, usual: int
+) -> tuple[Floats, tuple[Zone, ...]]:
+    """Nodes and zones; usual: cells of a line whose scene does not say."""
+    mesh = scene.mesh
+    if mesh is None and effort.grading is not None:
+        bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
+        bounds[-1] = scene.length
+        zones = tuple(Zone(plan.kind, float(a), float(b)) for plan, (a, b) in zip(plans, pairwise(bounds), strict=True))
+        return effort.grading.nodes(sorted({*bounds.tolist(), *cuts}), effort.fineness), zones
+    if mesh is None:
+        cells = max(round(usual * effort.fineness), FEWEST_CELLS * len(plans))
+        return place_nodes(plans, cuts, None, None, cells)
+    if mesh.nodes is not None:
+        s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
-        cells = mesh.cells if mesh and mesh.cells else BASE_CELLS
-        base, _ = place_nodes(whole, cuts, cells, mesh.ratio if mesh else None)
-    middle = 0.5 * (base[:-1] + base[1:])
-    of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
+        s, zones = place_nodes(plans, cuts, mesh.cells or (usual if len(plans) == 1 else None), mesh.ratio)
+    if effort.fineness < 1.0:
+        s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / effort.fineness))
+    return s, zones
+
+
+def _layout(scene: Scene, cable: Material, cuts: Sequence[float], effort: Effort) -> Layout:
+    """Base cells, all rod."""
+    model = scene.model
+    assert isinstance(model, AdaptiveModel)
+    base, _ = _placed(scene, (ZonePlan("rod", scene.length),), cuts, effort, BASE_CELLS)
+    cell = rod_cells(scene, cable, 0.5 * (base[:-1] + base[1:])) / effort.fineness
+    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
+    return Layout(base, parts, np.ones(base.size - 1, bool))
+
+
+def rod_cells(scene: Scene, cable: Material, s: Floats) -> Floats:
+    """Length, m, of the cells of rods that come and go, at places s (K,) m, at fineness 1."""
+    of = np.clip(np.searchsorted(cable.bounds, s) - 1, 0, cable.mass.size - 1)
     EI = cable.B[of, :2].min(axis=1)
     weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
-    cell = np.full(middle.size, model.rod_cell) if model.rod_cell else ROD_CELL * np.cbrt(EI / weight)
-    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
-    return Layout(base, parts, np.ones(middle.size, bool))
+    asked = getattr(scene.model, "rod_cell", None)
+    return np.full(s.size, asked) if asked else np.asarray(ROD_CELL * np.cbrt(EI / weight))
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:

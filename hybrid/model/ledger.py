@@ -8,6 +8,7 @@ from itertools import pairwise
 from math import pi
 
 from hybrid.adapt.table import CRITERIA
+from hybrid.model.effort import first_effort
 from hybrid.model.mesh import Zone
 from hybrid.model.properties import weight
 from hybrid.model.sea import current_table
@@ -59,8 +60,8 @@ def _implausible(scene: Scene) -> Iterator[tuple[str, str]]:
 def _watched(scene: Scene) -> Iterator[Entry]:
     """The criteria by which zones move, with their thresholds."""
     assert isinstance(scene.model, AdaptiveModel)
-    tolerance = scene.model.tolerance * scene.length
-    yield Entry(f"zones that move; tolerance {tolerance:.3g} m", True, "model.tolerance x length")
+    why = "model.tolerance x length" if scene.model.tolerance else "1e-3 of the length, or a part of what accuracy asks"
+    yield Entry(f"zones that move; tolerance {first_effort(scene).zones * scene.length:.3g} m", True, why)
     for x in CRITERIA:
         asked = x.name != "given" or scene.model.always_rod or scene.model.always_catenary
         yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)

@@ -55,18 +55,23 @@ def share(total: int, lengths: Sequence[float]) -> list[int]:
 
 
 def place_nodes(
-    plans: Sequence[ZonePlan], cuts: Sequence[float], cells: int | None, ratio: float | None
+    plans: Sequence[ZonePlan],
+    cuts: Sequence[float],
+    cells: int | None,
+    ratio: float | None,
+    usual: int = DEFAULT_CELLS,
 ) -> tuple[Floats, tuple[Zone, ...]]:
     """Nodes s (N+1,) in m and the zones, for zones in order and further `cuts` (m) where a node must lie.
 
     A cut moves the nearest free node of its zone when that is less than half a cell away
-    and is inserted otherwise.  `ratio` grades a line of one zone as a whole.
+    and is inserted otherwise.  `ratio` grades a line of one zone as a whole.  `usual`: cells of a line whose scene
+    says nothing.
     """
     open_zones = [p for p in plans if p.cells is None]
     if cells is None:
         counts = [p.cells or 0 for p in plans]
         known = [(p.cells, p.length) for p in plans if p.cells]
-        density = DEFAULT_CELLS / sum(p.length for p in plans) if not known else max(c / x for c, x in known)
+        density = usual / sum(p.length for p in plans) if not known else max(c / x for c, x in known)
         rest = [max(2, round(density * p.length)) for p in open_zones]
     else:
         counts = [p.cells or 0 for p in plans]
@@ -100,6 +105,16 @@ def place_nodes(
         zones.append(Zone(plan.kind, start, stop))
         start = stop
     return np.array(s), tuple(zones)
+
+
+def thinned(s: Floats, fixed: Sequence[float], parts: int) -> Floats:
+    """Every so many-th of the nodes s, at least two cells (or all) between nodes that must stay at `fixed`, m."""
+    at = np.unique(np.concatenate([[0], np.searchsorted(s, np.array(fixed) - 1e-9 * s[-1]), [s.size - 1]]).astype(int))
+    kept = [np.array([0])]
+    for a, b in pairwise(at):
+        count = min(b - a, max(2, round((b - a) / parts)))
+        kept.append(np.linspace(a, b, count + 1).astype(int)[1:])
+    return s[np.concatenate(kept)]
 
 
 def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:

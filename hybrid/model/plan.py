@@ -8,6 +8,7 @@ from math import ceil
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import build
+from hybrid.model.effort import first_effort
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
 from hybrid.scene.schema import Scene
@@ -44,7 +45,7 @@ def parts(length: float, step: float) -> int:
 def output_interval(scene: Scene) -> float:
     """Time between two outputs, s; a scene that does not say how often gets OUTPUTS, or one a step."""
     time = scene.require_time()
-    return scene.output.every or max(time.duration / OUTPUTS, time.step)
+    return scene.output.every or max(time.duration / OUTPUTS, time.step or 0.0)
 
 
 def output_times(scene: Scene) -> list[float]:
@@ -55,7 +56,7 @@ def output_times(scene: Scene) -> list[float]:
         fix = f"output.every: {time.duration / 1000:.3g} makes a thousand"
         expected = f"at most {MOST_OUTPUTS} outputs"
         raise SceneError([Complaint("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)])
-    steps = time.duration / time.step
+    steps = time.duration / (time.step or time.duration)
     if steps > MOST_STEPS:
         expected = f"at most {MOST_STEPS:g} steps, some months of computing"
         raise SceneError([Complaint("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")])
@@ -71,11 +72,15 @@ def step_ends(start: float, stop: float, step: float) -> Iterator[float]:
 
 
 def count_steps(scene: Scene) -> int:
-    """Steps of a run: each interval between two outputs is cut into equal ones (a load that stops may add one)."""
+    """Steps of a run: each interval between two outputs is cut into equal ones (a load that stops may add one).
+
+    Where steps follow the motion: the least that there may be.
+    """
     time, every = scene.require_time(), output_interval(scene)
+    step = first_effort(scene).step
     whole = parts(time.duration, every) - 1
     last = time.duration - whole * every
-    return whole * parts(every, time.step) + parts(last, time.step)
+    return whole * parts(every, step) + parts(last, step)
 
 
 def plan(scene: Scene) -> Plan:
@@ -86,7 +91,7 @@ def plan(scene: Scene) -> Plan:
     steps, step = 0, 0.0
     if scene.time:
         every = output_interval(scene)
-        steps, step = count_steps(scene), every / parts(every, scene.time.step)
+        steps, step = count_steps(scene), every / parts(every, first_effort(scene).step)
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     return Plan(
         model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,

@@ -364,15 +364,19 @@ class Observer:
         loads: Sequence[float] = (),
         kinds: set[str] | None = None,
         criteria: Sequence[tuple[str, str]] = (),
+        only: Sequence[str] | None = None,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
-        criteria: name and description of those that are written as well; `values` gets them.
+        criteria: name and description of those that are written as well; `values` gets them; only: names of probes,
+        None: all.
         """
         self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
         self._loads = tuple(loads)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
-        self._probes = {name: p for name, p in PROBES.items() if not p.needs or p.needs in has}
+        self._probes = {
+            name: p for name, p in PROBES.items() if (not p.needs or p.needs in has) and (only is None or name in only)
+        }
         self._first_energy: float | None = None
         self._with_work = with_work
         size = {"s": s.size, "xyz": 3, "edge": 2}

@@ -274,6 +274,37 @@ class Recorder:
             self.close("interrupted", "stopped from outside")
 
 
+def amend(
+    target: Path | io.BytesIO,
+    fields: Sequence[tuple[Field, np.ndarray]],
+    attributes: Mapping[str, str | float | int],
+    events: Sequence[tuple[str, str]] = (),
+) -> None:
+    """Add to a complete result what is known only afterwards.
+
+    fields: quantities over the output times, (nt, ...), with their values; events: kind and text, of all the cable.
+    """
+    where = target if isinstance(target, io.BytesIO) else target.expanduser().resolve()
+    try:
+        with h5py.File(where, "r+", libver=_LIBVER, locking="best-effort") as file:
+            for name, value in attributes.items():
+                file.attrs[name] = value
+            for field, values in fields:
+                _checked(field, values[0], None)
+                data = file.create_dataset(field.name, data=values)
+                _annotate(data, field.unit, field.description, field.frame)
+                _attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
+            if events:
+                table = _Table(_EVENTS, [file[f"events/{f.name}"] for f in _EVENTS])
+                table.count = len(file["events/t"])
+                table.rows = [(0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan) for event in events]
+                table.write()
+                table.commit()
+    except OSError as error:
+        advice = "free some disk space; close programs that hold the file"
+        raise ResultError(f"{where} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
+
+
 def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
     """Make the file under another name, move it into place whole, and open it to readers.
 

@@ -14,7 +14,7 @@ from hybrid.scene import sea_checks, start_checks
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.table import Finding, Place
-from hybrid.scene.task import AdaptiveModel, Mesh, Model, Output, RodModel, RodZone, ZonesModel
+from hybrid.scene.task import AdaptiveModel, Mesh, Model, Output, RodModel, RodZone, Time, ZonesModel
 
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
@@ -108,6 +108,11 @@ def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
         yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
 
 
+def _arbiter_steps(time: Time | None, solver: str) -> Iterator[Finding]:
+    if solver == "shooting" and time is not None and time.controlled:
+        yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
+
+
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
     if isinstance(model, AdaptiveModel):
@@ -165,6 +170,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _rods_can_bend,
     _stretches_on_cable,
     _zones_that_move,
+    _arbiter_steps,
     _sections_that_come_and_go,
     _mesh_spans,
     _output_on_cable,

@@ -241,20 +241,47 @@ def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
     return found
 
 
-def resolution_findings(ends: Ends, environment: Environment | None, step: float) -> list[Finding]:
-    """What a time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp or a move."""
-    found: list[Finding] = []
+def _periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
+    """Every period, s, that a scene names, by the key that names it."""
     periods: dict[str, float] = {}
     waves = environment.fluid.waves if environment is not None and environment.fluid is not None else None
     if waves is not None:
         periods["environment.fluid.waves"] = waves.period
-    shortest = RAMP_STEPS * step * (1 - 1e-9)
     for here, _, motion in _motions(ends):
         for what, harmonics in motion.harmonics().items():
             listed = not isinstance(getattr(motion, what), Harmonic)
             for i, h in enumerate(harmonics):
                 if h.amplitude:
                     periods[dotted((*here, what, i) if listed else (*here, what))] = h.period
+    return periods
+
+
+def shortest_period(ends: Ends, environment: Environment | None) -> float:
+    """The shortest period, ramp or move of a scene, s; infinity if it names none."""
+    ramps = [t for _, _, m in _motions(ends) for t in (m.ramp, m.travel.over if m.travel else None) if t]
+    return min([*_periods(ends, environment).values(), *ramps], default=math.inf)
+
+
+def ramp_ends(scene: Scene) -> list[float]:
+    """Times, s, at which something stops growing or moving: a step should end there."""
+    fluid, ends = scene.environment.fluid, scene.ends
+    times = [t for _, _, m in _motions(ends) for t in (m.ramp, m.travel.over if m.travel else None)]
+    times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
+    for end in (ends.start, ends.end):
+        for load in (getattr(end, "force", None), getattr(end, "moment", None)):
+            times += [getattr(x, "ramp", None) for x in (load if isinstance(load, tuple) else (load,))]
+    return [t for t in times if t]
+
+
+def resolution_findings(ends: Ends, environment: Environment | None, step: float | None) -> list[Finding]:
+    """What a fixed time step cannot follow: fewer than SAMPLES steps a period or RAMP_STEPS in a ramp or a move."""
+    found: list[Finding] = []
+    if step is None:
+        return found
+    waves = environment.fluid.waves if environment is not None and environment.fluid is not None else None
+    periods = _periods(ends, environment)
+    shortest = RAMP_STEPS * step * (1 - 1e-9)
+    for here, _, motion in _motions(ends):
         slow = [h.period for harmonics in motion.harmonics().values() for h in harmonics]
         steps = f"{RAMP_STEPS} time steps of {step:g} s"
         if motion.ramp is not None and motion.ramp < shortest:

@@ -13,6 +13,7 @@ from typing import Any, Literal
 from pydantic import Field, model_validator
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.accuracy import Accuracy, AskedAccuracy
 from hybrid.scene.attachments import Attachment, Clump, Float, Modules
 from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
@@ -49,7 +50,7 @@ from hybrid.scene.task import (
 )
 
 __all__ = [
-    "AdaptiveModel",
+    "Accuracy", "AdaptiveModel",
     "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
     "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends", "Environment", "Equilibrium", "Float",
     "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial", "JonswapWaves", "Load", "Mesh", "Model", "Modules",
@@ -75,6 +76,11 @@ class Scene(Table):
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     output: Output = Field(default=Output(), description="what is kept")
+    accuracy: AskedAccuracy | None = Field(
+        default=None,
+        description="how wrong the result may be, such as 1%, 3 cm or 50 N; absent: 1% where steps are to follow the "
+        "motion, else not asked",
+    )
     solver: Literal["elimination", "shooting"] = Field(
         default="elimination",
         description="elimination for all scenes; shooting is the slow, independent arbiter for short lines",

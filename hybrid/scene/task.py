@@ -18,6 +18,7 @@ from hybrid.scene.table import (
     Number,
     Positive,
     Table,
+    Truth,
     Vector,
     Whole,
     by_kind,
@@ -202,10 +203,11 @@ class AdaptiveModel(Table):
     """Zones that follow the physics: rod where bending, torsion or slack ask for it, catenary elsewhere."""
 
     kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
-    tolerance: Positive = Field(
-        default=1e-3,
+    tolerance: Positive | None = Field(
+        default=None,
         le=0.1,
-        description="error of position that leaving bending out may make, as a part of the length of the cable [-]",
+        description="error of position that leaving bending out may make, as a part of the length of the cable; "
+        "absent: 1e-3, or what accuracy leaves for it [-]",
     )
     rod_cell: Positive | None = Field(
         default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
@@ -271,21 +273,42 @@ class Mesh(Table):
 # --- how long, and what is kept ----------------------------------------------------------------
 
 
+# Steps that change need some damping of what they do not resolve (tests/solve/test_time_control.py).
+LEAST_DAMPED = 0.9
+
+
 class Time(Table):
     """How long to compute, in which steps."""
 
     duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
-    step: Positive = Field(description="largest time step; shortened so that a whole number fits between outputs [s]")
+    step: Positive | None = Field(
+        default=None,
+        description="fixed time step, shortened so that a whole number fits between outputs; with a tolerance, the "
+        "largest; absent: steps follow the motion [s]",
+    )
+    tolerance: Positive | None = Field(
+        default=None,
+        description="error of position that one time step may make: steps follow it; absent: chosen for `accuracy`, "
+        "if there is no step [m]",
+    )
     rho_inf: Number = Field(
         default=0.5, ge=0, le=1, description="spectral radius of generalized-alpha at high frequency; 1: no damping [-]"
     )
 
     @model_validator(mode="after")
     def _step_fits(self) -> Time:
-        if self.step > self.duration:
+        if self.step is not None and self.step > self.duration:
             expected = f"at most the duration, {self.duration:.6g} s"
             refuse([Finding(("step",), expected, "a smaller step or a longer duration")])
+        if self.controlled and self.rho_inf > LEAST_DAMPED:
+            expected = f"at most {LEAST_DAMPED:g} where steps follow the motion: above, steps that change are unstable"
+            refuse([Finding(("rho_inf",), expected, "0.5 is usual; or give a fixed step (time.step)")])
         return self
+
+    @property
+    def controlled(self) -> bool:
+        """Whether steps follow the motion."""
+        return self.step is None or self.tolerance is not None
 
 
 OutputPoints = Annotated[
@@ -311,6 +334,11 @@ class Output(Table):
     criteria: bool = Field(
         default=False,
         description="also write the criteria of zones that move, as fields over time and arc length",
+    )
+    errors: Truth | None = Field(
+        default=None,
+        description="estimate how wrong the result is (mesh, time step, model) by coarser runs; absent: if accuracy is "
+        "asked for, or steps follow the motion",
     )
 
     @model_validator(mode="after")

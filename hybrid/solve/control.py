@@ -1,8 +1,8 @@
 """Error control of the time step: how long the next step may be, by what the last ones were wrong by.
 
-A step's error is of third order in its length.  The controller is proportional and integral (Gustafsson 1991; Soederlind
-2003): the integral part aims at the tolerance, the proportional one damps the reaction to an error that jumps about,
-as it does over contact.  docs/theory.md, 2.
+A step's error is of third order in its length.  The controller is proportional and integral (Gustafsson 1991;
+Soederlind 2003): the integral part aims at the tolerance, the proportional one damps the reaction to an error that
+jumps about, as it does over contact.  docs/theory.md, 2.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from math import ceil
 
 # Share of the tolerance aimed at: steps that come out a little worse than predicted still pass.
 SAFETY = 0.8
-# Exponents on tolerance/error and on the error before over the error now, for an error of order 3 (Gustafsson's choice).
+# Exponents on tolerance/error and on the error before over the error now, for an error of order 3 (Gustafsson).
 INTEGRAL, PROPORTIONAL = 0.7 / 3.0, 0.4 / 3.0
 # Bounds on the change from step to step, within which the weights of the scheme keep tension clean and the motion
 # stable (solve.step.weights).
@@ -34,12 +34,13 @@ class Controller:
     def __init__(self, tolerance: float, largest: float, smallest: float) -> None:
         self.tolerance, self.largest, self.smallest = tolerance, largest, smallest
         self.next = max(largest / FIRST, smallest)
+        self.most = float("inf")  # s, for the time being
         self._before = 1.0  # error over tolerance of the last accepted step
         self._wary = 0
 
     def until(self, t: float, stop: float) -> float:
         """Where the next step from t should end, so that equal steps would end at `stop`."""
-        parts = ceil((stop - t) / self.next * (1.0 - 1e-9) - 1e-9)
+        parts = ceil((stop - t) / min(self.next, self.most) * (1.0 - 1e-9) - 1e-9)
         return stop if parts <= 1 else t + (stop - t) / parts
 
     def accepts(self, dt: float, error: float) -> bool:

@@ -105,10 +105,10 @@ class ShootingRun:
     """
 
     def __init__(self, scene: Scene) -> None:
-        if scene.time is None:
+        if scene.time is None or scene.time.step is None:
             raise refuse("time", None, "a duration and a step", "add time: {duration: 10, step: 0.01}")
         self.line: Line = line_of(scene)
-        self.step = scene.time.step
+        self.step: float = scene.time.step
         self.rho = scene.time.rho_inf
         self.duration = scene.time.duration
         self.taken = 0

@@ -1,0 +1,52 @@
+"""A run kept in memory without a file: what a run to estimate errors from leaves behind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ResultError
+
+
+class Notebook:
+    """Stands in for a `Recorder` where only arrays are wanted; keeps outputs and events, no step log."""
+
+    def __init__(self) -> None:
+        self.times: list[float] = []
+        self.events: list[tuple[float, float, str]] = []  # s, m, kind
+        self.steps = 0
+        self._kept: dict[str, list[Any]] = {}
+
+    @property
+    def last(self) -> float:
+        """Time of the last output, s."""
+        return self.times[-1] if self.times else -np.inf
+
+    def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
+        """Append an output at time t, s.  ResultError when it is not finite."""
+        self.times.append(t)
+        for name, value in values.items():
+            array = np.array(value, float)
+            if not np.isfinite(array).all():
+                raise ResultError(f"{name} is not finite at t = {t:.9g} s")
+            self._kept.setdefault(name, []).append(array)
+
+    def log(self, values: Mapping[str, float | int]) -> None:
+        """Count a step."""
+        self.steps += 1
+
+    def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
+        """Note that something happened at time t (s) from s_a to s_b (m)."""
+        self.events.append((t, 0.5 * (s_a + s_b), kind))
+
+    def close(self, status: str, message: str) -> None:
+        """There is no file to close."""
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._kept
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """All outputs of a quantity, (nt, ...)."""
+        return np.array(self._kept[name])

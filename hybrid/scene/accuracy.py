@@ -1,0 +1,93 @@
+"""What accuracy is asked for: a part (`1%`) or a size with its unit (`3 cm`, `50 N`), for named outputs."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator, Field, model_validator
+
+from hybrid.scene.table import Finding, Table, Words, refuse
+
+# Units in which a size may be given, what they measure, and how much of the SI unit they are.
+UNITS = {
+    "%": ("part", 0.01),
+    "mm": ("position", 1e-3), "cm": ("position", 1e-2), "m": ("position", 1.0),
+    "N": ("tension", 1.0), "kN": ("tension", 1e3), "MN": ("tension", 1e6),
+}  # fmt: skip
+_AMOUNT = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(%|[a-zA-Z]+)\s*")
+# Beyond a tenth nothing is computed that deserves the name; below a millionth round-off of long runs begins to show.
+ROUGHEST, FINEST = 0.1, 1e-6
+_EXAMPLES = "a part or a size, such as 1%, 3 cm or 50 N"
+
+
+def amount(text: str) -> tuple[str, float]:
+    """What `text` measures ("part", "position" or "tension") and how much of it, SI."""
+    found = _AMOUNT.fullmatch(text)
+    if found is None or found[2] not in UNITS:
+        refuse([Finding((), _EXAMPLES, f"units are {', '.join(UNITS)}")])
+        raise AssertionError
+    what, unit = UNITS[found[2]]
+    size = float(found[1]) * unit
+    if not size > 0.0:
+        refuse([Finding((), f"{_EXAMPLES}, more than zero")])
+    if what == "part" and not FINEST <= size <= ROUGHEST:
+        refuse([Finding((), f"between {100 * FINEST:g}% and {100 * ROUGHEST:g}%", "1% is usual")])
+    return what, size
+
+
+def _is_text(value: Any) -> Any:
+    if isinstance(value, str):
+        return value
+    fix = f"write {100 * value:g}%, or a size with its unit" if isinstance(value, int | float) else ""
+    refuse([Finding((), _EXAMPLES, fix)])
+    raise AssertionError
+
+
+def _checked(text: str) -> str:
+    amount(text)
+    return text.strip()
+
+
+Amount = Annotated[str, BeforeValidator(_is_text), AfterValidator(_checked), Words(_EXAMPLES)]
+
+
+class Accuracy(Table):
+    """How wrong a result may be; step, mesh and the thresholds of zones follow from it, unless the scene gives them."""
+
+    position: Amount | None = Field(
+        default=None, description="of every point at every output: a part of the length of the cable, or mm, cm, m"
+    )
+    tension: Amount | None = Field(
+        default=None,
+        description="of the pull at both ends at every output: a part of the largest, or N, kN",
+    )
+
+    @model_validator(mode="after")
+    def _units_fit(self) -> Accuracy:
+        found = []
+        for name in ("position", "tension"):
+            text = getattr(self, name)
+            if text is not None and amount(text)[0] not in ("part", name):
+                found.append(Finding((name,), f"a part (%) or a size in {_units(name)}"))
+        if self.position is None and self.tension is None:
+            found.append(Finding((), "position, tension, or both", "accuracy: 1% stands for both"))
+        refuse(found)
+        return self
+
+
+def _units(name: str) -> str:
+    return ", ".join(unit for unit, (what, _) in UNITS.items() if what == name)
+
+
+def expand(value: Any) -> Any:
+    """`1%` for {position: 1%, tension: 1%}; `3 cm` and `50 N` for one of them."""
+    if value is None or isinstance(value, Mapping | Accuracy):
+        return value
+    text = _is_text(value)
+    what, _ = amount(text)
+    return {"position": text, "tension": text} if what == "part" else {what: text}
+
+
+AskedAccuracy = Annotated[Accuracy, BeforeValidator(expand)]
