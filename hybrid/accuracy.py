@@ -1,7 +1,8 @@
 """How wrong a result is, and how finely to compute for an accuracy that was asked for.
 
-Three runs say it: one on a coarser mesh shows what the mesh does, one more with longer steps what the steps do.  Where
-an accuracy is asked for, cells and steps of the next run follow from what was found; the last run is the result.
+Coarser runs say it: one with longer cells and steps shows what both do, a second with longer steps what the steps do,
+a third how fast errors fall.  Together they cost less than half of the result.  Where an accuracy is asked for, cells
+and steps of the next run follow from what was found, and the last run is the result.
 docs/accuracy.md
 """
 
@@ -19,9 +20,9 @@ from hybrid.model.effort import Asked, Effort
 from hybrid.model.grade import Grading, grading
 from hybrid.model.state import Floats
 
-# The order that errors are taken to fall with.  A smooth motion has 2, contact and blows have 1; of 1.5 the figure is
-# 1.6 times too large for the first and half as large as it should be for the second.
-ORDER = 1.5
+# The order that errors are taken to fall with, where three runs do not show it, and what they may show.  A smooth motion
+# has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half as large for the second.
+ORDER, ORDERS = 1.5, (1.0, 2.0)
 # Times as long as others that steps must be to tell from both what the step does.
 LEAST_RATIO = 1.1
 # Coarser runs have cells and steps so many times as long.
@@ -34,7 +35,7 @@ MOST_RUNS, MOST_FINER = 3, 5.0
 COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end")
 PULLS = {"reaction_start": "pull_start", "reaction_end": "pull_end"}
 # The run that looks how the cable bends: cells and steps so many times as long as those of the first result.
-SURVEY_CELLS, SURVEY_STEPS, SURVEY_POINTS = 1.0, 4.0, 201
+SURVEY_CELLS, SURVEY_STEPS, SURVEY_POINTS = 2.0, 4.0, 201
 
 
 @dataclass(frozen=True)
@@ -84,37 +85,73 @@ def _thin(count: int, every: int) -> np.ndarray:
     return np.unique(np.append(np.arange(0, count, every), count - 1))
 
 
-def estimate(final: Sketch, mesh: Sketch | None, steps: tuple[Sketch, Sketch] | None) -> Errors:
-    """Errors of `final`.
+class Estimate:
+    """Errors of the last of several runs, by what finer cells and steps have changed.
 
-    mesh: a run on a coarser mesh; steps: two runs on one mesh, the second with the shorter steps.  None: it cannot
-    be told, or there is nothing to tell.
+    Of an error that falls with order p, a run on cells k times as long has k^p times as much.
     """
-    out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "total": {}}
-    if steps is not None and steps[0].step < LEAST_RATIO * steps[1].step:
-        steps = None
-    for name, values in final.values.items():
-        late = np.zeros_like(values)
-        if steps is not None and name in steps[0].values:
-            rough, fine = steps
-            change = fine.at(name, rough.every) - rough.values[name]
-            error = change / ((rough.step / fine.step) ** ORDER - 1.0) * (final.step / fine.step) ** ORDER
-            late = _spread(error, len(values), rough.every)
-        cells = np.zeros_like(values)
-        if mesh is not None and name in mesh.values:
-            change = values - mesh.values[name]
-            ratio = mesh.step / final.step
-            if ratio > LEAST_RATIO:  # what shorter steps have changed is not the mesh's doing
-                change = change - late * (ratio**ORDER - 1.0)
-            cells = change / ((final.effort.fineness / mesh.effort.fineness) ** ORDER - 1.0)
-        for kind, error in (("mesh", cells), ("time", late), ("total", cells + late)):
-            if (kind == "mesh" and mesh is None) or (kind == "time" and steps is None):
-                continue
-            out[kind][PULLS.get(name, name)] = _size(error, name)
-        model = final.model_error.get(PULLS.get(name, name))
-        if model is not None:
-            out["total"][PULLS.get(name, name)] = out["total"][PULLS.get(name, name)] + model
-    return Errors({kind: fields for kind, fields in out.items() if fields})
+
+    def __init__(self, final: Sketch, coarse: Sketch, rough: Sketch | None, coarsest: Sketch | None) -> None:
+        """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
+
+        None: it failed, or nothing moves.
+        """
+        self.run = final
+        self.order = {name: _order(name, final, coarse, coarsest) for name in final.values if name in coarse.values}
+        self.late: dict[str, np.ndarray] = {}
+        self.cells: dict[str, np.ndarray] = {}
+        for name, p in self.order.items():
+            if rough is not None and name in rough.values and coarse.steps > LEAST_RATIO * rough.steps:
+                late = (coarse.at(name, rough.every) - rough.values[name]) / ((coarse.steps / rough.steps) ** p - 1.0)
+                late = late / (final.steps / coarse.steps) ** p
+                self.late[name] = _spread(late, len(final.values[name]), rough.every)
+            change = final.at(name, coarse.every) - coarse.values[name]
+            self.cells[name] = self._of_cells(name, _spread(change, len(final.values[name]), coarse.every), coarse)
+
+    def _of_cells(self, name: str, change: np.ndarray, before: Sketch) -> np.ndarray:
+        """What cells make wrong, by a change since a run with others: less what steps have changed."""
+        p = self.order[name]
+        if name in self.late:
+            change = change - self.late[name] * ((self.run.steps / before.steps) ** p - 1.0)
+        return np.asarray(change / ((self.run.effort.fineness / before.effort.fineness) ** p - 1.0))
+
+    def follow(self, final: Sketch) -> None:
+        """A finer run has become the result."""
+        before, self.run = self.run, final
+        finer, shorter = final.effort.fineness / before.effort.fineness, final.steps / before.steps
+        for name, p in self.order.items():
+            change = final.values[name] - before.values[name]
+            if finer > LEAST_RATIO:
+                if name in self.late:
+                    self.late[name] = self.late[name] / shorter**p
+                self.cells[name] = self._of_cells(name, change, before)
+            elif shorter > LEAST_RATIO:
+                self.late[name] = change / (shorter**p - 1.0)
+
+    @property
+    def errors(self) -> Errors:
+        """What it comes to."""
+        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "total": {}}
+        for name, cells in self.cells.items():
+            late, called = self.late.get(name), PULLS.get(name, name)
+            out["mesh"][called] = _size(cells, name)
+            if late is not None:
+                out["time"][called] = _size(late, name)
+            total = _size(cells if late is None else cells + late, name)
+            out["total"][called] = total + self.run.model_error.get(called, 0.0)
+        return Errors({kind: fields for kind, fields in out.items() if fields})
+
+
+def _order(name: str, final: Sketch, coarse: Sketch, coarsest: Sketch | None) -> float:
+    """The order with which an output converges, by three runs; bounded, because a ratio of noise is one as well."""
+    if coarsest is None or name not in coarsest.values:
+        return ORDER
+    every = coarsest.every
+    later = np.abs(final.at(name, every) - coarse.at(name, every)).max()
+    earlier = np.abs(coarse.at(name, every) - coarsest.values[name]).max()
+    if not (later > 0.0 and earlier > 0.0):
+        return ORDER
+    return float(np.clip(np.log(earlier / later) / np.log(COARSER), *ORDERS))
 
 
 def _spread(error: np.ndarray, count: int, every: int) -> np.ndarray:
@@ -243,44 +280,47 @@ class Climb:
 
     def reach(self, effort: Effort) -> tuple[Sketch, Errors | None]:
         """From a first effort to the result and its errors, None where they cannot be told."""
-        steps, mesh = self._coarse(effort)
+        coarse = self._coarse(effort)
         final = self._counted(self.result(effort))
+        if coarse is None:
+            return final, None
+        estimate = Estimate(final, *coarse)
         for k in range(MOST_RUNS + 1):
-            if mesh is None and steps is None:
-                return final, None
-            errors = estimate(final, mesh, steps)
+            errors = estimate.errors
             if self.asked is None:
                 return final, errors
             verdict = judge(self.asked, errors, final)
-            if verdict.ratio <= 1.0 and not (final.unresolved and self.mesh_is_free and k < MOST_RUNS):
+            last = k == MOST_RUNS
+            if verdict.ratio <= 1.0 and not (final.unresolved and self.mesh_is_free and not last):
                 return final, errors
-            better = finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free)
-            if better is None or k == MOST_RUNS:
-                return final, self._missed(verdict, errors, better is None)
+            better = None if last else finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free)
+            if better is None:
+                return final, self._missed(verdict, errors, not last)
             self.told(f"{verdict.text}: computed more finely")
-            last, final = final, self._counted(self.result(better))
-            if final.effort.fineness > last.effort.fineness:
-                mesh = last
-            if final.effort.fineness == last.effort.fineness and final.step < last.step:
-                steps = (last, final)
-        raise AssertionError("unreachable: the loop returns")
+            final = self._counted(self.result(better))
+            estimate.follow(final)
+        raise AssertionError("unreachable: the last of the loop returns")
 
     def _counted(self, run: Sketch) -> Sketch:
         self.runs.append(run)
         return run
 
-    def _coarse(self, effort: Effort) -> tuple[tuple[Sketch, Sketch] | None, Sketch | None]:
-        """Runs to compare with: two that differ in their steps, and one on a coarser mesh."""
-        try:
-            mesh = self._counted(self.sketch(effort.coarser(cells=COARSER)))
-            if not self.moves:
-                return None, mesh
-            rough = self._counted(self.sketch(effort.coarser(cells=COARSER, steps=COARSER)))
-            return (rough, mesh), mesh
-        except ComputationError as error:
-            text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
-            self.notes.append(("no error figure", text))
-            return None, None
+    def _coarse(self, effort: Effort) -> tuple[Sketch, Sketch | None, Sketch | None] | None:
+        """Runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well."""
+        longer = COARSER if self.moves else 1.0
+        found: list[Sketch | None] = []
+        for cells, steps in ((COARSER, longer), (COARSER, longer**2), (COARSER**2, longer**2)):
+            try:
+                same = not self.moves and cells == COARSER and found
+                found.append(None if same else self._counted(self.sketch(effort.coarser(cells, steps))))
+            except ComputationError as error:
+                if not found:
+                    text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
+                    self.notes.append(("no error figure", text))
+                    return None
+                found.append(None)
+        assert found[0] is not None
+        return found[0], found[1], found[2]
 
     def _missed(self, verdict: Verdict, errors: Errors, stuck: bool) -> Errors:
         """Say that what was asked is not met."""

@@ -272,7 +272,7 @@ class _Told:
         elif progress:
             self._tell = progress
         self._duration = duration
-        self._begin = clock.perf_counter()
+        self._begin: float | None = None  # s of the clock, at the first call
         self._last = 0.0
 
     def __enter__(self) -> _Told:
@@ -292,6 +292,8 @@ class _Told:
     def __call__(self, motion: Motion, finished: bool = False) -> None:
         if self._tell is None:
             return
+        if self._begin is None:
+            self._begin = clock.perf_counter()
         now = clock.perf_counter() - self._begin
         if finished or now - self._last > REPORT_EVERY:
             self._last = now

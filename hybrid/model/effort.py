@@ -20,11 +20,11 @@ ONE = 0.01
 ZONES = 1e-3  # of a scene that asks for nothing: part of the length
 # Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
 # Medians of what the examples needed (docs/accuracy.md), as are those below; what is asked decides, not they.
-FOR_TENSION, FOR_POSITION = 2.2, 0.4
+FOR_TENSION, FOR_POSITION = 1.7, 0.4
 # Fewer cells show no shape; more are not needed before the first error figure has said so.
 COARSEST, FINEST = 0.5, 20.0
 # What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.
-STEP_FOR_TENSION, STEP_FOR_POSITION = 2e-5, 5e-4
+STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 5e-4
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.

@@ -40,7 +40,8 @@ def amount(text: str) -> tuple[str, float]:
 def _is_text(value: Any) -> Any:
     if isinstance(value, str):
         return value
-    fix = f"write {100 * value:g}%, or a size with its unit" if isinstance(value, int | float) else ""
+    number = isinstance(value, int | float) and not isinstance(value, bool) and FINEST <= value <= ROUGHEST
+    fix = f"write {100 * value:g}%, or a size with its unit" if number else "write 1%, or a size with its unit"
     refuse([Finding((), _EXAMPLES, fix)])
     raise AssertionError
 

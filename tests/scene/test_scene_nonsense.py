@@ -26,7 +26,7 @@ ADAPTIVE = (
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
         "always_catenary: [[200.0, 250.0]], joint: curvature}",
     )
-    + "output: {criteria: true}\n"
+    + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%}\n"
 )
 TEXTS = {
     "adaptive": ADAPTIVE,
@@ -75,7 +75,7 @@ LISTS = [(name, path) for name, text in TEXTS.items() for path, node in _places(
 LISTABLE = {"surge", "sway", "heave", "roll", "pitch", "yaw"}
 
 REQUIRED = {
-    "length", "mass", "kind", "amplitude", "period", "density", "duration", "step", "rod", "catenary", "z",
+    "length", "mass", "kind", "amplitude", "period", "density", "duration", "rod", "catenary", "z",
     "at", "over", "stiffness",
 }  # fmt: skip
 WORDS = {"title", "kind", "slack", "guess", "solver", "follow"}
@@ -98,7 +98,7 @@ def _say(name: str, path: tuple[str | int, ...], nonsense: str) -> list[Any]:
 
 def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
     """A title may be any line, true is a word for swivel and criteria, and damping may be an empty table."""
-    harmless = {"title": ("nonsense",), "swivel": (True,), "criteria": (True,), "damping": ({},)}
+    harmless = {"title": ("nonsense",), "swivel": (True,), "criteria": (True,), "errors": (True,), "damping": ({},)}
     return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
 
 
@@ -141,7 +141,7 @@ def _loaded(name: str) -> Any:
 
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
-SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria"}
+SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "errors"}
 SIGNED |= {"z", "slope", "surface", "top", "bottom", "turn", "near", "thrust", "by", "shape"}
 
 
@@ -153,7 +153,7 @@ def test_a_negative_number(case: tuple[str, tuple[str | int, ...]]) -> None:
     if keys[-1] in SIGNED or keys == ["initial", "friction"] or keys[:2] == ["initial", "points"] or ballast:
         found = complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
         assert all(c.line is not None for c in found)
-    elif keys == ["mesh", "nodes"]:
+    elif keys == ["mesh", "nodes"] or keys[0] == "accuracy":
         assert complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
     else:
         (complaint,) = [c for c in _say(name, path, "-7.25") if c.where.startswith(dotted(path))]

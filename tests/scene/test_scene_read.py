@@ -275,7 +275,7 @@ OVERRIDES = {
     "time.step=[1": ("time.step", "bracket"),
     "time.step={a: 1, a: 2}": ("time.step", "keep one"),
     "time.step=-1": ("time.step", "sign"),
-    "time.step=": ("time.step", "value"),
+    "time.duration=": ("time.duration", "value"),
     "model.kind=rood": ("model.kind", "did you mean rod?"),
     "ends.end.force=3": ("ends.end.force", ""),
 }

@@ -144,7 +144,7 @@ CASES = {
     "number for drag": (SUSPENSION, "{normal: 1.5, tangential: 0.05}", "§1.0", "cable.sections[0].drag", "`drag: {normal: 1.0}`"),
     "number for force": (SUSPENSION, "[0.005, 0, 0.00866025]", "§-300", "ends.end.force", "`force: [0, 0, -300]`"),
     "number for current": (OCEAN, "[0.3, 0, 0]", "§0.3", "environment.fluid.current", "`current: [0.3, 0, 0]`"),
-    "number for time": (SUSPENSION, "{duration: 20.0, step: 0.01}", "§20", "time", "`time: {duration: 20, step: ...}`"),
+    "number for time": (SUSPENSION, "{duration: 20.0, step: 0.01}", "§20", "time", "`time: {duration: 20}`"),
     "decimal comma": (SUSPENSION, MASS, "mass: §2,5e7", "cable.sections[0].mass", "a decimal comma? write 2.5e7"),
     "decimal comma in quotes": (SUSPENSION, MASS, 'mass: §"2,5e7"', "cable.sections[0].mass", "a decimal comma? write 2.5e7"),
     "decimal comma in braces": (OCEAN, "axial_stiffness: 2.0e8", "axial_stiffness: §2,5e7", "cable.sections[0].axial_stiffness", "a decimal comma? write 2.5e7"),
