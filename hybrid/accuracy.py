@@ -31,6 +31,8 @@ COARSER = 2.0
 AIM = 0.7
 # Runs that may follow the first result; each is at most this much finer.
 MOST_RUNS, MOST_FINER = 3, 5.0
+# Rod cells in a base cell of zones that move.
+MOST_PARTS = 24.0
 # What a run is compared by, as names of outputs; those that are not there are left out.
 COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end")
 PULLS = {"reaction_start": "pull_start", "reaction_end": "pull_end"}
@@ -253,7 +255,7 @@ def survey_grading(model: Model, s: Floats, run: Mapping[str, np.ndarray], rod_c
     found = grading(s, curvature, fade, disturbed, model.length)
     if rod_cell is None:
         return found
-    most = 24.0 * np.interp(found.s, s, rod_cell)  # rod cells in a base cell
+    most = MOST_PARTS * np.interp(found.s, s, rod_cell)
     return replace(found, density=np.maximum(found.density, 1.0 / most))
 
 

@@ -194,8 +194,8 @@ class Job:
             seen = self.sketch(coarse, s)
         except ComputationError:
             return None
-        cells = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
-        return survey_grading(model, s, seen.values, cells)
+        bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
+        return survey_grading(model, s, seen.values, bend)
 
     def _model(self, effort: Effort) -> tuple[Model, Equilibrium | None, Zoning | None]:
         model = build(self.scene, effort)

@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.effort import Effort, first_effort
 from hybrid.model.ends import EndConditions
+from hybrid.model.grade import Grading
 from hybrid.model.layout import Layout
 from hybrid.model.ledger import Entry, ledger
 from hybrid.model.line import line_on
@@ -159,6 +160,7 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
 # over which a cable without tension bends under its weight; the most rod cells in a base cell.
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
+GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends that have been seen
 FEWEST_CELLS = 4  # of a zone, however little is asked
 
 
@@ -200,18 +202,26 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], effort: Effort
     model = scene.model
     assert isinstance(model, AdaptiveModel)
     base, _ = _placed(scene, (ZonePlan("rod", scene.length),), cuts, effort, BASE_CELLS)
-    cell = rod_cells(scene, cable, 0.5 * (base[:-1] + base[1:])) / effort.fineness
+    middle = 0.5 * (base[:-1] + base[1:])
+    cell = rod_cells(scene, cable, middle, effort.grading) / effort.fineness
     parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(base.size - 1, bool))
 
 
-def rod_cells(scene: Scene, cable: Material, s: Floats) -> Floats:
-    """Length, m, of the cells of rods that come and go, at places s (K,) m, at fineness 1."""
+def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None = None) -> Floats:
+    """Length, m, of the cells of rods that come and go, at places s (K,) m, at fineness 1.
+
+    As a part of the length over which a cable bends under its weight; where it is known how the cable bends, no
+    shorter than that asks for.
+    """
     of = np.clip(np.searchsorted(cable.bounds, s) - 1, 0, cable.mass.size - 1)
     EI = cable.B[of, :2].min(axis=1)
     weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
     asked = getattr(scene.model, "rod_cell", None)
-    return np.full(s.size, asked) if asked else np.asarray(ROD_CELL * np.cbrt(EI / weight))
+    if asked:
+        return np.full(s.size, asked)
+    bend = np.cbrt(EI / weight)
+    return np.asarray(ROD_CELL * bend if grading is None else np.minimum(grading.cell(s), GRADED_ROD_CELL * bend))
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:

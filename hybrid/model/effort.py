@@ -20,7 +20,7 @@ ONE = 0.01
 ZONES = 1e-3  # of a scene that asks for nothing: part of the length
 # Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
 # Medians of what the examples needed (docs/accuracy.md), as are those below; what is asked decides, not they.
-FOR_TENSION, FOR_POSITION = 1.7, 0.4
+FOR_TENSION, FOR_POSITION = 1.5, 0.4
 # Fewer cells show no shape; more are not needed before the first error figure has said so.
 COARSEST, FINEST = 0.5, 20.0
 # What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.

@@ -34,6 +34,10 @@ class Grading:
         """Cells of the stretch [a, b]."""
         return max(LEAST_PIECE, round(fineness * float(np.diff(self._number(np.array([a, b])))[0])))
 
+    def cell(self, s: Floats) -> Floats:
+        """Length of cells, m, at s (K,) m, at fineness 1."""
+        return np.asarray(1.0 / np.interp(s, self.s, self.density))
+
     def nodes(self, cuts: Sequence[float], fineness: float) -> Floats:
         """Nodes (N+1,) m; one at every cut, the ends of the cable among them."""
         out = [np.array(cuts[:1])]
