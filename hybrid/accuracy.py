@@ -20,8 +20,8 @@ from hybrid.model.effort import Asked, Effort
 from hybrid.model.grade import Grading, grading
 from hybrid.model.state import Floats
 
-# The order that errors are taken to fall with, where three runs do not show it, and what they may show.  A smooth motion
-# has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half as large for the second.
+# The order that errors are taken to fall with, where three runs do not show it, and what they may show.  A smooth
+# motion has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half of it for the second.
 ORDER, ORDERS = 1.5, (1.0, 2.0)
 # Times as long as others that steps must be to tell from both what the step does.
 LEAST_RATIO = 1.1
@@ -276,7 +276,6 @@ class Climb:
     moves: bool  # whether there is a time
     sketch: Callable[[Effort], Sketch]
     result: Callable[[Effort], Sketch]
-    told: Callable[[str], None]
     notes: list[tuple[str, str]] = field(default_factory=list)  # events: kind, text
     runs: list[Sketch] = field(default_factory=list)
 
@@ -298,7 +297,6 @@ class Climb:
             better = None if last else finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free)
             if better is None:
                 return final, self._missed(verdict, errors, not last)
-            self.told(f"{verdict.text}: computed more finely")
             final = self._counted(self.result(better))
             estimate.follow(final)
         raise AssertionError("unreachable: the last of the loop returns")

@@ -106,6 +106,9 @@ def run(
         facts = _zones_over_time(result) if asked.model.kind == "adaptive" else {}
         if facts:
             say.show(lambda: _zones_said(facts, target))
+        errors = _errors(result)
+        say.show(lambda: _errors_said(errors, result))
+        facts |= {"errors": errors}
         say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
 
@@ -301,6 +304,29 @@ def _zones_over_time(result: Result) -> dict[str, Any]:
     changes = sum(e.kind in ZONE_EVENTS for e in result.events)
     rod = {"least": min(shares), "mean": sum(shares) / len(shares), "most": max(shares)}
     return {"rod": rod, "zone_changes": changes}
+
+
+def _errors(result: Result) -> dict[str, float]:
+    """The estimated errors: largest of position (m) and of the pulls at the ends (N), by kind."""
+    return {k.removeprefix("error_"): float(x) for k, x in result.attributes.items() if k.startswith("error_")}
+
+
+def _errors_said(errors: dict[str, float], result: Result) -> str:
+    """The same in words, with what was asked."""
+    if not errors:
+        return "error: not estimated (accuracy: 1%, or output.errors: true)"
+    pulls = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
+    most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in pulls), default=0.0)
+    said = []
+    for what, unit, whole in (("position", "m", float(result.s[-1])), ("pull", "N", most)):
+        total = errors[f"total_{what}"]
+        parts = [(kind, errors[f"{kind}_{what}"]) for kind in ("mesh", "time", "model") if f"{kind}_{what}" in errors]
+        causes = ", ".join(f"{kind} {x:.2g}" for kind, x in parts)
+        share = f", {100 * total / whole:.2g} %" if whole > 0 else ""
+        name = "position" if what == "position" else "pull at the ends"
+        said.append(f"{name} {total:.2g} {unit}{share} ({causes})")
+    asked = result.attributes.get("accuracy_asked")
+    return f"error: {'; '.join(said)}" + (f"; asked {asked}" if asked else "")
 
 
 def _zones_said(facts: dict[str, Any], file: Path) -> str:

@@ -79,6 +79,8 @@ class LiveLine:
         self._display: Any = None
 
     def __call__(self, progress: Progress) -> None:
+        if self._past and progress.t < self._past[-1][1]:
+            self._past.clear()  # another run has begun
         self._past.append((progress.wall, progress.t))
         if progress.t >= progress.duration:
             self.close()
@@ -118,6 +120,8 @@ class LiveLine:
         widest = len(f"{p.duration:.{places}f}")
         time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
         step, rate, left = f"step {p.step:<5d}", *self._pace(p)
+        if p.stage:
+            step = f"{p.stage:<9s}  {step}"
         for zones, newton, real in (
             (40, " Newton", " x real time"),
             (18, " Newton", " x real time"),

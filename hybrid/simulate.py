@@ -77,7 +77,10 @@ STEP_FIELDS = (
 
 @dataclass(frozen=True)
 class Progress:
-    """Where a run is: time and duration (s), step number, Newton iterations of the last step, zones, wall time (s)."""
+    """Where a run is: time and duration (s), step number, Newton iterations of the last step, zones, wall time (s).
+
+    stage: which run, where several tell the error: "looking" how the cable bends, "comparing", "result"; else empty.
+    """
 
     t: float
     duration: float
@@ -85,6 +88,7 @@ class Progress:
     iterations: int
     zones: tuple[Zone, ...]
     wall: float
+    stage: str = ""
 
 
 def run(
@@ -123,7 +127,7 @@ def run(
             return open_result(target)
         climb = Climb(
             asked(scene), scene.mesh is None, scene.time.controlled and scene.time.tolerance is None, True,
-            job.sketch, lambda effort: job.record(effort, target, overwrite), told.say,
+            job.sketch, lambda effort: job.record(effort, target, overwrite),
         )  # fmt: skip
         final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
         _amend(target, scene, final, errors, climb)
@@ -143,7 +147,7 @@ class Job:
         if isinstance(target, io.BytesIO):
             target.seek(0)
             target.truncate()
-        begin = clock.process_time()
+        begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
         model, equilibrium, zoning = self._model(effort)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
@@ -170,7 +174,7 @@ class Job:
 
         An effort with longer steps has as many times fewer outputs, so that these do not shorten its steps.
         """
-        begin = clock.process_time()
+        begin, self.told.stage = clock.process_time(), "comparing" if points is None else "looking"
         model, equilibrium, zoning = self._model(effort)
         s = output_points(self.scene.output.points, model.length) if points is None else points
         observer = self._observer(model, zoning, s, COMPARED)
@@ -271,7 +275,7 @@ class _Told:
             self._tell = live_line()
         elif progress:
             self._tell = progress
-        self._duration = duration
+        self._duration, self.stage = duration, ""
         self._begin: float | None = None  # s of the clock, at the first call
         self._last = 0.0
 
@@ -283,12 +287,6 @@ class _Told:
         if close is not None:
             close()
 
-    def say(self, text: str) -> None:
-        """Something that the live line should say above itself."""
-        say = getattr(self._tell, "say", None)
-        if say is not None:
-            say(text)
-
     def __call__(self, motion: Motion, finished: bool = False) -> None:
         if self._tell is None:
             return
@@ -297,7 +295,8 @@ class _Told:
         now = clock.perf_counter() - self._begin
         if finished or now - self._last > REPORT_EVERY:
             self._last = now
-            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, motion.model.zones, now))
+            zones = motion.model.zones
+            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
 
 
 def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import pi
 
 from hybrid.adapt.table import CRITERIA
-from hybrid.model.effort import first_effort
+from hybrid.model.effort import USUAL, asked, first_effort, wants_errors
 from hybrid.model.mesh import Zone
 from hybrid.model.properties import weight
 from hybrid.model.sea import current_table
@@ -88,6 +88,27 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
     yield Entry(f"joints that carry {carry}", True, "model.joint; where rod and catenary meet")
 
 
+def _accuracy(scene: Scene) -> Iterator[Entry]:
+    """What is asked of the result, and what it sets."""
+    want, effort, time = asked(scene), first_effort(scene), scene.time
+    if want is None:
+        yield Entry("accuracy", False, "not asked for: `accuracy: 1%`, `3 cm` or `50 N`")
+    else:
+        yield Entry("accuracy", True, f"{'accuracy' if scene.accuracy else f'no time.step, so {USUAL}'}: {want.text}")
+    if time is not None and effort.local is not None:
+        why = f"error of a step {effort.local:.2g} m at most, by {'time.tolerance' if time.tolerance else 'accuracy'}"
+        yield Entry("steps that follow the motion", True, f"{why}; {effort.step:.3g} s at most")
+    elif time is not None:
+        yield Entry("steps that follow the motion", False, "time.step fixes them")
+    graded = want is not None and scene.mesh is None and time is not None
+    why = "mesh places the cells" if scene.mesh else "no accuracy is asked for"
+    yield Entry("cells graded by bends", graded, "accuracy; as a first, coarse run shows them" if graded else why)
+    wants = wants_errors(scene)
+    by = "output.errors" if scene.output.errors is not None else "accuracy"
+    why = f"{by}; about half as much computing again" if wants else "output.errors: true, or accuracy"
+    yield Entry("error figure, by coarser runs", wants, why)
+
+
 def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
     """What is on and who asked for it, what is off and what would switch it on."""
     kinds = {z.kind for z in zones}
@@ -119,6 +140,7 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
         entries += _watched(scene)
     elif scene.output.criteria:
         entries.append(Entry("criteria as fields", False, "only zones that move have criteria", event="ignored"))
+    entries += _accuracy(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
     entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]

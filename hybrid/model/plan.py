@@ -8,7 +8,7 @@ from math import ceil
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import build
-from hybrid.model.effort import first_effort
+from hybrid.model.effort import first_effort, wants_errors
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
 from hybrid.scene.schema import Scene
@@ -33,6 +33,7 @@ class Plan:
 COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
 COST_STEP = 25e-6
 USUAL_ITERATIONS = 2.5
+COST_ERRORS = 1.6  # times a run that a run with its coarser ones costs
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often
 
@@ -93,7 +94,8 @@ def plan(scene: Scene) -> Plan:
         every = output_interval(scene)
         steps, step = count_steps(scene), every / parts(every, first_effort(scene).step)
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
+    seconds = steps * (USUAL_ITERATIONS * each + COST_STEP) * (COST_ERRORS if wants_errors(scene) else 1.0)
     return Plan(
         model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
-        steps * (USUAL_ITERATIONS * each + COST_STEP),
+        seconds,
     )  # fmt: skip
