@@ -21,7 +21,7 @@ from hybrid.model.grade import Grading, grading
 from hybrid.model.state import Floats
 
 # The order that errors are taken to fall with, where three runs do not show it, and what they may show.  A smooth
-# motion has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half of it for the second.
+# motion has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.
 ORDER, ORDERS = 1.5, (1.0, 2.0)
 # Times as long as others that steps must be to tell from both what the step does.
 LEAST_RATIO = 1.1

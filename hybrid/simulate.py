@@ -201,6 +201,47 @@ class Job:
         bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
         return survey_grading(model, s, seen.values, bend)
 
+    def record_rest(self, effort: Effort, target: Path | io.BytesIO, overwrite: bool) -> Sketch:
+        """The same of the equilibrium."""
+        if isinstance(target, io.BytesIO):
+            target.seek(0)
+            target.truncate()
+        begin = clock.process_time()
+        model, found = self._rest(effort)
+        s = output_points(self.scene.output.points, model.length)
+        observer = Observer(model.line, model.sea.values, model.zones, s, False, model.attached)
+        with _recorder(self.scene, model, observer, target, overwrite, 0, found) as recorder:
+            ends = model.ends.at(np.inf)
+            watch = Watch(recorder, model)
+            watch.equilibrium(found)
+            watch.strain(0.0, found.state)
+            watch.mesh(0.0, found.state)
+            stop = watch.still(ends, found.state)
+            if stop is not None:
+                raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
+            values = observer.values(ends, found.state, found.report, np.zeros(len(POWERS)))
+            recorder.save(0.0, values, observer.zone_rows)
+            recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
+        kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
+        return Sketch(effort, kept, 1, clock.process_time() - begin)
+
+    def sketch_rest(self, effort: Effort) -> Sketch:
+        """The equilibrium for comparison only."""
+        begin = clock.process_time()
+        model, found = self._rest(effort)
+        s = output_points(self.scene.output.points, model.length)
+        observer = Observer(model.line, model.sea.values, model.zones, s, False, model.attached, only=COMPARED)
+        values = observer.values(model.ends.at(np.inf), found.state, found.report, np.zeros(len(POWERS)))
+        return Sketch(effort, {k: np.array(x)[None] for k, x in values.items()}, 1, clock.process_time() - begin)
+
+    def _rest(self, effort: Effort) -> tuple[Model, Equilibrium]:
+        model = build(self.scene, effort)
+        if model.layout is None:
+            return model, _equilibrium(self.scene, model, np.inf)
+        model, found, _ = _first_zones(self.scene, model, effort, np.inf, None, at_rest=True)
+        assert found is not None
+        return model, found
+
     def _model(self, effort: Effort) -> tuple[Model, Equilibrium | None, Zoning | None]:
         model = build(self.scene, effort)
         if model.layout is not None:
@@ -306,33 +347,16 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         from hybrid.arbitrate import static_shooting
 
         return static_shooting(scene, output, overwrite)
-    model = build(scene)
-    if model.layout is not None:
-        model, equilibrium, _ = _first_zones(scene, model, first_effort(scene), np.inf, None, at_rest=True)
-        assert equilibrium is not None
-        found = equilibrium
-    else:
-        found = _equilibrium(scene, model, np.inf)
-    observer = Observer(
-        model.line,
-        model.sea.values,
-        model.zones,
-        output_points(scene.output.points, model.length),
-        False,
-        model.attached,
-    )
-    target = _target(output)
-    with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
-        ends = model.ends.at(np.inf)
-        watch = Watch(recorder, model)
-        watch.equilibrium(found)
-        watch.strain(0.0, found.state)
-        watch.mesh(0.0, found.state)
-        stop = watch.still(ends, found.state)
-        if stop is not None:
-            raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
-        recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
-        recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
+    job, target, effort = Job(scene, None), _target(output), first_effort(scene)
+    if not wants_errors(scene):
+        job.record_rest(effort, target, overwrite)
+        return open_result(target)
+    climb = Climb(
+        asked(scene), scene.mesh is None, False, False, job.sketch_rest,
+        lambda effort: job.record_rest(effort, target, overwrite),
+    )  # fmt: skip
+    final, errors = climb.reach(effort)
+    _amend(target, scene, final, errors, climb)
     return open_result(target)
 
 

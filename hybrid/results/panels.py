@@ -111,7 +111,7 @@ def plot_profiles(
 ) -> None:
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
-    The zones of that output are shaded.  Further names after the first are dashed, and left
+    The zones of that output are shaded, and the estimated error is a band, if the file has one.  Further names after the first are dashed, and left
     out where nothing would be seen of them.  times: when else to show the first, in grey.
     """
     names = [names] if isinstance(names, str) else list(names)
@@ -137,6 +137,9 @@ def plot_profiles(
             ax.plot(result.s, then * factor, color=earlier_grey(n, len(times)), linewidth=0.7, zorder=2.5, label="_")
         line: dict[str, Any] = {"color": INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
         ax.plot(result.s, values[output] * factor, zorder=3, label=title_of(name), **line)
+        error = error_of(result, name)
+        if error is not None:
+            _band(ax, result.s, values[output] * factor, error[output] * factor, INK)
     short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
     style(ax, (short if drawn[1:] else title_of(names[0])) + _at(result, output), "s (m)", f"{up} ({unit})")
@@ -151,7 +154,7 @@ def plot_history(
     """A quantity over time at the arc lengths s (m).
 
     component: 0, 1, 2 for x, y, z of a vector, drawn as the change since the first output;
-    None for a scalar or the magnitude of a vector.  Dotted lines: the zones changed.
+    None for a scalar or the magnitude of a vector.  Dotted lines: the zones changed; bands: the estimated error.
     """
     if "s" not in result.dims(name):
         raise ResultError(f"'{name}' does not depend on s; plot it as result[{name!r}] over result.times")
@@ -167,6 +170,12 @@ def plot_history(
     factor, unit = prefix(result.units[name], max(peak, round_off))
     for k, point in enumerate(s):
         ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
+    error = error_of(result, name)
+    for k, point in enumerate(s):
+        if error is None:
+            break
+        at = np.array([np.interp(point, result.s, row) for row in error])
+        _band(ax, result.times, values[:, k] * factor, at * factor, _POINT_COLOURS[k % len(_POINT_COLOURS)])
     changes = np.unique(result["zones/t"])[1:]
     for k, t in enumerate(changes if len(changes) <= MOST_CHANGES else ()):
         ax.axvline(t, color=GREY, lw=0.9, ls=":", zorder=1, label="_" * (k > 0) + "zones changed")  # one entry
@@ -191,6 +200,18 @@ def plot_touchdown(ax: Axes, result: Result) -> None:
     low, high = ax.get_ylim()
     ax.fill_between(result.times, *edges.T, color=SAND, linewidth=0, zorder=0.2)
     ax.set_ylim(low, high)
+
+
+def error_of(result: Result, name: str) -> np.ndarray | None:
+    """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none.  Of x, y, z: of position."""
+    found = f"errors/total/{'position' if name in AXES else name}"
+    return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
+
+
+def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, colour: str) -> None:
+    """The range in which the truth is estimated to lie."""
+    low, high = values - error, values + error
+    ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, zorder=2.8, label="_")
 
 
 def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
