@@ -46,6 +46,7 @@ class Sketch:
 
     effort: Effort
     values: Mapping[str, np.ndarray]
+    cells: int  # of zones that move: base cells
     steps: int
     cpu: float  # s
     every: int = 1  # outputs of the result to one of these; the last is there always
@@ -107,6 +108,8 @@ class Estimate:
                 late = (coarse.at(name, rough.every) - rough.values[name]) / ((coarse.steps / rough.steps) ** p - 1.0)
                 late = late / (final.steps / coarse.steps) ** p
                 self.late[name] = _spread(late, len(final.values[name]), rough.every)
+            if final.cells < LEAST_RATIO * coarse.cells:
+                continue
             change = final.at(name, coarse.every) - coarse.values[name]
             self.cells[name] = self._of_cells(name, _spread(change, len(final.values[name]), coarse.every), coarse)
 
@@ -115,15 +118,15 @@ class Estimate:
         p = self.order[name]
         if name in self.late:
             change = change - self.late[name] * ((self.run.steps / before.steps) ** p - 1.0)
-        return np.asarray(change / ((self.run.effort.fineness / before.effort.fineness) ** p - 1.0))
+        return np.asarray(change / ((self.run.cells / before.cells) ** p - 1.0))
 
     def follow(self, final: Sketch) -> None:
         """A finer run has become the result."""
         before, self.run = self.run, final
-        finer, shorter = final.effort.fineness / before.effort.fineness, final.steps / before.steps
+        finer, shorter = final.cells / before.cells, final.steps / before.steps
         for name, p in self.order.items():
             change = final.values[name] - before.values[name]
-            if finer > LEAST_RATIO:
+            if finer > LEAST_RATIO and name in self.cells:
                 if name in self.late:
                     self.late[name] = self.late[name] / shorter**p
                 self.cells[name] = self._of_cells(name, change, before)
@@ -132,14 +135,14 @@ class Estimate:
 
     @property
     def errors(self) -> Errors:
-        """What it comes to."""
+        """What it comes to.  Causes add up in size: that they cancel is seldom true at all times."""
         out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "total": {}}
         for name, cells in self.cells.items():
             late, called = self.late.get(name), PULLS.get(name, name)
-            out["mesh"][called] = _size(cells, name)
+            out["mesh"][called] = total = _size(cells, name)
             if late is not None:
                 out["time"][called] = _size(late, name)
-            total = _size(cells if late is None else cells + late, name)
+                total = total + out["time"][called]
             out["total"][called] = total + self.run.model_error.get(called, 0.0)
         return Errors({kind: fields for kind, fields in out.items() if fields})
 
@@ -286,6 +289,10 @@ class Climb:
         if coarse is None:
             return final, None
         estimate = Estimate(final, *coarse)
+        if not estimate.cells:
+            text = f"no error figure: {final.cells} cells are so few that there is nothing coarser to compare with"
+            self.notes.append(("no error figure", text))
+            return final, None
         for k in range(MOST_RUNS + 1):
             errors = estimate.errors
             if self.asked is None:

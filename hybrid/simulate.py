@@ -33,7 +33,7 @@ from hybrid.adapt.table import CRITERIA
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones, rod_cells
 from hybrid.model.coarse import coarser, refined
-from hybrid.model.effort import Effort, asked, first_effort, wants_errors
+from hybrid.model.effort import Effort, asked, first_effort, mesh_is_free, wants_errors
 from hybrid.model.grade import Grading
 from hybrid.model.mesh import Zone
 from hybrid.model.plan import output_times
@@ -126,7 +126,7 @@ def run(
             job.record(effort, target, overwrite)
             return open_result(target)
         climb = Climb(
-            asked(scene), scene.mesh is None, scene.time.controlled and scene.time.tolerance is None, True,
+            asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None, True,
             job.sketch, lambda effort: job.record(effort, target, overwrite),
         )  # fmt: skip
         final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
@@ -159,7 +159,7 @@ class Job:
             self._move(motion, outputs)
             recorder.close("complete", f"{motion.steps} steps")
         if not wants_errors(self.scene):
-            return Sketch(effort, {}, motion.steps, 0.0)
+            return Sketch(effort, {}, cells_of(model), motion.steps, 0.0)
         with open_result(target) as result:
             values = {name: np.array(result[name]) for name in COMPARED if name in result}
             model_error = (
@@ -167,7 +167,7 @@ class Job:
             )
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
         spent = clock.process_time() - begin
-        return Sketch(effort, values, motion.steps, spent, 1, unresolved, model_error)
+        return Sketch(effort, values, cells_of(model), motion.steps, spent, 1, unresolved, model_error)
 
     def sketch(self, effort: Effort, points: Floats | None = None) -> Sketch:
         """Compute for comparison only; points: places, m, instead of those of the result.
@@ -185,11 +185,11 @@ class Job:
         motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning)
         self._move(motion, times)
         values = {name: notebook[name] for name in COMPARED if name in notebook}
-        return Sketch(effort, values, motion.steps, clock.process_time() - begin, effort.every)
+        return Sketch(effort, values, cells_of(model), motion.steps, clock.process_time() - begin, effort.every)
 
     def survey(self, effort: Effort) -> Grading | None:
         """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
-        if self.scene.mesh is not None:
+        if not mesh_is_free(self.scene):
             return None
         coarse = effort.coarser(SURVEY_CELLS, SURVEY_STEPS)
         model = build(self.scene, coarse)
@@ -223,7 +223,7 @@ class Job:
             recorder.save(0.0, values, observer.zone_rows)
             recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
         kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
-        return Sketch(effort, kept, 1, clock.process_time() - begin)
+        return Sketch(effort, kept, cells_of(model), 1, clock.process_time() - begin)
 
     def sketch_rest(self, effort: Effort) -> Sketch:
         """The equilibrium for comparison only."""
@@ -232,7 +232,8 @@ class Job:
         s = output_points(self.scene.output.points, model.length)
         observer = Observer(model.line, model.sea.values, model.zones, s, False, model.attached, only=COMPARED)
         values = observer.values(model.ends.at(np.inf), found.state, found.report, np.zeros(len(POWERS)))
-        return Sketch(effort, {k: np.array(x)[None] for k, x in values.items()}, 1, clock.process_time() - begin)
+        kept = {name: np.array(x)[None] for name, x in values.items()}
+        return Sketch(effort, kept, cells_of(model), 1, clock.process_time() - begin)
 
     def _rest(self, effort: Effort) -> tuple[Model, Equilibrium]:
         model = build(self.scene, effort)
@@ -273,6 +274,11 @@ class Job:
             if stop in breaks:
                 motion.restart()
         self.told(motion, finished=True)
+
+
+def cells_of(model: Model) -> int:
+    """Cells by which meshes of one scene are compared: of zones that move, their base cells."""
+    return model.cells if model.layout is None else int(model.layout.rod.size)
 
 
 def _amend(target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb) -> None:
@@ -352,7 +358,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         job.record_rest(effort, target, overwrite)
         return open_result(target)
     climb = Climb(
-        asked(scene), scene.mesh is None, False, False, job.sketch_rest,
+        asked(scene), mesh_is_free(scene), False, False, job.sketch_rest,
         lambda effort: job.record_rest(effort, target, overwrite),
     )  # fmt: skip
     final, errors = climb.reach(effort)

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.effort import Effort, first_effort
+from hybrid.model.effort import Effort, first_effort, mesh_is_free
 from hybrid.model.ends import EndConditions
 from hybrid.model.grade import Grading
 from hybrid.model.layout import Layout
@@ -179,19 +179,20 @@ def _placed(
     scene: Scene, plans: tuple[ZonePlan, ...], cuts: Sequence[float], effort: Effort, usual: int
 ) -> tuple[Floats, tuple[Zone, ...]]:
     """Nodes and zones; usual: cells of a line whose scene does not say."""
-    mesh = scene.mesh
-    if mesh is None and effort.grading is not None:
+    mesh, free = scene.mesh, mesh_is_free(scene)
+    if free and effort.grading is not None:
         bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
         bounds[-1] = scene.length
         zones = tuple(Zone(plan.kind, float(a), float(b)) for plan, (a, b) in zip(plans, pairwise(bounds), strict=True))
         return effort.grading.nodes(sorted({*bounds.tolist(), *cuts}), effort.fineness), zones
-    if mesh is None:
+    if free:
         cells = max(round(usual * effort.fineness), FEWEST_CELLS * len(plans))
         return place_nodes(plans, cuts, None, None, cells)
-    if mesh.nodes is not None:
+    if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
-        s, zones = place_nodes(plans, cuts, mesh.cells or (usual if len(plans) == 1 else None), mesh.ratio)
+        ratio, given = (mesh.ratio, mesh.cells) if mesh is not None else (None, None)
+        s, zones = place_nodes(plans, cuts, given or (usual if len(plans) == 1 else None), ratio)
     if effort.fineness < 1.0:
         s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / effort.fineness))
     return s, zones

@@ -107,6 +107,12 @@ def wants_errors(scene: Scene) -> bool:
     return accuracy_of(scene) is not None
 
 
+def mesh_is_free(scene: Scene) -> bool:
+    """Whether the program places the cells."""
+    zones = getattr(scene.model, "zones", ())
+    return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
+
+
 def first_effort(scene: Scene) -> Effort:
     """What a scene's accuracy asks for, before anything is known of its errors."""
     want = asked(scene)
@@ -118,7 +124,7 @@ def first_effort(scene: Scene) -> Effort:
         which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
         part = min(x for x, _, _ in which)
         local = min(step * (x / ONE) ** 1.5 for x, _, step in which) * scene.length
-        if scene.mesh is None:
+        if mesh_is_free(scene):
             fineness = min(max(max(cells * sqrt(ONE / x) for x, cells, _ in which), COARSEST), FINEST)
     part *= OF_ZONES
     time = scene.time

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import pi
 
 from hybrid.adapt.table import CRITERIA
-from hybrid.model.effort import USUAL, asked, first_effort, wants_errors
+from hybrid.model.effort import USUAL, asked, first_effort, mesh_is_free, wants_errors
 from hybrid.model.mesh import Zone
 from hybrid.model.properties import weight
 from hybrid.model.sea import current_table
@@ -100,8 +100,8 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
         yield Entry("steps that follow the motion", True, f"{why}; {effort.step:.3g} s at most")
     elif time is not None:
         yield Entry("steps that follow the motion", False, "time.step fixes them")
-    graded = want is not None and scene.mesh is None and time is not None
-    why = "mesh places the cells" if scene.mesh else "no accuracy is asked for"
+    graded = want is not None and mesh_is_free(scene) and time is not None
+    why = "the scene places the cells" if not mesh_is_free(scene) else "no accuracy is asked for"
     yield Entry("cells graded by bends", graded, "accuracy; as a first, coarse run shows them" if graded else why)
     wants = wants_errors(scene)
     by = "output.errors" if scene.output.errors is not None else "accuracy"

@@ -31,7 +31,7 @@ TOLERANCE = 1e-9
 ROUND_OFF = 1e-6
 # Round-off of a length, as a part of it, and the most (as a part of the tension scale) that it may
 # make of a tension: a step so small that it is more does not converge, and says so.
-ROUND_OFF_LENGTH, MOST_NOISE = 1e-15, 1e-3
+ROUND_OFF_LENGTH, MOST_NOISE = 4e-15, 1e-3
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
 CLAMP = 20.0

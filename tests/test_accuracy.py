@@ -1,0 +1,280 @@
+"""Accuracy that is asked for: error figures against the truth, efforts that follow, and what cannot be told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.accuracy import ORDERS, Errors, Estimate, Sketch, Verdict, finer, judge
+from hybrid.errors import SceneError
+from hybrid.model.effort import Asked, Effort, first_effort, wants_errors
+from hybrid.model.grade import GROWTH, grading
+from hybrid.scene.accuracy import amount
+
+# --- what is written -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "size"),
+    [("1%", "part", 0.01), ("0.3 %", "part", 0.003), ("3 cm", "position", 0.03), ("5mm", "position", 0.005),
+     ("0.2 m", "position", 0.2), ("50 N", "tension", 50.0), ("1.5 kN", "tension", 1500.0), ("2e-1 m", "position", 0.2)],
+)  # fmt: skip
+def test_amounts(text, what, size):
+    assert amount(text)[0] == what
+    assert amount(text)[1] == pytest.approx(size, rel=1e-12)
+
+
+def swinging(**more):
+    """A chain that is let go from 40 degrees and swings in water; smooth, and of no particular period."""
+    data = {
+        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0}},
+        "cable": {
+            "sections": [
+                {"length": 2.0, "mass": 0.5, "diameter": 0.02, "bending_stiffness": 0.01, "axial_stiffness": 1e5,
+                 "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
+            ]
+        },
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {
+                "kind": "pinned", "position": [1.5, 0, 0],
+                "motion": {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0},
+            },
+        },
+        "initial": "equilibrium",
+        "model": "rod",
+        "time": {"duration": 6.0},
+        "output": {"every": 0.1, "points": 21},
+    }  # fmt: skip
+    return hybrid.validate_scene(data | more)
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [(0.01, "accuracy"), ("1", "accuracy"), ("3 ft", "accuracy"), ("50%", "accuracy"), ("0 m", "accuracy"),
+     ({"position": "5 N"}, "accuracy.position"), ({}, "accuracy"), ([1], "accuracy"), ("-1%", "accuracy")],
+)  # fmt: skip
+def test_what_is_no_accuracy_is_refused(given, where):
+    with pytest.raises(SceneError) as caught:
+        swinging(accuracy=given)
+    assert [c.where for c in caught.value.complaints] == [where]
+
+
+def test_a_number_is_told_how_to_write_it():
+    with pytest.raises(SceneError, match="write 2%"):
+        swinging(accuracy=0.02)
+
+
+def test_steps_that_follow_need_damping():
+    with pytest.raises(SceneError, match=r"at most 0\.9"):
+        swinging(time={"duration": 1.0, "rho_inf": 1.0})
+
+
+# --- efforts -------------------------------------------------------------------------------------
+
+
+def test_first_efforts():
+    """A scene that leaves its steps open asks for 1 %; finer asks are finer; what the scene says stands."""
+    usual, fine = first_effort(swinging()), first_effort(swinging(accuracy="0.1%"))
+    assert wants_errors(swinging())
+    assert usual == first_effort(swinging(accuracy="1%"))
+    assert fine.fineness > 2.0 * usual.fineness and fine.local < 0.1 * usual.local
+    fixed = swinging(time={"duration": 6.0, "step": 0.02}, mesh={"cells": 30}, accuracy="0.1%")
+    assert first_effort(fixed).local is None and first_effort(fixed).step == 0.02 and first_effort(fixed).fineness == 1
+    plain = swinging(time={"duration": 6.0, "step": 0.02})
+    assert not wants_errors(plain) and first_effort(plain).local is None
+    assert first_effort(swinging(time={"duration": 6.0, "tolerance": 1e-7})).local == 1e-7
+
+
+def test_coarser_efforts():
+    effort = Effort(2.0, 0.1, 1e-6, 1e-3)
+    other = effort.coarser(2.0, 2.0)
+    assert (other.fineness, other.local, other.step, other.every) == (1.0, 8e-6, 0.2, 2)
+    assert Effort(2.0, 0.1, None, 1e-3).coarser(1.0, 2.0).step == 0.2
+
+
+# --- estimates, by pure functions ----------------------------------------------------------------
+
+
+def sketch(effort: Effort, steps: int, order: float, every: int = 1, noise: float = 0.0) -> Sketch:
+    """A run whose error is h^order + 0.5 dt^order in position and pull, of known sign, at 9 outputs."""
+    t = np.linspace(0.0, 1.0, 9)
+    keep = np.unique(np.append(np.arange(0, 9, every), 8))
+    h, dt = 1.0 / effort.fineness, 100.0 / steps
+    wrong = (0.01 * h**order + 0.005 * dt**order) * (1.0 + t) + noise
+    position = np.zeros((9, 4, 3))
+    position[..., 2] = (np.sin(t) + wrong)[:, None]
+    values = {"position": position[keep], "reaction_end": (np.cos(t) + wrong)[keep, None] * [0.0, 0.0, 1.0]}
+    return Sketch(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
+
+
+@pytest.mark.parametrize("order", [1.0, 1.4, 2.0])
+def test_an_error_of_one_order_is_found_exactly(order):
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    final = sketch(effort, 100, order)
+    coarse = sketch(effort.coarser(2, 2), 50, order, 2)
+    rough = sketch(effort.coarser(2, 4), 25, order, 4)
+    coarsest = sketch(effort.coarser(4, 4), 25, order, 4)
+    estimate = Estimate(final, coarse, rough, coarsest)
+    assert estimate.order["position"] == pytest.approx(order, abs=1e-6)
+    found = estimate.errors
+    # the largest at t = 1 s; at outputs in between the error is interpolated, and here it is linear
+    assert found.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
+    assert found.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
+    assert found.largest("total", "pull_end") == pytest.approx(0.03, rel=1e-6)
+    better = sketch(Effort(2.5, 0.03, None, 1e-3), 300, order)
+    estimate.follow(better)
+    assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02 / 2.5**order, rel=1e-6)
+    assert estimate.errors.largest("time", "position") == pytest.approx(0.01 / 3.0**order, rel=1e-6)
+
+
+def test_orders_are_bounded():
+    """Runs that do not converge count as of order one: the figure is what the last refinement has changed."""
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    runs = [sketch(effort, 100, 2.0, 1, 0.0), sketch(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
+    runs += [sketch(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sketch(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
+    estimate = Estimate(*runs)
+    assert estimate.order["position"] == ORDERS[0]
+    assert estimate.errors.largest("total", "position") > 0.4
+
+
+def test_without_the_rougher_runs_an_order_in_between_is_taken():
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    estimate = Estimate(sketch(effort, 100, 2.0), sketch(effort.coarser(2, 2), 50, 2.0, 2), None, None)
+    assert ORDERS[0] < estimate.order["position"] < ORDERS[1]
+    assert 1.0 < estimate.errors.largest("total", "position") / 0.03 < 2.0
+    assert "time" not in estimate.errors.fields
+
+
+def test_judging_and_refining():
+    errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
+                     "total": {"position": np.full((2, 3), 0.4), "pull_end": np.full(2, 1.0)}})  # fmt: skip
+    effort = Effort(1.0, 0.1, 1e-3, 1e-3)
+    run = Sketch(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
+    verdict = judge(Asked(0.1, None, None), errors, run)
+    assert (verdict.ratio, verdict.mesh, verdict.time) == pytest.approx((4.0, 3.0, 1.0))
+    better = finer(effort, verdict, True, True)
+    assert better is not None and better.fineness > 1.5 and better.local < 1e-3
+    assert finer(effort, verdict, False, False) is None
+    only_steps = finer(effort, verdict, False, True)
+    assert only_steps is not None and only_steps.fineness == 1.0 and only_steps.local < 1e-3
+    assert judge(Asked(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
+
+
+def test_the_model_is_made_better_when_it_is_what_is_wrong():
+    better = finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True)
+    assert better is not None and better.zones < 0.5e-3
+
+
+# --- cells ---------------------------------------------------------------------------------------
+
+
+def test_graded_cells():
+    """Short where it bends and beside a clamp, neighbours alike, cuts kept, as many times more as asked."""
+    s = np.linspace(0.0, 100.0, 201)
+    curvature = np.where(np.abs(s - 30.0) < 2.0, 0.5, 0.001)
+    found = grading(s, curvature, np.full(201, 0.5), [100.0], 100.0)
+    nodes = found.nodes([0.0, 61.7, 100.0], 1.0)
+    h = np.diff(nodes)
+    assert 61.7 in nodes and nodes[0] == 0.0 and nodes[-1] == 100.0 and (h > 0).all()
+    at = 0.5 * (nodes[1:] + nodes[:-1])
+    assert h[np.abs(at - 30.0) < 1.0].max() < 0.3
+    assert h[-1] < 0.25 and h.max() > 3.0
+    inside = np.abs(at[:-1] - 61.7) > 6.0  # a cut may part cells unevenly
+    assert (np.maximum(h[1:] / h[:-1], h[:-1] / h[1:])[inside]).max() < 1.0 + 2.0 * GROWTH
+    assert found.nodes([0.0, 100.0], 3.0).size == pytest.approx(3 * h.size, rel=0.05)
+
+
+# --- runs ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return hybrid.run(swinging(accuracy="0.02%"))
+
+
+def pull(result):
+    return np.linalg.norm(result.reaction_end, axis=1)
+
+
+@pytest.mark.parametrize("percent", [10, 3, 1, 0.3])
+@pytest.mark.parametrize("model", ["rod", "adaptive"])
+def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
+    """Against a run asked for 0.02 %: error at most as asked, and its estimate from 0.5 to 4 times the truth."""
+    result = hybrid.run(swinging(accuracy=f"{percent}%", model=model))
+    position = np.linalg.norm(result.position - truth.position, axis=2).max()
+    force = np.abs(pull(result) - pull(truth)).max()
+    said = result.attributes["error_total_position"], result.attributes["error_total_pull"]
+    print(
+        f"{model}, {percent} %: position {position:.1e} m, estimated {said[0]:.1e}; pull {force:.1e} N of "
+        f"{pull(truth).max():.3g}, estimated {said[1]:.1e}; {result.attributes['effort_runs']} runs"
+    )
+    assert position <= percent / 100 * 2.0
+    assert force <= percent / 100 * pull(truth).max()
+    assert not [e for e in result.events if e.kind in ("accuracy missed", "no error figure")]
+    if model == "rod":  # zones leave a model error besides
+        assert 0.5 <= said[0] / position <= 4.0
+        assert 0.5 <= said[1] / force <= 6.0
+
+
+def test_what_the_file_holds():
+    result = hybrid.run(swinging(accuracy="3%"))
+    for kind in ("mesh", "time", "total"):
+        for name in ("position", "tension", "curvature", "bending_moment"):
+            assert result[f"errors/{kind}/{name}"].shape == (61, 21)
+            assert np.isfinite(result[f"errors/{kind}/{name}"]).all()
+        assert result[f"errors/{kind}/pull_end"].shape == (61,)
+    assert result.units["errors/total/position"] == "m"
+    assert result.dims("errors/total/tension") == ("t", "s")
+    assert result.errors["total/position"].max() == result.attributes["error_total_position"]
+    assert "0.06 m" in result.attributes["accuracy_asked"]
+    assert result.at(t=3.0, s=1.0)["errors/total/position"] > 0.0
+
+
+def test_explicit_settings_win_and_what_they_miss_is_said():
+    fixed = swinging(accuracy="0.01%", time={"duration": 6.0, "step": 0.05}, mesh={"cells": 10})
+    result = hybrid.run(fixed)
+    assert result.attributes["cells"] == 10
+    assert np.allclose(result["steps/dt"], 0.05)
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "fixes" in missed.text and "asked" in missed.text
+
+
+def test_a_figure_beside_a_run_with_fixed_steps(truth):
+    """Without accuracy, output.errors asks for the figure alone; the run is the same as without."""
+    settings = {"time": {"duration": 6.0, "step": 0.02}, "mesh": {"cells": 40}}
+    plain = hybrid.run(swinging(**settings))
+    result = hybrid.run(swinging(output={"every": 0.1, "points": 21, "errors": True}, **settings))
+    assert "errors" not in plain
+    assert (plain.position == result.position).all()
+    error = np.linalg.norm(result.position - truth.position, axis=2).max()
+    assert 0.5 < result.attributes["error_total_position"] / error < 3.0
+
+
+def test_a_figure_that_cannot_be_had_is_said():
+    """On two cells there is nothing coarser; the result stands, without a figure, and says so."""
+    chain = swinging(mesh={"cells": 2}, time={"duration": 1.0, "step": 0.02}, accuracy="1%")
+    result = hybrid.run(chain)
+    kinds = {e.kind for e in result.events}
+    assert "no error figure" in kinds and "errors" not in result
+
+
+def test_steps_land_on_outputs_and_ramps():
+    result = hybrid.run(swinging(accuracy="3%", output={"every": 0.37, "points": 5}))
+    t = result["steps/t"]
+    for when in [*result.times[1:], 2.0]:
+        assert np.abs(t - when).min() < 1e-12
+
+
+@pytest.mark.parametrize("percent", [1, 0.01])
+def test_statics(percent):
+    """A hanging cable without bending, against the catenary in closed form."""
+    scene = swinging(model="catenary", accuracy=f"{percent}%", time=None)
+    result = hybrid.static(scene)
+    fine = hybrid.static(swinging(model="catenary", time=None, mesh={"cells": 4000}))
+    error = np.linalg.norm(result.position - fine.position, axis=2).max()
+    said = result.attributes["error_total_position"]
+    print(f"static, {percent} %: {error:.2e} m, estimated {said:.2e}")
+    assert error <= percent / 100 * 2.0
+    assert 0.7 <= said / error <= 3.0
