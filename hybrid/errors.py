@@ -93,6 +93,8 @@ EVENTS_BY_WEIGHT = (
     "deep in the seabed",
     "implausible",
     "loses energy",
+    "coarse step",
+    "torque left out",
     "ignored",
     "undamped",
     "not judged",

@@ -135,6 +135,7 @@ def run(
                 motion.save()
             if stop in model.ends.breaks:
                 motion.restart()
+        motion.watch.finish()
         told(motion, finished=True)
         recorder.close("complete", f"{motion.steps} steps")
     return open_result(target)
@@ -214,7 +215,8 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     try:
         return _by_coarser(scene, model, t) or _statics(scene, model, t)
     except ComputationError as failed:
-        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))
+        flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
+        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
         if not reasons:
             raise
         roads = failed.detail.splitlines()

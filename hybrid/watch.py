@@ -34,6 +34,17 @@ NEWTON_LEAVES = 1e-7
 LOSS_NOTED = 0.5
 # Strain beyond which a cable is hardly one; ropes of polymer reach a few per cent in service.
 STRETCHED = 0.05
+# A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
+# under, and what Newton leaves of no tension at all is far below.
+PRESSED = 1e-3
+# What a step leaves out of the motion (docs/theory.md, 8), as a part of the largest displacement: 12 steps a period of
+# an oscillation, which is then wrong by about a tenth after one.
+COARSE = 0.05
+# An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
+# next node is a boundary layer.
+ASKEW, LAYER = 1e-5, 0.5
+# A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
+TURNED = 0.01
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
 AT_REST = 1e-4
 
@@ -50,7 +61,9 @@ class Watch:
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
-        self._rested = False
+        self._rested = self._left_out = False
+        self._placed: Floats | None = None  # m, of base nodes at the start
+        self._moved, self._left, self._left_at = 0.0, 0.0, (0.0, 0.0, 0.0)  # m; m; t, dt in s and s in m
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
             if entry.event:
@@ -75,7 +88,8 @@ class Watch:
             where = f"{text} for one that lies where it was laid"
             self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
         if not found.judged:
-            text = "the stability of this equilibrium is not judged, because an end moment is not conservative"
+            why = "round-off of the bending of so short cells hides it" if found.blurred else "an end moment is not conservative"
+            text = f"the stability of this equilibrium is not judged, because {why}"
             self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
@@ -114,6 +128,39 @@ class Watch:
         ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
 
+    def step(self, t: float, dt: float, rho: float, before: State, state: State) -> None:
+        """Remember the step that leaves the most out of the motion, and how far the line has moved."""
+        first = slice(None) if self._model.layout is None else self._model.layout.first
+        if self._placed is None:
+            self._placed = before.r[first].copy()
+        self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
+        change = np.abs(state.a - before.a)
+        left = dt * dt * float(change.max()) / (1.0 + rho) ** 2  # beta of generalized-alpha is 1/(1 + rho)^2
+        if left > self._left:
+            node = int(np.argmax(change.max(axis=1)))
+            self._left, self._left_at = left, (t, dt, float(self._model.line.s[node]))
+
+    def finish(self) -> None:
+        """After the last step: whether steps were too long for the motion."""
+        if self._left > COARSE * self._moved > 0.0:
+            t, dt, s = self._left_at
+            finer = dt * (0.2 * COARSE * self._moved / self._left) ** (1.0 / 3.0)
+            text = (
+                f"a step of {dt:.2g} s leaves out {self._left:.2g} m of a motion of {self._moved:.2g} m: amplitudes and "
+                f"phases are wrong; a time.step of {finer:.1g} s would do"
+            )
+            self._recorder.event(t, s, s, "coarse step", text)
+
+    def torque(self, t: float, turn: float, torque: float) -> None:
+        """A torque that zones which move do not carry, because a catenary lies between the ends."""
+        if abs(turn) > TURNED and not self._left_out:
+            text = (
+                f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: the "
+                f"result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
+            )
+            self._recorder.event(t, 0.0, self._model.length, "torque left out", text)
+            self._left_out = True
+
     def strain(self, t: float, state: State) -> None:
         """A cable that is stretched more than cables are."""
         strain = self._model.line.ck * state.T
@@ -135,6 +182,7 @@ class Watch:
             fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
             self.note(t, node, "unresolved bend", text + fix)
             self._fold = 1.5 * float(turn[node - 1])
+        self._clamps(t, state, d)
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = sea.offset - state.r @ sea.normal
@@ -143,6 +191,23 @@ class Watch:
                 text = f"the line lies {depth[node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
                 self.note(t, node, "deep in the seabed", f"{text}: is its stiffness in N/m per m of cable?")
                 self._sunk = 3.0 * float(depth[node])
+
+    def _clamps(self, t: float, state: State, d: Floats) -> None:
+        """Clamps that the cable leaves within less than a cell, however small the angle: their moment is too small."""
+        line, frames = self._model.line, self._model.ends.values.frame
+        for k, node, cell, beside in ((0, 0, 0, 1), (1, -1, -1, -2)):
+            if not (line.element[node] and line.element[beside]) or self._bend > UNRESOLVED:
+                continue
+            stiffness = float(line.kb[node, :2].max() * line.hn[node])
+            if state.T[cell] * line.h[cell] ** 2 <= stiffness:
+                continue
+            tangent = frames[k].reshape(3, 3)[:, 2]
+            angle = float(np.linalg.norm(d[cell] - tangent)) - float(np.linalg.norm(line.k0[node, :2]))
+            next_ = float(np.linalg.norm(d[cell] - d[beside])) / line.hn[beside]
+            if angle > ASKEW and next_ < LAYER * angle / line.hn[node]:
+                where = node % line.s.size
+                self.note(t, where, "unresolved bend", self._bend_text(where, angle, state))
+                self._bend = 1.5 * UNRESOLVED
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""
@@ -185,7 +250,9 @@ class Watch:
         if self._rested or not rod.any():
             return
         elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
-        pressed = float(state.T[rod].min()) < 0.0 or float(values["energy/torsion"]) > 0.0
+        bending = float((line.kb[:, :2] * line.hn[:, None])[line.element == 1].min(initial=np.inf))
+        least = PRESSED * bending / self._model.length if np.isfinite(bending) else 0.0  # J
+        pressed = float(state.T[rod].min()) * self._model.length < -least or float(values["energy/torsion"]) > least
         calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
         if (
             pressed
