@@ -37,9 +37,11 @@ STRETCHED = 0.05
 # A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
 # under, and what Newton leaves of no tension at all is far below.
 PRESSED = 1e-3
-# What a step leaves out of the motion (docs/theory.md, 8), as a part of the largest displacement: 12 steps a period of
-# an oscillation, which is then wrong by about a tenth after one.
-COARSE = 0.05
+# What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
+# (docs/theory.md, 8): 9 steps a period with rho_inf = 1, 16 with 0.5, 28 with 0.
+COARSE = 0.25
+# Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
+HARDLY_MOVED = 1e-7
 # An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
 # next node is a boundary layer.
 ASKEW, LAYER = 1e-5, 0.5
@@ -47,6 +49,8 @@ ASKEW, LAYER = 1e-5, 0.5
 TURNED = 0.01
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
 AT_REST = 1e-4
+# Inertia above this part of the load is a motion that has begun.
+LET_GO = 0.01
 
 Stop = tuple[Outcome, int] | None
 
@@ -63,7 +67,8 @@ class Watch:
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = False
         self._placed: Floats | None = None  # m, of base nodes at the start
-        self._moved, self._left, self._left_at = 0.0, 0.0, (0.0, 0.0, 0.0)  # m; m; t, dt in s and s in m
+        self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
+        self._rho, self._moved, self._left, self._left_at = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)  # -; m; m; t, dt in s, s in m
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
             if entry.event:
@@ -134,20 +139,34 @@ class Watch:
         if self._placed is None:
             self._placed = before.r[first].copy()
         self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
+        pull = float(state.T.max())
+        self._pulls = min(self._pulls[0], pull), max(self._pulls[1], pull)
         change = np.abs(state.a - before.a)
-        left = dt * dt * float(change.max()) / (1.0 + rho) ** 2  # beta of generalized-alpha is 1/(1 + rho)^2
+        self._rho = rho
+        left = dt * dt * float(change.max())
         if left > self._left:
             node = int(np.argmax(change.max(axis=1)))
             self._left, self._left_at = left, (t, dt, float(self._model.line.s[node]))
 
     def finish(self) -> None:
-        """After the last step: whether steps were too long for the motion."""
-        if self._left > COARSE * self._moved > 0.0:
+        """After the last step: whether steps were too long for the motion.
+
+        Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
+        beta = 1/(1 + rho)^2 of generalized-alpha.
+        """
+        low, high = self._pulls
+        if not self._moved > 0.0 or (
+            self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
+        ):
+            return
+        turn = (self._left / self._moved) ** (1.0 / 3.0)  # w dt
+        wrong = 2.0 * np.pi * (1.0 / (1.0 + self._rho) ** 2 - 1.0 / 6.0) * turn * turn
+        if wrong > COARSE:
             t, dt, s = self._left_at
-            finer = dt * (0.2 * COARSE * self._moved / self._left) ** (1.0 / 3.0)
             text = (
-                f"a step of {dt:.2g} s leaves out {self._left:.2g} m of a motion of {self._moved:.2g} m: amplitudes and "
-                f"phases are wrong; a time.step of {finer:.1g} s would do"
+                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: an "
+                f"oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
+                f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
             )
             self._recorder.event(t, s, s, "coarse step", text)
 
@@ -252,8 +271,11 @@ class Watch:
         elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
         bending = float((line.kb[:, :2] * line.hn[:, None])[line.element == 1].min(initial=np.inf))
         least = PRESSED * bending / self._model.length if np.isfinite(bending) else 0.0  # J
-        pressed = float(state.T[rod].min()) * self._model.length < -least or float(values["energy/torsion"]) > least
+        twisted = float(values["energy/torsion"]) > least
+        pressed = float(state.T[rod].min()) * self._model.length < -least or twisted
         calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
+        if not twisted:  # what is let go has no velocity yet, but is no longer at rest
+            calm &= float(line.mass.sum()) * float(np.abs(state.vd).max()) <= LET_GO * -float(state.T[rod].min())
         if (
             pressed
             and calm

@@ -1,4 +1,4 @@
-"""What an extreme case is, how it is judged, and the page that the judgements become.
+"""What an extreme case is, how it is judged, and how its scene is written down.
 
 A case is a scene, a model and a truth.  It ends in one of three ways that are honest,
 
@@ -7,7 +7,8 @@ A case is a scene, a model and a truth.  It ends in one of three ways that are h
     refused   no result: a SceneError or a ComputationError whose text names the real reason
 
 and in one that is not: *wrong*, which no case may be.  `must` says which end is expected, and `cause` what the
-event or the error has to say, so that a case that comes to hold where it did not fails as well.
+event or the error has to say, so that a case that comes to hold where it did not fails as well.  Where round-off or
+the luck of a coarse step decides, `must` allows two ends; docs/extremes.md says which one it was.
 """
 
 from __future__ import annotations
@@ -15,11 +16,9 @@ from __future__ import annotations
 import re
 import signal
 import time
-from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
-from itertools import groupby
 from typing import Any
 
 import numpy as np
@@ -52,6 +51,7 @@ class Case:
     source: str
     must: str = "right"
     cause: str = ""
+    slow: bool = False
 
     @property
     def key(self) -> str:
@@ -124,8 +124,8 @@ def judge(case: Case) -> Verdict:
 def check(case: Case, verdict: Verdict) -> None:
     """A case ends as it must, for the cause it names."""
     told = f"{verdict.outcome}: {verdict.what} {verdict.error:.3g} (tolerance {verdict.tolerance:.3g}); {verdict.said}"
-    assert verdict.outcome == case.must, f"{case.key}\n  is {told}"
-    if case.must != "right":
+    assert verdict.outcome in case.must.split(" or "), f"{case.key}\n  is {told}"
+    if verdict.outcome != "right":
         assert re.search(case.cause, verdict.said), f"{case.key}\n  for the wrong cause: {verdict.said}"
 
 
@@ -146,12 +146,14 @@ def scene(
     kind: Any = model
     if model == "zones":
         L, part = section["length"], None if cells is None else max(2, round(0.3 * cells))
-        counts = [{}, {}, {}] if part is None else [{"cells": part}, {"cells": max(1, cells - 2 * part)}, {"cells": part}]
+        counts = [{}, {}, {}] if part is None else [{"cells": part}, {"cells": max(2, cells - 2 * part)}, {"cells": part}]
         kinds = ("rod", "catenary", "rod")
         zones = [{kind: share * L} | n for kind, share, n in zip(kinds, (0.3, 0.4, 0.3), counts, strict=True)]
         kind = {"kind": "zones", "zones": zones}
     elif cells is not None:
         tables["mesh"] = {"cells": cells} | tables.get("mesh", {})
+    if tables.pop("slack", False) and model in ("catenary", "zones"):
+        kind = {"kind": model, **(kind if isinstance(kind, dict) else {}), "slack": "warn"}
     tables.setdefault("initial", "equilibrium")
     if model == "catenary":
         section = {k: v for k, v in section.items() if k not in ("bending_stiffness", "torsional_stiffness")}
@@ -194,52 +196,3 @@ def spread(seed: int, count: int, **ranges: Any) -> Iterator[dict[str, Any]]:
             columns[name] = [values[int(p * len(values))] for p in places]
     for k in range(count):
         yield {name: column[k] for name, column in columns.items()}
-
-
-# --- the page --------------------------------------------------------------------------------------
-
-HEAD = """\
-# Extremes
-
-Where each model holds, degrades and refuses.  Every line below was computed, and this page written, by
-
-    pytest tests/extremes -m "not bench" --write-extremes
-
-*Right*: within the tolerance of the truth, by the figure that comes nearest to it.  *Warned*: not within it, and the
-result says so in an event.  *Refused*: a scene that is refused or a computation that stops, with its true cause.
-There is no fourth kind: a test fails where an answer is wrong and nothing says so, where anything but a
-`SceneError` or a `ComputationError` comes out, and where a case takes more than 20 s.
-The families, their truths and the reasons for the tolerances are in tests/extremes.  SI units.
-
-"""
-
-
-def page(judged: Sequence[tuple[Case, Verdict]]) -> str:
-    """docs/extremes.md: the summary of family x model, and every case."""
-    rows = sorted(judged, key=lambda x: x[0].family)
-    text = HEAD + f"{len(rows)} cases.\n\n| family | " + " | ".join(MODELS) + " | worst error / tolerance |\n"
-    text += "|---" * (len(MODELS) + 2) + "|\n"
-    tables = ""
-    for family, members in groupby(rows, key=lambda x: x[0].family):
-        cases = list(members)
-        cells = []
-        for model in MODELS:
-            count = Counter(verdict.outcome for case, verdict in cases if case.model == model)
-            cells.append(", ".join(f"{count[x]} {x}" for x in ("right", "warned", "refused", "wrong") if count[x]) or "–")
-        worst = max((v.ratio for _, v in cases if v.outcome == "right"), default=0.0)
-        text += f"| {family} | " + " | ".join(cells) + f" | {worst:.2g} |\n"
-        sources = list(dict.fromkeys(case.source for case, _ in cases))
-        tables += f"\n## {family.capitalize()}\n\n" + "".join(f"{k}. {x}\n" for k, x in enumerate(sources, 1))
-        tables += "\n| case | model | outcome | error | tolerance | truth | said |\n|---|---|---|---|---|---|---|\n"
-        for case, v in cases:
-            tables += line(case, v, sources.index(case.source) + 1) + "\n"
-    return text + tables
-
-
-def line(case: Case, v: Verdict, source: int) -> str:
-    """One row of a family's table."""
-    figures = ("", "") if v.outcome == "refused" else (f"{v.what} {v.error:.1e}", f"{v.tolerance:.1e}")
-    said = v.said.splitlines()
-    brief = said[0] if v.outcome == "refused" and len(said) == 1 else " ".join(x.strip() for x in said[:2])
-    brief = re.sub(r"\s+", " ", brief).replace("|", "\\|")
-    return f"| {case.name} | {case.model} | {v.outcome} | {figures[0]} | {figures[1]} | {source} | {brief[:160]} |"

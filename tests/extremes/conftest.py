@@ -1,0 +1,45 @@
+"""Judging extreme cases, and the page that they become: docs/extremes.md (--write-extremes)."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import hybrid
+import pytest
+from extreme import Case, Verdict, check, judge, pinned, scene
+from every import CASES, PAGE, listed, page
+
+JUDGED = pytest.StashKey[dict[str, tuple[Case, Verdict]]]()
+
+
+@pytest.fixture(scope="session", autouse=True)
+def warm() -> None:
+    """Compile the kernels, which is no part of the time that a case may take."""
+    line = {"length": 1.0, "mass": 0.1, "bending_stiffness": 1e-3}
+    for model in ("rod", "adaptive"):
+        tables = scene(line, pinned(), pinned((0.8, 0, 0)), model, 20, 9.81, time={"duration": 0.1, "step": 0.01})
+        hybrid.run(hybrid.validate_scene(tables))
+
+
+@pytest.fixture
+def honest(request: pytest.FixtureRequest) -> Callable[[Case], None]:
+    """`honest(case)`: it ends as it must, and as docs/extremes.md says."""
+    writes = request.config.getoption("--write-extremes")
+
+    def look(case: Case) -> None:
+        verdict = judge(case)
+        request.config.stash.setdefault(JUDGED, {})[case.key] = (case, verdict)
+        print(f"\n{case.key}: {verdict.outcome}, {verdict.what} {verdict.error:.2g} of {verdict.tolerance:.2g}, {verdict.seconds:.2f} s")
+        check(case, verdict)
+        if not writes and " or " not in case.must:
+            assert listed().get(case.key) == verdict.outcome, "run: pytest tests/extremes -m 'not bench' --write-extremes"
+
+    return look
+
+
+@pytest.hookimpl(hookwrapper=True)
+def pytest_sessionfinish(session: pytest.Session) -> Iterator[None]:
+    yield
+    judged = session.config.stash.get(JUDGED, {})
+    if session.config.getoption("--write-extremes") and len(judged) == len(CASES):
+        PAGE.write_text(page([judged[case.key] for case in CASES]), encoding="utf-8")
