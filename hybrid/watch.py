@@ -68,7 +68,12 @@ class Watch:
         self._rested = self._left_out = False
         self._placed: Floats | None = None  # m, of base nodes at the start
         self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
-        self._rho, self._moved, self._left, self._left_at = 0.0, 0.0, 0.0, (0.0, 0.0, 0.0)  # -; m; m; t, dt in s, s in m
+        self._rho, self._moved, self._left, self._left_at = (
+            0.0,
+            0.0,
+            0.0,
+            (0.0, 0.0, 0.0),
+        )  # -; m; m; t, dt in s, s in m
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
             if entry.event:
@@ -93,7 +98,11 @@ class Watch:
             where = f"{text} for one that lies where it was laid"
             self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
         if not found.judged:
-            why = "round-off of the bending of so short cells hides it" if found.blurred else "an end moment is not conservative"
+            why = (
+                "round-off of the bending of so short cells hides it"
+                if found.blurred
+                else "an end moment is not conservative"
+            )
             text = f"the stability of this equilibrium is not judged, because {why}"
             self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
 
@@ -164,8 +173,8 @@ class Watch:
         if wrong > COARSE:
             t, dt, s = self._left_at
             text = (
-                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: an "
-                f"oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
+                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: "
+                f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
                 f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
             )
             self._recorder.event(t, s, s, "coarse step", text)
@@ -174,8 +183,8 @@ class Watch:
         """A torque that zones which move do not carry, because a catenary lies between the ends."""
         if abs(turn) > TURNED and not self._left_out:
             text = (
-                f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: the "
-                f"result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
+                f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
+                f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
             )
             self._recorder.event(t, 0.0, self._model.length, "torque left out", text)
             self._left_out = True

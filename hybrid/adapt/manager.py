@@ -173,8 +173,8 @@ class DomainManager:
         self.torque = self._torque(line, ends, state) if self.twisted else 0.0
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
-            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, self.torque, self.base_of_cell, self.free,
-            self.turn, self.twisting, self.ratios,
+            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, self.torque, self.base_of_cell,
+            self.free, self.turn, self.twisting, self.ratios,
         )  # fmt: skip
         if self.loaded:
             self._weigh_moments(state)

@@ -60,12 +60,12 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float =
                 f"{math.degrees(math.atan(least)):.3g} deg: nothing else keeps the cable from sliding"
             )
     if weight and bed is None and len(held) == 2:
-        level = math.dist(held["start"][:2], held["end"][:2])
-        if level < flexible:
+        across = math.dist(held["start"][:2], held["end"][:2])
+        if across < flexible:
             found.append(
-                f"the ends are {level:.3g} m apart, across gravity, and cells of the catenary are {flexible:.3g} m long: it "
-                f"folds within a cell, where it has no tension; a rod (bending_stiffness) rounds the fold, and more cells or "
-                f"some axial_stiffness may help"
+                f"the ends are {across:.3g} m apart across gravity, and cells of the catenary {flexible:.3g} m long: "
+                f"it folds within a cell, where it has no tension; a rod (bending_stiffness) rounds the fold, and more "
+                f"cells or some axial_stiffness may help"
             )
     if not weight and not any(isinstance(x, Body) for x in (scene.ends.start, scene.ends.end)) and len(held) == 2:
         apart = math.dist(held["start"], held["end"])

@@ -260,7 +260,9 @@ def resolution_findings(ends: Ends, environment: Environment | None, step: float
                     periods[name] = h.period
                 rate = 2 * math.pi * math.radians(abs(h.amplitude)) / h.period if what not in SHIFTS else 0.0
                 if rate * step > MOST_TURN:
-                    expected = f"at most {_rounded_down(MOST_TURN / rate)} s: the end turns by a radian in that, by {name}"
+                    expected = (
+                        f"at most {_rounded_down(MOST_TURN / rate)} s: the end turns by a radian in that, by {name}"
+                    )
                     fix = f"time.step: {0.3 * MOST_TURN / rate:.3g}, or less"
                     found.append(Finding(("time", "step"), expected, fix, f"{step:g}"))
         slow = [h.period for harmonics in motion.harmonics().values() for h in harmonics]

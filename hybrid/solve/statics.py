@@ -34,8 +34,8 @@ HARDENING = 8  # parts of the way from a soft, short line to the real one; a par
 CHECKED_COMPLIANCE = (
     1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
 )
-# What the factor of the stiffness loses of a node's bending stiffness (a hundred rounded operations a row), and the part
-# of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
+# What the factor of the stiffness loses of a node's bending stiffness (some fifty rounded operations a row), and the
+# part of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
 LOST, HIDDEN = 1e-14, 0.1
 NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign

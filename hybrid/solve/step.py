@@ -29,8 +29,8 @@ OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # error
 TOLERANCE = 1e-9
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
-# Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most (as a
-# part of the tension scale) that it may make of a tension: a step so small that it is more does not converge, and says so.
+# Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most, as a
+# part of the tension scale, that it may make of a tension: a step so small that it is more does not converge.
 ROUND_OFF_LENGTH, MOST_NOISE = 2.5e-16, 1e-3
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.

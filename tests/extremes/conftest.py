@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 
-import hybrid
 import pytest
-from extreme import Case, Verdict, check, judge, pinned, scene
 from every import CASES, PAGE, listed, page
+from extreme import Case, Verdict, check, judge, pinned, scene
+
+import hybrid
 
 JUDGED = pytest.StashKey[dict[str, tuple[Case, Verdict]]]()
 
@@ -29,10 +30,14 @@ def honest(request: pytest.FixtureRequest) -> Callable[[Case], None]:
     def look(case: Case) -> None:
         verdict = judge(case)
         request.config.stash.setdefault(JUDGED, {})[case.key] = (case, verdict)
-        print(f"\n{case.key}: {verdict.outcome}, {verdict.what} {verdict.error:.2g} of {verdict.tolerance:.2g}, {verdict.seconds:.2f} s")
+        print(
+            f"\n{case.key}: {verdict.outcome}, {verdict.what} {verdict.error:.2g} of {verdict.tolerance:.2g}, {verdict.seconds:.2f} s"
+        )
         check(case, verdict)
         if not writes and " or " not in case.must:
-            assert listed().get(case.key) == verdict.outcome, "run: pytest tests/extremes -m 'not bench' --write-extremes"
+            assert listed().get(case.key) == verdict.outcome, (
+                "run: pytest tests/extremes -m 'not bench' --write-extremes"
+            )
 
     return look
 

@@ -68,7 +68,9 @@ def page(judged: Sequence[tuple[Case, Verdict]]) -> str:
         cells = []
         for model in MODELS:
             count = Counter(verdict.outcome for case, verdict in cases if case.model == model)
-            cells.append(", ".join(f"{count[x]} {x}" for x in ("right", "warned", "refused", "wrong") if count[x]) or "–")
+            cells.append(
+                ", ".join(f"{count[x]} {x}" for x in ("right", "warned", "refused", "wrong") if count[x]) or "–"
+            )
         worst = max((v.ratio for _, v in cases if v.outcome == "right"), default=0.0)
         text += f"| {family} | " + " | ".join(cells) + f" | {worst:.2g} |\n"
         sources = list(dict.fromkeys(case.source for case, _ in cases))

@@ -146,7 +146,9 @@ def scene(
     kind: Any = model
     if model == "zones":
         L, part = section["length"], None if cells is None else max(2, round(0.3 * cells))
-        counts = [{}, {}, {}] if part is None else [{"cells": part}, {"cells": max(2, cells - 2 * part)}, {"cells": part}]
+        counts = (
+            [{}, {}, {}] if part is None else [{"cells": part}, {"cells": max(2, cells - 2 * part)}, {"cells": part}]
+        )
         kinds = ("rod", "catenary", "rod")
         zones = [{kind: share * L} | n for kind, share, n in zip(kinds, (0.3, 0.4, 0.3), counts, strict=True)]
         kind = {"kind": "zones", "zones": zones}

@@ -6,11 +6,11 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from extreme import AXES, MODELS, Case, Floats, Measured, X, Y, Z, free, pinned, scene, spread
+from extreme import AXES, MODELS, Case, Floats, Measured, X, Z, free, pinned, scene, spread
 from scipy.optimize import brentq, root
 
 G = 9.81
-ROUND_OFF = 1e-8  # of a length or a tension: Newton stops at 1e-9 of either
+ROUND_OFF = 1e-12  # of a length or a tension: straight lines, on which Newton converges to the last digits
 
 
 def section(L: float, D: float, density: float, EI: float, EA: float | None) -> dict[str, Any]:
@@ -28,7 +28,7 @@ def told(**values: Any) -> str:
 
 def taut() -> Iterator[Case]:
     """No weight, a pull T along an axis: straight, stretched by T/EA."""
-    source = "straight, r = s (1 + T/EA), T everywhere; round-off: 1e-8 of length and tension, where Newton stops"
+    source = "straight, r = s (1 + T/EA), T everywhere; round-off: 1e-12 of length and tension"
     draws = spread(
         1, 40, EI=(1e-9, 1e6), EA=[None, (1e3), 1e5, 1e7, 1e9, 1e12], T=(1e-6, 1e8), L=(0.1, 1e4), D=(1e-4, 1.0),
         n=[4, 5, 10, 33, 100, 400, 1000, 20_000], axis=list(AXES), model=list(MODELS),
@@ -52,7 +52,7 @@ def hanging() -> Iterator[Case]:
     """A line that hangs (or floats) straight from a pin: T = w (L - s), stretched by w (L s - s^2/2)/EA."""
     source = (
         "T = w (L - s) of the weight in the fluid, r = s + w (L s - s²/2)/EA; round-off: the discrete line has this very "
-        "solution at its nodes and middles; 1e-8"
+        "solution at its nodes and middles; 1e-12"
     )
     draws = spread(
         2, 36, EI=(1e-9, 1e6), EA=[None, 1e4, 1e6, 1e9], L=(0.1, 1e4), D=(1e-4, 1.0), fluid=[0.0, 1e-3, 1.2, 1025.0, 13_534.0],
@@ -79,7 +79,9 @@ def hanging() -> Iterator[Case]:
         around = {"fluid": {"density": d["fluid"]}} if d["fluid"] else {}
         output = {"points": points.tolist()} if d["model"] in ("rod", "catenary") and n <= 100 else {"points": 5}
         tables = scene(line, *ends, d["model"], n, G, output=output, **around)
-        name = told(EI=d["EI"], EA=EA or "inf", L=L, D=d["D"], fluid=d["fluid"], density=d["density"], n=n, held=d["held"])
+        name = told(
+            EI=d["EI"], EA=EA or "inf", L=L, D=d["D"], fluid=d["fluid"], density=d["density"], n=n, held=d["held"]
+        )
         yield Case("hanging lines", name, d["model"], tables, truth, source)
 
 
@@ -97,7 +99,10 @@ def catenary_force(L: float, w: float, EA: float | None, span: float, rise: floa
         H, V = T * span / chord, 0.5 * w * L - T * rise / chord
 
     def miss(q: Floats) -> Floats:
-        return np.array(catenary_shape(L, w, EA, float(np.exp(q[0])), float(q[1] * w * L), L)) / L - [span / L, rise / L]
+        return np.array(catenary_shape(L, w, EA, float(np.exp(q[0])), float(q[1] * w * L), L)) / L - [
+            span / L,
+            rise / L,
+        ]
 
     found = root(miss, [np.log(H), V / (w * L)], tol=1e-14)
     assert np.abs(miss(found.x)).max() < 1e-10, "the closed form did not close"
@@ -147,12 +152,20 @@ def sagging() -> Iterator[Case]:
             bent = EI * w / H**2 * (1.0 if model != "catenary" else 0.0) + (1e-3 * L if model == "adaptive" else 0.0)
             allowed = h * h * w / (8 * H) + bent + 1e-7 * L
             yield "shape (m)", np.abs(result.position[-1] - exact).max(), min(allowed, 0.02 * L)
-            T = np.hypot(H, w * result.s - V)
             share = (w * h / H) ** 2 / 8 + 0.7 * (h / L) ** 2 + 4 * bent * w / H + 1e-6
             yield "pull", np.abs(np.linalg.norm(result.reaction_start[-1]) / np.hypot(H, V) - 1), min(0.05, share)
 
-        tables = scene(line, pinned(start), pinned(start + [span, 0, rise]), d["model"], n, G)
-        name = told(EI=EI, EA=f"{EA:.3g}" if EA else "inf", L=L, D=d["D"], ends=f"{d['tight']} L apart", rise=f"{d['slope']} rad", n=n, H=f"{H:.2g}")
+        tables = scene(line, pinned(start), pinned(start + np.array([span, 0, rise])), d["model"], n, G)
+        name = told(
+            EI=EI,
+            EA=f"{EA:.3g}" if EA else "inf",
+            L=L,
+            D=d["D"],
+            ends=f"{d['tight']} L apart",
+            rise=f"{d['slope']} rad",
+            n=n,
+            H=f"{H:.2g}",
+        )
         name += " far" * (d["far"] > 0) + f" sag of a cell {h * w / 8 / H:.1g} h" * (tip > 0)
         yield Case("sagging lines", name, d["model"], tables, truth, source)
 
@@ -199,7 +212,9 @@ def weightless() -> Iterator[Case]:
                 cause = "vanished|no unique solution|tension"
                 gravity = G if around else 0.0
                 tables = scene(line, *ends, model, 20, gravity, **around)
-                yield Case("no load at all", name, model, tables, lambda _: [("any", 1.0, 0.5)], source, "refused", cause)
+                yield Case(
+                    "no load at all", name, model, tables, lambda _: [("any", 1.0, 0.5)], source, "refused", cause
+                )
 
 
 CASES = [*taut(), *hanging(), *sagging(), *doubled(), *weightless()]

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import pytest
-from every import parameters
 from chains import CASES
+from every import parameters
 
 
 @pytest.mark.parametrize("case", parameters(CASES))
