@@ -306,7 +306,20 @@ def _recorder(
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "clamp left out", text)
+    left = [s for s in model.attached if model.layout is not None and not _bends(model, s)]
+    if left:
+        which = ", ".join(f"{s:.5g}" for s in left[:5]) + ", .." * (len(left) > 5)
+        text = (
+            f"bends at the point loads at s = {which} m shift the cable by less than the tolerance: they have no moment"
+        )
+        recorder.event(0.0, left[0], left[-1], "point left out", f"{text}; for it, say always_rod around them")
     return recorder
+
+
+def _bends(model: Model, s: float) -> bool:
+    """Whether an inner node at s has an element; the ends have their own say."""
+    node = int(np.argmin(np.abs(model.line.s - s)))
+    return bool(model.line.element[node]) or not 0 < node < model.line.h.size
 
 
 def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:

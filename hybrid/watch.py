@@ -21,6 +21,8 @@ from hybrid.solve.step import lowest, sharpest
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
+# What a catenary sags below the chord of a cell, as a part of the line's length, beyond which its shape is poor.
+OFF = 0.02
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
 # Twist of an element (rad) that could just as well be its opposite: the log strain ends at pi.
@@ -64,9 +66,11 @@ class Watch:
         self._strain = STRETCHED
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
+        self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = False
         self._placed: Floats | None = None  # m, of base nodes at the start
+        self._jump = model.tension_scale  # N
         self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
         self._rho, self._moved, self._left, self._left_at = (
             0.0,
@@ -127,18 +131,20 @@ class Watch:
 
     def _bend_text(self, node: int, bend: float, state: State) -> str:
         line, s = self._model.line, float(self._model.line.s[node])
-        if 0 < node < line.s.size - 1:
+        cell = min(node, line.h.size - 1)
+        first, tension = float(line.h[cell]), float(state.T[cell])
+        stiffness = float(line.kb[node, :2].max() * line.hn[node])
+        leaving = float(np.sqrt(stiffness / tension)) if tension > 0.0 else np.inf
+        place = "the cable leaves its end" if node in (0, line.s.size - 1) else "the cable leaves its point load"
+        if leaving <= first and (bend < UNRESOLVED or node in (0, line.s.size - 1)):
+            finer = 0.25 * leaving
+            how = f"{place} at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
+        elif 0 < node < line.s.size - 1:
             finer = 0.3 * float(line.hn[node]) / bend
             how = f"the bend at s = {s:g} m is sharper than the mesh ({np.degrees(bend):.0f} deg to the next cell)"
         else:
-            cell = min(node, line.h.size - 1)
-            first, tension = float(line.h[cell]), float(state.T[cell])
-            stiffness = float(line.kb[node, :2].max() * line.hn[node])
-            leaving = np.sqrt(stiffness / tension) if tension > 0.0 else np.inf
-            finer = 0.25 * float(leaving) if leaving <= first else 0.3 * first / bend
-            how = f"the cable leaves its end at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
-            if leaving > first:
-                how = f"the bend at the end s = {s:g} m is sharper than the mesh"
+            finer = 0.3 * first / bend
+            how = f"the bend at the end s = {s:g} m is sharper than the mesh"
         ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
 
@@ -149,6 +155,15 @@ class Watch:
             self._placed = before.r[first].copy()
         self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
         pull = float(state.T.max())
+        jump = pull - float(before.T.max())
+        if jump > self._jump and self._model.inextensible:
+            cell = int(np.argmax(state.T))
+            text = (
+                f"tension jumps by {jump:.3g} N within a step: what does not stretch stops at once, and the height of "
+                f"such a blow depends on step and cells; give axial_stiffness"
+            )
+            self.note(t, cell, "snap", text)
+            self._jump = 3.0 * jump
         self._pulls = min(self._pulls[0], pull), max(self._pulls[1], pull)
         change = np.abs(state.a - before.a)
         self._rho = rho
@@ -210,7 +225,13 @@ class Watch:
             fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
             self.note(t, node, "unresolved bend", text + fix)
             self._fold = 1.5 * float(turn[node - 1])
-        self._clamps(t, state, d)
+        self._layers(t, state, d)
+        sagging = np.where(flexible, turn * line.hn[1:-1] / 8.0, 0.0)
+        if sagging.size and sagging.max() > self._off:
+            node = int(np.argmax(sagging)) + 1
+            text = f"at s = {line.s[node]:g} m the catenary sags by {sagging[node - 1]:.2g} m below its chords"
+            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
+            self._off = 3.0 * float(sagging[node - 1])
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = sea.offset - state.r @ sea.normal
@@ -220,22 +241,27 @@ class Watch:
                 self.note(t, node, "deep in the seabed", f"{text}: is its stiffness in N/m per m of cable?")
                 self._sunk = 3.0 * float(depth[node])
 
-    def _clamps(self, t: float, state: State, d: Floats) -> None:
-        """Clamps that the cable leaves within less than a cell, however small the angle: their moment is too small."""
-        line, frames = self._model.line, self._model.ends.values.frame
-        for k, node, cell, beside in ((0, 0, 0, 1), (1, -1, -1, -2)):
-            if not (line.element[node] and line.element[beside]) or self._bend > UNRESOLVED:
+    def _layers(self, t: float, state: State, d: Floats) -> None:
+        """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
+        line, last = self._model.line, self._model.line.h.size
+        if self._bend > UNRESOLVED:
+            return
+        tangents = self._model.ends.values.frame[:, 2::3]
+        ends = [(0, tangents[0], d[0]), (last, d[-1], tangents[1])]
+        inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
+        for node, before, after in [*ends, *((i, d[i - 1], d[i]) for i in inner if 0 < i < last)]:
+            beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
+            if not line.element[node] or not beside:
                 continue
-            stiffness = float(line.kb[node, :2].max() * line.hn[node])
+            cell, stiffness = min(node, last - 1), float(line.kb[node, :2].max() * line.hn[node])
             if state.T[cell] * line.h[cell] ** 2 <= stiffness:
                 continue
-            tangent = frames[k].reshape(3, 3)[:, 2]
-            angle = float(np.linalg.norm(d[cell] - tangent)) - float(np.linalg.norm(line.k0[node, :2]))
-            next_ = float(np.linalg.norm(d[cell] - d[beside])) / line.hn[beside]
-            if angle > ASKEW and next_ < LAYER * angle / line.hn[node]:
-                where = node % line.s.size
-                self.note(t, where, "unresolved bend", self._bend_text(where, angle, state))
+            angle = float(np.linalg.norm(after - before)) - float(np.linalg.norm(line.k0[node, :2]))
+            smooth = max(float(np.linalg.norm(d[i] - d[i - 1])) / line.hn[i] for i in beside)
+            if angle > ASKEW and smooth < LAYER * angle / line.hn[node]:
+                self.note(t, node, "unresolved bend", self._bend_text(node, angle, state))
                 self._bend = 1.5 * UNRESOLVED
+                return
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""

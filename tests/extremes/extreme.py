@@ -94,6 +94,12 @@ def deadline(seconds: float) -> Iterator[None]:
         signal.signal(signal.SIGALRM, before)
 
 
+def compute(case: Case) -> Result:
+    """The result of a case; HybridError where there is none."""
+    scene = hybrid.validate_scene(case.scene)
+    return hybrid.run(scene) if "time" in case.scene else hybrid.static(scene)
+
+
 def judge(case: Case) -> Verdict:
     """Compute a case and compare it with its truth; whatever is no HybridError passes through as what it is."""
     begin = time.perf_counter()
@@ -103,8 +109,7 @@ def judge(case: Case) -> Verdict:
 
     with deadline(LONGEST):
         try:
-            scene = hybrid.validate_scene(case.scene)
-            result = hybrid.run(scene) if "time" in case.scene else hybrid.static(scene)
+            result = compute(case)
         except hybrid.SceneError as error:
             return verdict("refused", "", 0.0, 1.0, str(error))
         except hybrid.ComputationError as error:

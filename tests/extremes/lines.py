@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
-from extreme import AXES, MODELS, Case, Floats, Measured, X, Z, free, pinned, scene, spread
+from extreme import AXES, MODELS, Case, Floats, Measured, X, Z, clamped, free, pinned, scene, spread
 from scipy.optimize import brentq, root
 
 G = 9.81
@@ -217,4 +217,42 @@ def weightless() -> Iterator[Case]:
                 )
 
 
-CASES = [*taut(), *hanging(), *sagging(), *doubled(), *weightless()]
+def coarse() -> Iterator[Case]:
+    """A catenary of 2 to 8 cells: a polygon, as far from the curve as it is, or with a word on it."""
+    source = (
+        "catenary (Irvine 1981); 2 % of the length: what a cell sags below its chord; beyond, the result must say so"
+    )
+    for n in (2, 3, 4, 5, 6, 8):
+        for tight in (0.5, 0.8, 0.95):
+            L = 10.0
+            line = section(L, 0.02, 7850.0, 0.0, None)
+            w = line["mass"] * G
+            H, V = catenary_force(L, w, None, tight * L, 0.1 * L)
+
+            def truth(result: Any, L: float = L, w: float = w, H: float = H, V: float = V) -> Measured:
+                x, z = catenary_shape(L, w, None, H, V, result.s)
+                yield "shape/L", np.abs(result.position[-1] - np.column_stack([x, 0 * x, z])).max() / L, 0.02
+
+            tables = scene(line, pinned(), pinned((tight * L, 0, 0.1 * L)), "catenary", n, G)
+            name = told(n=n, ends=f"{tight} L apart")
+            yield Case("coarse meshes", name, "catenary", tables, truth, source, "right or warned", "unresolved bend")
+
+
+def unloaded() -> Iterator[Case]:
+    """T = 0, no gravity: a rod keeps its shape, a flexible line has none."""
+    source = "a rod without load is straight and free of tension, T = 0; a catenary has no answer; round-off 1e-12"
+    for EI, L in ((1e-9, 0.1), (1.0, 10.0), (1e6, 1e4)):
+        for axis, along in AXES.items():
+            for model in MODELS:
+
+                def truth(result: Any, L: float = L, EI: float = EI, along: Floats = along) -> Measured:
+                    yield "shape/L", np.abs(result.position[-1] - result.s[:, None] * along).max() / L, ROUND_OFF
+                    yield "tension/(EI/L²)", np.abs(result.tension[-1]).max() * L * L / EI, ROUND_OFF
+
+                must = "right" if model in ("rod", "adaptive") else "refused"
+                cause = "tension of a catenary zone vanished|no unique solution"
+                tables = scene(section(L, 0.01, 7850.0, EI, None), clamped((0, 0, 0), along), free(), model, 20)
+                yield Case("no tension", told(EI=EI, L=L, axis=axis), model, tables, truth, source, must, cause)
+
+
+CASES = [*taut(), *hanging(), *sagging(), *doubled(), *weightless(), *coarse(), *unloaded()]

@@ -349,4 +349,51 @@ def moves() -> Iterator[Case]:
         yield Case("moves to rest", name, d["model"], tables, truth, source)
 
 
-CASES = [*flights(), *sinking(), *drops(), *pendulums(), *twists(), *moves()]
+def blows() -> Iterator[Case]:
+    """A slack line pulled taut at speed: without stretch the blow has no height that steps and cells could find."""
+    source = "what does not stretch stops at once, at an infinite force: no answer but one that says so"
+    for L in (0.1, 10.0, 1e4):
+        for dt in (2e-4, 1e-3):
+            for model in ("rod", "zones", "adaptive", "catenary"):
+                beat = np.sqrt(L / G)
+                end = pinned((0.7 * L, 0, 0), motion={"travel": {"by": [0.295 * L, 0, 0], "over": 0.5 * beat}})
+                line = rod(L, 1e-7 * G * L**3, 1.0, rotary_inertia=0.0)
+                tables = scene(line, pinned(), end, model, 30, G, **clock(round(0.7 / dt), dt * beat, 0.5, 30))
+                name = told(L=L, dt=f"{dt:g} sqrt(L/g)")
+                cause = "snap|energy|tension of a catenary zone vanished"
+                yield Case(
+                    "inextensible blows",
+                    name,
+                    model,
+                    tables,
+                    lambda _: [("any", 1.0, 0.5)],
+                    source,
+                    "warned or refused",
+                    cause,
+                )
+
+
+def presses() -> Iterator[Case]:
+    """A straight rod between pins that are moved together: it stays straight by symmetry alone, and that must be said."""
+    source = "a straight rod bears π² EI/L² between pins; pressed beyond, it is straight only in a computation"
+    for L in (0.1, 10.0, 1e4):
+        for stiff in (1e3, 1e5):
+            for model in ("rod", "adaptive", "catenary"):
+                EI = 1.0
+                EA = stiff * EI / L**2
+                beat = np.sqrt(L * L / (EI / L**2))
+                end = pinned((L, 0, 0), motion={"travel": {"by": [-0.1 * L, 0, 0], "over": 2 * beat}})
+                line = rod(L, EI, 1.0, axial_stiffness=EA, damping=3.0 / beat, rotary_inertia=0.0)
+                initial = {"kind": "straight", "direction": [1, 0, 0]}
+                tables = scene(
+                    line, pinned(), end, model, 20, 0.0, initial=initial, **clock(300, 6 * beat / 300, 0.5, 6)
+                )
+                cause = "unstable" if model != "catenary" else "tension of a catenary zone vanished"
+                must = "warned" if model != "catenary" else "refused"
+                name = told(L=L, EA=f"{stiff:g} EI/L²")
+                yield Case(
+                    "pressed while straight", name, model, tables, lambda _: [("any", 1.0, 0.5)], source, must, cause
+                )
+
+
+CASES = [*flights(), *sinking(), *drops(), *pendulums(), *twists(), *moves(), *blows(), *presses()]
