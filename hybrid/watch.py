@@ -40,8 +40,10 @@ STRETCHED = 0.05
 # under, and what Newton leaves of no tension at all is far below.
 PRESSED = 1e-3
 # What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
-# (docs/theory.md, 8): 9 steps a period with rho_inf = 1, 16 with 0.5, 28 with 0.
-COARSE = 0.25
+# (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
+COARSE = 0.35
+# So many of the worst steps are needed: one alone is a blow or a load let go, unless it leaves out all of the motion.
+SEVERAL = 3
 # Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
 HARDLY_MOVED = 1e-7
 # An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
@@ -72,12 +74,8 @@ class Watch:
         self._placed: Floats | None = None  # m, of base nodes at the start
         self._jump = model.tension_scale  # N
         self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
-        self._rho, self._moved, self._left, self._left_at = (
-            0.0,
-            0.0,
-            0.0,
-            (0.0, 0.0, 0.0),
-        )  # -; m; m; t, dt in s, s in m
+        self._rho = self._moved = 0.0  # -, m
+        self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
             if entry.event:
@@ -149,7 +147,7 @@ class Watch:
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
 
     def step(self, t: float, dt: float, rho: float, before: State, state: State) -> None:
-        """Remember the step that leaves the most out of the motion, and how far the line has moved."""
+        """Remember the steps that leave the most out of the motion, and how far the line has moved."""
         first = slice(None) if self._model.layout is None else self._model.layout.first
         if self._placed is None:
             self._placed = before.r[first].copy()
@@ -168,9 +166,10 @@ class Watch:
         change = np.abs(state.a - before.a)
         self._rho = rho
         left = dt * dt * float(change.max())
-        if left > self._left:
+        if len(self._left) < SEVERAL or left > self._left[-1][0]:
             node = int(np.argmax(change.max(axis=1)))
-            self._left, self._left_at = left, (t, dt, float(self._model.line.s[node]))
+            self._left.append((left, t, dt, float(self._model.line.s[node])))
+            self._left = sorted(self._left, reverse=True)[:SEVERAL]
 
     def finish(self) -> None:
         """After the last step: whether steps were too long for the motion.
@@ -179,14 +178,14 @@ class Watch:
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
         low, high = self._pulls
-        if not self._moved > 0.0 or (
-            self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
-        ):
+        hardly = self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
+        if hardly or not self._left or not self._moved > 0.0:
             return
-        turn = (self._left / self._moved) ** (1.0 / 3.0)  # w dt
+        once, several = self._left[0], self._left[-1]
+        left, t, dt, s = once if once[0] > self._moved else several
+        turn = (left / self._moved) ** (1.0 / 3.0)  # w dt
         wrong = 2.0 * np.pi * (1.0 / (1.0 + self._rho) ** 2 - 1.0 / 6.0) * turn * turn
         if wrong > COARSE:
-            t, dt, s = self._left_at
             text = (
                 f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: "
                 f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "

@@ -23,9 +23,20 @@ CASES: list[Case] = [*lines.CASES, *rods.CASES, *motions.CASES, *chains.CASES]
 FAMILIES = list(dict.fromkeys(case.family for case in CASES))
 
 
+def takes_long(case: Case) -> bool:
+    """About a second or more: thousands of cells in zones that move, stiff links for scipy, thousands of steps."""
+    cells = case.scene.get("mesh", {}).get("cells", 0)
+    time = case.scene.get("time")
+    steps = time["duration"] / time["step"] if time else 0
+    stiff = case.family == "whips and chains" and "(1 w L" in case.name
+    return stiff or (case.model == "adaptive" and (cells >= 1000 or steps > 700))
+
+
 def parameters(cases: Sequence[Case]) -> list[Any]:
     """The cases of a file for pytest, slow ones marked."""
-    return [pytest.param(c, id=c.key.replace(" | ", "; "), marks=[pytest.mark.slow] if c.slow else []) for c in cases]
+    return [
+        pytest.param(c, id=c.key.replace(" | ", "; "), marks=[pytest.mark.slow] if takes_long(c) else []) for c in cases
+    ]
 
 
 @cache

@@ -51,7 +51,6 @@ class Case:
     source: str
     must: str = "right"
     cause: str = ""
-    slow: bool = False
 
     @property
     def key(self) -> str:
