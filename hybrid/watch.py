@@ -42,7 +42,8 @@ PRESSED = 1e-3
 # What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
 # (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
 COARSE = 0.35
-# So many of the worst steps are needed: one alone is a blow or a load let go, unless it leaves out all of the motion.
+# So many of the worst steps are needed: one alone is a blow or a load let go, unless it leaves out all of the motion or
+# there are hardly any others.
 SEVERAL = 3
 # Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
 HARDLY_MOVED = 1e-7
@@ -74,7 +75,7 @@ class Watch:
         self._placed: Floats | None = None  # m, of base nodes at the start
         self._jump = model.tension_scale  # N
         self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
-        self._rho = self._moved = 0.0  # -, m
+        self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
         self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
@@ -165,6 +166,7 @@ class Watch:
         self._pulls = min(self._pulls[0], pull), max(self._pulls[1], pull)
         change = np.abs(state.a - before.a)
         self._rho = rho
+        self._steps += 1
         left = dt * dt * float(change.max())
         if len(self._left) < SEVERAL or left > self._left[-1][0]:
             node = int(np.argmax(change.max(axis=1)))
@@ -182,7 +184,7 @@ class Watch:
         if hardly or not self._left or not self._moved > 0.0:
             return
         once, several = self._left[0], self._left[-1]
-        left, t, dt, s = once if once[0] > self._moved else several
+        left, t, dt, s = once if once[0] > self._moved or self._steps <= SEVERAL**2 else several
         turn = (left / self._moved) ** (1.0 / 3.0)  # w dt
         wrong = 2.0 * np.pi * (1.0 / (1.0 + self._rho) ** 2 - 1.0 / 6.0) * turn * turn
         if wrong > COARSE:
