@@ -157,6 +157,9 @@ class Motion:
         if self.target is None:
             return
         self.watch.rest(self.t, ends, values, self.state)
+        if self.zoning is not None:
+            manager = self.zoning.manager
+            self.watch.torque(self.t, manager.torque * manager.compliance, manager.torque)
         self._look(self.watch.energy(self.t, values, np.array(self.work), self.state))
 
     def _look(self, found: Stop) -> None:
@@ -194,6 +197,8 @@ class Motion:
                 "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
+        assert self.scene.time is not None
+        self.watch.step(end, dt, self.scene.time.rho_inf, self.spare, self.state)
         self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)

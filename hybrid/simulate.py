@@ -273,6 +273,7 @@ class Job:
                 motion.save()
             if stop in breaks:
                 motion.restart()
+        motion.watch.finish()
         self.told(motion, finished=True)
 
 
@@ -371,7 +372,8 @@ def _equilibrium(scene: Scene, model: Model, t: float) -> Equilibrium:
     try:
         return _by_coarser(scene, model, t) or _statics(scene, model, t)
     except ComputationError as failed:
-        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])))
+        flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
+        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
         if not reasons:
             raise
         roads = failed.detail.splitlines()
@@ -462,7 +464,20 @@ def _recorder(
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "clamp left out", text)
+    left = [s for s in model.attached if model.layout is not None and not _bends(model, s)]
+    if left:
+        which = ", ".join(f"{s:.5g}" for s in left[:5]) + ", .." * (len(left) > 5)
+        text = (
+            f"bends at the point loads at s = {which} m shift the cable by less than the tolerance: they have no moment"
+        )
+        recorder.event(0.0, left[0], left[-1], "point left out", f"{text}; for it, say always_rod around them")
     return recorder
+
+
+def _bends(model: Model, s: float) -> bool:
+    """Whether an inner node at s has an element; the ends have their own say."""
+    node = int(np.argmin(np.abs(model.line.s - s)))
+    return bool(model.line.element[node]) or not 0 < node < model.line.h.size
 
 
 def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:

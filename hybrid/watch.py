@@ -22,6 +22,8 @@ from hybrid.solve.step import lowest, sharpest
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
+# What a catenary sags below the chord of a cell, as a part of the line's length, beyond which its shape is poor.
+OFF = 0.02
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
 # Twist of an element (rad) that could just as well be its opposite: the log strain ends at pi.
@@ -35,8 +37,26 @@ NEWTON_LEAVES = 1e-7
 LOSS_NOTED = 0.5
 # Strain beyond which a cable is hardly one; ropes of polymer reach a few per cent in service.
 STRETCHED = 0.05
+# A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
+# under, and what Newton leaves of no tension at all is far below.
+PRESSED = 1e-3
+# What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
+# (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
+COARSE = 0.35
+# So many of the worst steps are needed: one alone is a blow or a load let go, unless it leaves out all of the motion or
+# there are hardly any others.
+SEVERAL = 3
+# Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
+HARDLY_MOVED = 1e-7
+# An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
+# next node is a boundary layer.
+ASKEW, LAYER = 1e-5, 0.5
+# A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
+TURNED = 0.01
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
 AT_REST = 1e-4
+# Inertia above this part of the load is a motion that has begun.
+LET_GO = 0.01
 
 Stop = tuple[Outcome, int] | None
 
@@ -50,8 +70,14 @@ class Watch:
         self._strain = STRETCHED
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
+        self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
-        self._rested = False
+        self._rested = self._left_out = False
+        self._placed: Floats | None = None  # m, of base nodes at the start
+        self._jump = model.tension_scale  # N
+        self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
+        self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
+        self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
         for entry in model.ledger:
             if entry.event:
@@ -76,7 +102,12 @@ class Watch:
             where = f"{text} for one that lies where it was laid"
             self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
         if not found.judged:
-            text = "the stability of this equilibrium is not judged, because an end moment is not conservative"
+            why = (
+                "round-off of the bending of so short cells hides it"
+                if found.blurred
+                else "an end moment is not conservative"
+            )
+            text = f"the stability of this equilibrium is not judged, because {why}"
             self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
@@ -100,20 +131,80 @@ class Watch:
 
     def _bend_text(self, node: int, bend: float, state: State) -> str:
         line, s = self._model.line, float(self._model.line.s[node])
-        if 0 < node < line.s.size - 1:
+        cell = min(node, line.h.size - 1)
+        first, tension = float(line.h[cell]), float(state.T[cell])
+        stiffness = float(line.kb[node, :2].max() * line.hn[node])
+        leaving = float(np.sqrt(stiffness / tension)) if tension > 0.0 else np.inf
+        place = "the cable leaves its end" if node in (0, line.s.size - 1) else "the cable leaves its point load"
+        if leaving <= first and (bend < UNRESOLVED or node in (0, line.s.size - 1)):
+            finer = 0.25 * leaving
+            how = f"{place} at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
+        elif 0 < node < line.s.size - 1:
             finer = 0.3 * float(line.hn[node]) / bend
             how = f"the bend at s = {s:g} m is sharper than the mesh ({np.degrees(bend):.0f} deg to the next cell)"
         else:
-            cell = min(node, line.h.size - 1)
-            first, tension = float(line.h[cell]), float(state.T[cell])
-            stiffness = float(line.kb[node, :2].max() * line.hn[node])
-            leaving = np.sqrt(stiffness / tension) if tension > 0.0 else np.inf
-            finer = 0.25 * float(leaving) if leaving <= first else 0.3 * first / bend
-            how = f"the cable leaves its end at s = {s:g} m within {leaving:.2g} m, less than its cell of {first:.2g} m"
-            if leaving > first:
-                how = f"the bend at the end s = {s:g} m is sharper than the mesh"
+            finer = 0.3 * first / bend
+            how = f"the bend at the end s = {s:g} m is sharper than the mesh"
         ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
+
+    def step(self, t: float, dt: float, rho: float, before: State, state: State) -> None:
+        """Remember the steps that leave the most out of the motion, and how far the line has moved."""
+        first = slice(None) if self._model.layout is None else self._model.layout.first
+        if self._placed is None:
+            self._placed = before.r[first].copy()
+        self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
+        pull = float(state.T.max())
+        jump = pull - float(before.T.max())
+        if jump > self._jump and self._model.inextensible:
+            cell = int(np.argmax(state.T))
+            text = (
+                f"tension jumps by {jump:.3g} N within a step: what does not stretch stops at once, and the height of "
+                f"such a blow depends on step and cells; give axial_stiffness"
+            )
+            self.note(t, cell, "snap", text)
+            self._jump = 3.0 * jump
+        self._pulls = min(self._pulls[0], pull), max(self._pulls[1], pull)
+        change = np.abs(state.a - before.a)
+        self._rho = rho
+        self._steps += 1
+        left = dt * dt * float(change.max())
+        if len(self._left) < SEVERAL or left > self._left[-1][0]:
+            node = int(np.argmax(change.max(axis=1)))
+            self._left.append((left, t, dt, float(self._model.line.s[node])))
+            self._left = sorted(self._left, reverse=True)[:SEVERAL]
+
+    def finish(self) -> None:
+        """After the last step: whether steps were too long for the motion.
+
+        Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
+        beta = 1/(1 + rho)^2 of generalized-alpha.
+        """
+        low, high = self._pulls
+        hardly = self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
+        if hardly or not self._left or not self._moved > 0.0:
+            return
+        once, several = self._left[0], self._left[-1]
+        left, t, dt, s = once if once[0] > self._moved or self._steps <= SEVERAL**2 else several
+        turn = (left / self._moved) ** (1.0 / 3.0)  # w dt
+        wrong = 2.0 * np.pi * (1.0 / (1.0 + self._rho) ** 2 - 1.0 / 6.0) * turn * turn
+        if wrong > COARSE:
+            text = (
+                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: "
+                f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
+                f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
+            )
+            self._recorder.event(t, s, s, "coarse step", text)
+
+    def torque(self, t: float, turn: float, torque: float) -> None:
+        """A torque that zones which move do not carry, because a catenary lies between the ends."""
+        if abs(turn) > TURNED and not self._left_out:
+            text = (
+                f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
+                f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
+            )
+            self._recorder.event(t, 0.0, self._model.length, "torque left out", text)
+            self._left_out = True
 
     def strain(self, t: float, state: State) -> None:
         """A cable that is stretched more than cables are."""
@@ -136,6 +227,13 @@ class Watch:
             fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
             self.note(t, node, "unresolved bend", text + fix)
             self._fold = 1.5 * float(turn[node - 1])
+        self._layers(t, state, d)
+        sagging = np.where(flexible, turn * line.hn[1:-1] / 8.0, 0.0)
+        if sagging.size and sagging.max() > self._off:
+            node = int(np.argmax(sagging)) + 1
+            text = f"at s = {line.s[node]:g} m the catenary sags by {sagging[node - 1]:.2g} m below its chords"
+            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
+            self._off = 3.0 * float(sagging[node - 1])
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = sea.offset - state.r @ sea.normal
@@ -144,6 +242,28 @@ class Watch:
                 text = f"the line lies {depth[node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
                 self.note(t, node, "deep in the seabed", f"{text}: is its stiffness in N/m per m of cable?")
                 self._sunk = 3.0 * float(depth[node])
+
+    def _layers(self, t: float, state: State, d: Floats) -> None:
+        """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
+        line, last = self._model.line, self._model.line.h.size
+        if self._bend > UNRESOLVED:
+            return
+        tangents = self._model.ends.values.frame[:, 2::3]
+        ends = [(0, tangents[0], d[0]), (last, d[-1], tangents[1])]
+        inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
+        for node, before, after in [*ends, *((i, d[i - 1], d[i]) for i in inner if 0 < i < last)]:
+            beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
+            if not line.element[node] or not beside:
+                continue
+            cell, stiffness = min(node, last - 1), float(line.kb[node, :2].max() * line.hn[node])
+            if state.T[cell] * line.h[cell] ** 2 <= stiffness:
+                continue
+            angle = float(np.linalg.norm(after - before)) - float(np.linalg.norm(line.k0[node, :2]))
+            smooth = max(float(np.linalg.norm(d[i] - d[i - 1])) / line.hn[i] for i in beside)
+            if angle > ASKEW and smooth < LAYER * angle / line.hn[node]:
+                self.note(t, node, "unresolved bend", self._bend_text(node, angle, state))
+                self._bend = 1.5 * UNRESOLVED
+                return
 
     def tension(self, t: float, state: State) -> None:
         """Catenary cells without tension, where the scene asks to go on with them."""
@@ -186,8 +306,13 @@ class Watch:
         if self._rested or not rod.any():
             return
         elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
-        pressed = float(state.T[rod].min()) < 0.0 or float(values["energy/torsion"]) > 0.0
+        bending = float((line.kb[:, :2] * line.hn[:, None])[line.element == 1].min(initial=np.inf))
+        least = PRESSED * bending / self._model.length if np.isfinite(bending) else 0.0  # J
+        twisted = float(values["energy/torsion"]) > least
+        pressed = float(state.T[rod].min()) * self._model.length < -least or twisted
         calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
+        if not twisted:  # what is let go has no velocity yet, but is no longer at rest
+            calm &= float(line.mass.sum()) * float(np.abs(state.vd).max()) <= LET_GO * -float(state.T[rod].min())
         if (
             pressed
             and calm

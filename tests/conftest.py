@@ -52,6 +52,7 @@ Report = Callable[[str, str, str, str], None]
 
 def pytest_addoption(parser: pytest.Parser) -> None:
     parser.addoption("--write-validation", action="store_true", help="write the figures to docs/validation.md")
+    parser.addoption("--write-extremes", action="store_true", help="write the cases to docs/extremes.md")
 
 
 def pytest_configure(config: pytest.Config) -> None:

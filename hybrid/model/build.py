@@ -24,7 +24,7 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, thinned
 from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
-from hybrid.model.start import corners, ends_and_frames, hung, initial_nodes, spare_shapes
+from hybrid.model.start import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.scene.schema import AdaptiveModel, Points, RodZone, Scene, Straight, ZonesModel
@@ -140,13 +140,12 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
     ends, frames = ends_and_frames(scene, start.e, rod, sea)
     start.a1[:] = frames
     others = []
-    if shape is not None:
-        for name, r in spare_shapes(scene, s):
-            spare = blank_state(n)
-            spare.r[:], spare.T[:] = r, scale
-            spare.e[:] = np.diff(r, axis=0)
-            spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
-            others.append((name, spare))
+    for name, r in spare_shapes(scene, s) if shape is not None else from_joint(scene, s):
+        spare = blank_state(n)
+        spare.r[:], spare.T[:] = r, scale
+        spare.e[:] = np.diff(r, axis=0)
+        spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
+        others.append((name, spare))
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
         ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,

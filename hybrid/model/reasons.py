@@ -11,10 +11,10 @@ from hybrid.scene.schema import Body, Free, Scene
 HARDLY = 1e-3
 
 
-def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
+def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:
     """What speaks against an equilibrium of the scene, in sentences; empty when nothing is known.
 
-    rod_ends: whether the line begins and ends with a rod.
+    rod_ends: whether the line begins and ends with a rod.  flexible: its longest cell of a catenary, m.
     """
     found = []
     bed, held = scene.environment.seabed, scene.ends.held()
@@ -58,6 +58,14 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool]) -> list[str]:
             found.append(
                 f"the seabed slopes by {math.degrees(math.atan(slope)):.3g} deg and friction holds up to "
                 f"{math.degrees(math.atan(least)):.3g} deg: nothing else keeps the cable from sliding"
+            )
+    if weight and bed is None and len(held) == 2:
+        across = math.dist(held["start"][:2], held["end"][:2])
+        if across < flexible:
+            found.append(
+                f"the ends are {across:.3g} m apart across gravity, and cells of the catenary {flexible:.3g} m long: "
+                f"it folds within a cell, where it has no tension; a rod (bending_stiffness) rounds the fold, and more "
+                f"cells or some axial_stiffness may help"
             )
     if not weight and not any(isinstance(x, Body) for x in (scene.ends.start, scene.ends.end)) and len(held) == 2:
         apart = math.dist(held["start"], held["end"])

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Literal
 
 import numpy as np
@@ -65,6 +65,24 @@ def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
         yield "an arc", _arc(first, np.array(end, float), s, -1.0 if net_weight(scene) >= 0.0 else 1.0)
         if float(np.linalg.norm(span)) > SHORTEST_SPAN * scene.length:
             yield "the straight span", first + (s / s[-1])[:, None] * span
+
+
+def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+    """A shape to start from where a line is clamped at one end alone: its first rod straight, the rest hanging."""
+    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    initial = scene.initial
+    zones: Sequence[object] = getattr(scene.model, "zones", ())
+    tangent = getattr(scene.ends.start if start else scene.ends.end, "tangent", None)
+    asked = isinstance(initial, Equilibrium) and initial.guess == "auto" and not (initial.points or initial.direction)
+    if not asked or bool(start) == bool(end) or not tangent or len(zones) < 2:
+        return
+    stiff = getattr(zones[0] if start else zones[-1], "rod", 0.0)
+    outward = np.array(tangent, float) * (1.0 if start else -1.0) / np.linalg.norm(tangent)
+    far = s if start else s[-1] - s
+    hanging = np.array([0.0, 0.0, -1.0 if net_weight(scene) >= 0.0 else 1.0])
+    along, below = np.minimum(far, stiff), np.maximum(far - stiff, 0.0)
+    r = np.array(start or end, float) + along[:, None] * outward + below[:, None] * hanging
+    yield "a line that hangs from its first joint", r
 
 
 def _along_bed(scene: Scene) -> Floats:

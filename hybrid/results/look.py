@@ -24,7 +24,14 @@ SMALL, NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
 ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
 _NAMES |= {"contact": "contact force"} | {x: f"position {x}" for x in "xyz"}
-_NEWS = ("not judged", "turned in", "friction left out", "clamp left out", "zones held")  # events that warn of nothing
+_NEWS = (
+    "not judged",
+    "turned in",
+    "friction left out",
+    "clamp left out",
+    "point left out",
+    "zones held",
+)  # no warnings
 
 
 def title_of(name: str) -> str:

@@ -111,7 +111,8 @@ def plot_profiles(
 ) -> None:
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
-    The zones of that output are shaded, and the estimated error is a band, if the file has one.  Further names after the first are dashed, and left
+    The zones of that output are shaded, and the estimated error is a band, if the file has one.  Further names after
+    the first are dashed, and left
     out where nothing would be seen of them.  times: when else to show the first, in grey.
     """
     names = [names] if isinstance(names, str) else list(names)

@@ -35,6 +35,8 @@ AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least; and the part of its range that a recorded motion
 # may bow within a step.  Six steps a period bow by 13 %, which is a poor answer but the same motion.
 SAMPLES, RAMP_STEPS, MISSED = 6, 3, 0.15
+# The most that an end may be turned in a step (rad): beyond half a turn nobody knows which way it went.
+MOST_TURN = 1.0
 
 # Height of the surface above still water [m] and its rate [m/s] at x, y [m], t [s].
 Elevation = Callable[[float, float, float], tuple[float, float]]
@@ -282,6 +284,16 @@ def resolution_findings(ends: Ends, environment: Environment | None, step: float
     periods = _periods(ends, environment)
     shortest = RAMP_STEPS * step * (1 - 1e-9)
     for here, _, motion in _motions(ends):
+        for what, harmonics in motion.harmonics().items():
+            listed = not isinstance(getattr(motion, what), Harmonic)
+            for i, h in enumerate(harmonics):
+                rate = 2 * math.pi * math.radians(abs(h.amplitude)) / h.period if what not in SHIFTS else 0.0
+                if rate * step > MOST_TURN:
+                    name = dotted((*here, what, i) if listed else (*here, what))
+                    most = _rounded_down(MOST_TURN / rate)
+                    expected = f"at most {most} s: the end turns by a radian in that, by {name}"
+                    fix = f"time.step: {0.3 * MOST_TURN / rate:.3g}, or less"
+                    found.append(Finding(("time", "step"), expected, fix, f"{step:g}"))
         slow = [h.period for harmonics in motion.harmonics().values() for h in harmonics]
         steps = f"{RAMP_STEPS} time steps of {step:g} s"
         if motion.ramp is not None and motion.ramp < shortest:

@@ -34,6 +34,9 @@ HARDENING = 8  # parts of the way from a soft, short line to the real one; a par
 CHECKED_COMPLIANCE = (
     1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
 )
+# What the factor of the stiffness loses of a node's bending stiffness (some fifty rounded operations a row), and the
+# part of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
+LOST, HIDDEN = 1e-14, 0.1
 NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
@@ -55,7 +58,8 @@ class Equilibrium:
     report: Floats
     slack: int  # a catenary cell without tension, or -1
     rubbed: bool  # True when friction took part
-    judged: bool  # False when its stability could not be judged (an end moment)
+    judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
+    blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
 
     @property
     def summary(self) -> str:
@@ -128,9 +132,29 @@ class _Solver:
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)
         self.total = 0
+        self.blurred = False  # whether round-off had the last word on stability
 
     def stable(self, ends: Ends, state: State) -> bool:
-        """True when the stiffness of the line is positive definite: a Cholesky factor of it exists.
+        """True when the stiffness of the line is positive definite, or when round-off hides whether it is.
+
+        Short cells are so stiff in bending that the last digits of that may outweigh a slight tension: what fails
+        by no more than they are worth is no buckling.
+        """
+        mass, h = self.line.mass, np.append(self.line.h, self.line.h[-1])
+        soft = NEUTRAL / ANCHOR * self.anchor
+        self.blurred = False
+        if self._definite(ends, state, soft):
+            return True
+        bending = self.line.kb[:, :2].max(axis=1) * self.line.element
+        lost = LOST * float((bending / (h * h * mass)).max())
+        if lost <= soft or not self._definite(ends, state, lost):
+            return False
+        EI = (bending * self.line.hn)[self.line.element == 1].min()
+        self.blurred = bool(lost * float(mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
+        return True
+
+    def _definite(self, ends: Ends, state: State, soft: float) -> bool:
+        """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass.
 
         Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
         and at its real size its round-off would hide the softest modes of a long line.
@@ -140,7 +164,7 @@ class _Solver:
         rows = np.zeros((n + 1, SIZE * WIDTH))
         march(
             line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
-            state.w, state.wd, 0.0, NEUTRAL / ANCHOR * self.anchor, self.gaps, self.W, self.X, self.report, rows,
+            state.w, state.wd, 0.0, soft, self.gaps, self.W, self.X, self.report, rows,
         )  # fmt: skip
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
@@ -428,5 +452,7 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
     rubbed = bool(solver.line.bits & FRICTION)
-    judged = is_judged(solver.line, ends, solver.length) or not solver.line.element.any()
-    return Equilibrium(state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), rubbed, judged)
+    judged = (is_judged(solver.line, ends, solver.length) and not solver.blurred) or not solver.line.element.any()
+    return Equilibrium(
+        state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), rubbed, judged, solver.blurred
+    )

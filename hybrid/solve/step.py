@@ -29,9 +29,9 @@ OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # error
 TOLERANCE = 1e-9
 # Below this the correction is accepted when it no longer shrinks: round-off of ill-scaled lines.
 ROUND_OFF = 1e-6
-# Round-off of a length, as a part of it, and the most (as a part of the tension scale) that it may
-# make of a tension: a step so small that it is more does not converge, and says so.
-ROUND_OFF_LENGTH, MOST_NOISE = 4e-15, 1e-3
+# Round-off of the length of the line, as a part of it (equal cells are all rounded the same way), and the most, as a
+# part of the tension scale, that it may make of a tension: a step so small that it is more does not converge.
+ROUND_OFF_LENGTH, MOST_NOISE = 2.5e-16, 1e-3
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
 CLAMP = 20.0
@@ -154,11 +154,11 @@ def newton(
     where = -1
     # What round-off of a cell's length makes of the tension when inertia must account for it within a short step.
     heavy = 0.0
-    longest = 0.0
+    length = 0.0
     for i in range(e.shape[0]):
         heavy += line.mass[i]
-        longest = max(longest, line.h[i])
-    noise = min(ROUND_OFF_LENGTH * longest * heavy * ca, MOST_NOISE * scale)
+        length += line.h[i]
+    noise = min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
     for it in range(1, most + 1):
         bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
