@@ -12,13 +12,15 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
-from hybrid.physics.loads import FRICTION, ROTARY, SEABED, WAVES
+from hybrid.physics.loads import FRICTION, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.physics.plane import chord2, part2
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.physics.seabed import stored
 from hybrid.physics.water import stir
 from hybrid.solve.blocks import substitute
 from hybrid.solve.march import get9, march
 from hybrid.solve.node import get3
+from hybrid.solve.planar import carried, march_planar, sharpest_planar, substitute_planar, update_planar
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
@@ -143,6 +145,7 @@ def newton(
     tension scale of the scene; `turning`: see `update`.  Returns outcome,
     iterations, last predicted correction, and the cell or node where it was worst.
     """
+    planar = line.bits & PLANAR
     before = math.inf
     left = math.inf
     where = -1
@@ -154,12 +157,15 @@ def newton(
         longest = max(longest, line.h[i])
     noise = min(ROUND_OFF_LENGTH * longest * heavy * ca, MOST_NOISE * scale)
     for it in range(1, most + 1):
-        bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
+        if planar:
+            bad = march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows)
+        else:
+            bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
             if not report[15] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
                 return NOT_FINITE, it, left, int(report[16])
             return SINGULAR, it, left, bad
-        if not substitute(X, x):
+        if not (substitute_planar(line.plane, X, x) if planar else substitute(X, x)):
             return NOT_FINITE, it, left, first_bad(x, e)
         shift, turn, where, pull, big = measure(e, T, x)
         part = 1.0
@@ -169,7 +175,10 @@ def newton(
             part = LARGEST_TURN / turn
         if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
             part *= 0.5
-        update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
+        if planar and not turning:
+            update_planar(line, e, u, v, vd, T, a1, x, cv, ca, part)
+        else:
+            update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
@@ -190,6 +199,8 @@ def sharpest(line, ends, e, T, a1):
     The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
     h/lambda where the cell is longer than lambda = sqrt(EI/T), over which a cable leaves its clamp.
     """
+    if line.bits & PLANAR:
+        return sharpest_planar(line, ends, e, T, CLAMP)
     bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
     n = e.shape[0]
     for i in range(n + 1):
@@ -295,7 +306,15 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
         )
         new.e[i, 0], new.e[i, 1], new.e[i, 2] = en
         new.T[i] = old.T[i]
-        if line.spin[i]:
+        if line.bits & PLANAR:
+            a = get3(old.a1, i)
+            if line.spin[i]:
+                d, _, _ = chord2(part2(line.plane, old.e, i))
+                dn, _, _ = chord2(part2(line.plane, new.e, i))
+                a = carried(line.plane, a, d, dn)
+            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
+            new.w[i], new.wd[i] = 0.0, 0.0
+        elif line.spin[i]:
             dpsi = dt * old.w[i] + 0.5 * dt * dt * old.wa[i]
             d, _, _ = chord(ei)
             dn, _, _ = chord(en)
@@ -334,7 +353,7 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
             for k in range(3):
                 new.slip[i, k] = sea.slid[i, k]
     for i in range(n):
-        if line.spin[i]:
+        if line.spin[i] and not line.bits & PLANAR:
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
         else:
             new.wa[i] = 0.0
