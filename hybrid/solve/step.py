@@ -17,6 +17,7 @@ from hybrid.physics.plane import chord2, part2
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.physics.seabed import stored
 from hybrid.physics.water import stir
+from hybrid.solve.aside import step_aside
 from hybrid.solve.blocks import substitute
 from hybrid.solve.march import get9, march
 from hybrid.solve.node import get3
@@ -273,12 +274,13 @@ def lay(sea, e, slip):
 
 
 @kernel
-def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows):
+def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, X, x, report, rows, was, now):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.
     A step whose prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused:
     it has missed the motion, and Newton may end on a branch that has nothing to do with it.
+    was, now: a push out of the plane before and after the step (solve.aside); empty where there is none.
     """
     am = (2.0 * rho - 1.0) / (rho + 1.0)
     af = rho / (rho + 1.0)
@@ -373,4 +375,8 @@ def advance(line, sea, ends, old, new, u, dt, rho, reach, scale, most, gaps, W, 
                 report[20] += dot(b, ui) - along
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
             report[28] = stored(line, sea, new.r)
+        if was.shape[0] > 0:
+            report[29], report[30] = step_aside(
+                line, sea, ends, new.r, new.e, new.v, new.vd, new.T, new.a1, dt, rho, was, now, X
+            )
     return outcome, iterations, left, where
