@@ -59,7 +59,7 @@ class Push:
         """Carry it to a line with other nodes, in proportion to s; what lay before the last step is forgotten."""
         if s is self.s:
             return
-        now = np.column_stack([np.interp(s, self.s, x) for x in self._pair[1].T])
+        now = _on_cubics(self._pair[1], self.s, s)
         self._pair, self.s, self._led = (now, np.zeros_like(now)), s, None
 
     def last(self, size: float) -> Floats:
@@ -69,3 +69,13 @@ class Push:
         if not 0.0 < largest < np.inf:
             now, largest = self._seed(self.s), self._unit
         return np.asarray(now * (size / largest))
+
+
+def _on_cubics(x: Floats, s: Floats, at: Floats) -> Floats:
+    """x (N+1, k) at other nodes, on cubics with the slopes of parabolas: a rod would feel the kinks of chords."""
+    slope = np.gradient(x, s, axis=0)
+    j = np.clip(np.searchsorted(s, at, side="right") - 1, 0, s.size - 2)
+    h = (s[j + 1] - s[j])[:, None]
+    q = (at - s[j])[:, None] / h
+    near = (1.0 - q) ** 2 * ((1.0 + 2.0 * q) * x[j] + q * h * slope[j])
+    return np.asarray(near + q * q * ((3.0 - 2.0 * q) * x[j + 1] - (1.0 - q) * h * slope[j + 1]))
