@@ -119,7 +119,7 @@ def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
 def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
     """Step the push from `was` to `now` (N+1, 4) over a step that has led to (r, e, v, vd, T, a1).
 
-    A: work array with BAND numbers for each of 2 (N+1) equations.  Returns the kinetic energy of the push at the
+    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy of the push at the
     end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the step can follow.
     """
     am = (2.0 * rho - 1.0) / (rho + 1.0)
@@ -130,7 +130,7 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
     ca = (1.0 - am) / ((1.0 - af) * be * dt * dt)
     n = e.shape[0]
     plane = line.plane
-    for j in range(2 * (n + 1) * BAND):
+    for j in range((2 * (n + 1) + REACH) * BAND):  # with room for the rows that the last ones reach to
         A[j] = 0.0
 
     # shear S_c = T zeta_c + m_c.(dM_{c+1} - dM_c)/l_c, spin row d_c.(dM_{c+1} - dM_c) + Q_c zeta_c, cell by cell
@@ -233,18 +233,24 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
         if not A[o] < 0.0:
             wrong += 1
         inverse = 1.0 / A[o]
-        for j in range(1, min(REACH, rows - 1 - i) + 1):
-            p = (i + j) * BAND + REACH
-            f = A[p - j] * inverse
-            if f != 0.0:
-                for k in range(1, REACH + 1):
-                    A[p - j + k] -= f * A[o + k]
-                A[p + REACH + 1] -= f * A[o + REACH + 1]
+        A[o] = inverse
+        b1, b2, b3, b4, b = A[o + 1], A[o + 2], A[o + 3], A[o + 4], A[o + 5]
+        for j in range(1, REACH + 1):
+            p = o + j * BAND
+            f = A[p - j]
+            if f != 0.0:  # a catenary has no equations of spin, and reaches half as far
+                f *= inverse
+                p -= j
+                A[p + 1] -= f * b1
+                A[p + 2] -= f * b2
+                A[p + 3] -= f * b3
+                A[p + 4] -= f * b4
+                A[p + j + REACH + 1] -= f * b
     energy = 0.0
     x1 = x2 = x3 = x4 = 0.0
     for i in range(rows - 1, -1, -1):
         o = i * BAND + REACH
-        x = (A[o + 5] - A[o + 1] * x1 - A[o + 2] * x2 - A[o + 3] * x3 - A[o + 4] * x4) / A[o]
+        x = (A[o + 5] - A[o + 1] * x1 - A[o + 2] * x2 - A[o + 3] * x3 - A[o + 4] * x4) * A[o]
         x1, x2, x3, x4 = x, x1, x2, x3
         if i % 2 == 0:
             k = i // 2
