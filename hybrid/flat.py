@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.model.build import Model
-from hybrid.model.plane import in_space, planar
+from hybrid.model.plane import in_space, planar, untwist
 from hybrid.model.state import State
 from hybrid.scene.schema import Scene
 from hybrid.solve.push import GROWN, Push
@@ -43,6 +43,7 @@ class Flat:
             self.model = replace(model, plane=None)
             return
         self.model = replace(model, line=planar(model.line, model.plane))
+        untwist(self.model.line, model.ends.values, model.cable.held_tangent, state)
         self.push = Push(model.line, model.length, model.time_scale)
 
     def carry(self, stepper: Stepper) -> None:

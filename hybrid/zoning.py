@@ -16,7 +16,7 @@ from hybrid.model.build import Model
 from hybrid.model.coarse import picked
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
-from hybrid.model.plane import planar
+from hybrid.model.plane import planar, untwist
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import FRICTION, PLANAR, SEABED
 from hybrid.physics.seabed import stored
@@ -259,6 +259,8 @@ class Zoning:
         changed = on_layout(model, new)
         target = changed.line
         carried = self._carried(old, new, line, target, ends, state)
+        if target.bits & PLANAR:
+            untwist(target, ends, model.cable.held_tangent, carried.state)
         fresh = new.rod & ~old.rod
         manager.take(new, change, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()

@@ -194,9 +194,9 @@ def test_a_joint_is_a_node_without_an_element() -> None:
 
 
 def test_a_catenary_has_fewer_unknowns() -> None:
-    assert hybrid.plan(scene(BENDS)).unknowns == 3 * 9 + 8
-    assert hybrid.plan(scene(BENDS, "rod")).unknowns == 3 * 9 + 8 + 8
-    assert hybrid.plan(scene(BENDS, HYBRID)).unknowns == 3 * 9 + 8 + 4
+    assert hybrid.plan(scene(BENDS, dimension=3)).unknowns == 3 * 9 + 8
+    assert hybrid.plan(scene(BENDS, "rod", dimension=3)).unknowns == 3 * 9 + 8 + 8
+    assert hybrid.plan(scene(BENDS, HYBRID, dimension=3)).unknowns == 3 * 9 + 8 + 4
 
 
 ROD_ONLY = {

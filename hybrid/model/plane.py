@@ -65,3 +65,25 @@ def planar(line: Line, plane: Floats) -> Line:
 def in_space(line: Line) -> Line:
     """The line, to be computed in space."""
     return line._replace(bits=line.bits & ~PLANAR)
+
+
+def untwist(line: Line, ends: Ends, guides: tuple[bool, bool], state: State) -> None:
+    """Give the rods of a planar line frames without twist against each other and against its clamps.
+
+    guides: whether an end holds a tangent, and with it a frame.  In space a rod that begins twisted turns back within
+    a step; in a plane nothing turns it.
+    """
+    rods = np.flatnonzero(line.spin)
+    if not rods.size:
+        return
+    n = line.plane[2]
+    across = np.cross(n, state.e / np.linalg.norm(state.e, axis=1)[:, None])
+    frames = ends.frame.reshape(2, 3, 3)
+    if guides[0] or guides[1]:
+        held = frames[0 if guides[0] else 1]
+        director, m = held[:, 0], np.cross(n, held[:, 2])
+    else:
+        director, m = state.a1[rods[0]], across[rods[0]]
+    x, y = float(director @ n), float(director @ m)
+    size = np.hypot(x, y)
+    state.a1[rods] = (x * n + y * across[rods]) / size
