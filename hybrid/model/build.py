@@ -155,7 +155,7 @@ def build(scene: Scene) -> Model:
         line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        ledger=(*ledger(scene, line, zones), flat), length=float(s[-1]), tension_scale=scale,
+        ledger=ledger(scene, line, zones, flat), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
