@@ -199,7 +199,9 @@ def test_equilibria_that_hold_in_the_plane_alone() -> None:
     what["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}
     flat = hybrid.static(scene(what, dimension=2))
     assert planes(flat) and np.abs(flat.position[0, :, 1:]).max() < 1e-9
-    with pytest.raises(ComputationError, match="unstable"):  # the search in space does not find where it goes, and says so
+    with pytest.raises(
+        ComputationError, match="unstable"
+    ):  # the search in space does not find where it goes, and says so
         hybrid.static(scene(what))
 
 

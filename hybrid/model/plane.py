@@ -16,9 +16,7 @@ from hybrid.scene.schema import Scene
 WHAT = "computed in a plane (3 unknowns a node)"
 
 
-def in_plane(
-    scene: Scene, start: State, others: list[tuple[str, State]], ends: Ends
-) -> tuple[Floats | None, Entry]:
+def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: Ends) -> tuple[Floats | None, Entry]:
     """The plane (3, 3) of a scene, rows p, q and normal, or None; and what the ledger says about it.
 
     What a scene does not write down is looked at as well: the shape that it starts from.  Starts in `others` that

@@ -15,7 +15,7 @@ from typing import Any, Literal
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import SHIFTS, TURNS, Clamped, Ends, Guided, Motion, Triple
 from hybrid.scene.record import RecordRefused, read_record
-from hybrid.scene.sea import CurrentProfile, PowerLawCurrent, UniformCurrent
+from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
 from hybrid.scene.table import Finding, Place, unit
 from hybrid.scene.task import Initial, Points, Straight
 
@@ -149,7 +149,7 @@ def _twisted(ends: Ends, plane: Plane) -> Iterator[Finding]:
 
 
 def _director(end: Any, plane: Plane) -> tuple[float, float] | None:
-    """Components of the axis a1 that an end gives along the normal and along (normal x tangent); None: it gives none."""
+    """Components of the axis a1 of an end along the normal and along (normal x tangent); None: it gives none."""
     if not isinstance(end, Clamped | Guided) or end.normal is None:
         return None
     t = unit(end.tangent)
@@ -236,15 +236,16 @@ def _sea(environment: Environment) -> Iterator[Witness]:
             x, y, _ = current.velocity
             yield Witness((*here, "turn"), "along", (-y, x, 0.0))
     elif current is not None:
+        profile = isinstance(current, CurrentProfile)
         table = current.table if isinstance(current, CurrentProfile) else current
-        if not hasattr(table[0], "velocity"):
-            if any(table):
-                yield Witness(here, "along", table)  # type: ignore[arg-type]
-        else:
-            for i, point in enumerate(table):
-                if any(point.velocity):  # type: ignore[union-attr]
-                    where = (*here, "table", i, "velocity") if isinstance(current, CurrentProfile) else (*here, i)
-                    yield Witness(where, "along", point.velocity)  # type: ignore[union-attr]
+        points = [p for p in table if isinstance(p, CurrentPoint)]
+        for i, point in enumerate(points):
+            if any(point.velocity):
+                where: Place = (*here, "table", i, "velocity") if profile else (*here, i, "velocity")
+                yield Witness(where, "along", point.velocity)
+        if not points and any(table):
+            x, y, z = (float(v) for v in table if not isinstance(v, CurrentPoint))
+            yield Witness(here, "along", (x, y, z))
     if fluid.waves is not None:
         towards = math.radians(fluid.waves.direction)
         level = (round(math.cos(towards), 15), round(math.sin(towards), 15), 0.0)

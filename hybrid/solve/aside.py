@@ -9,7 +9,7 @@ of compressed or twisted rods, whirling and parametric resonance of taut lines. 
     w        displacement of a node along the normal n of the plane      -      m
     zeta     tilt of a chord out of the plane, (w_{c+1} - w_c)/l         -      rad
     psi      spin of a cell about its chord                              -      rad
-    C        how the moment answers, dM = C (dth_b - dth_a) - M J dth_a  4      N m, plane; J = n x
+    C        dM = C (dth_b - dth_a) - M J dth_a, J = n x                 4      N m, plane
     was, now w, its rate, algorithmic and true acceleration              N+1, 4 m, s
 
 What only damps or turns sections (stiffness-proportional damping, rotary inertia) is left out, which lets a push
@@ -35,7 +35,7 @@ BAND = 2 * REACH + 2  # numbers of an equation: its band and its right-hand side
 def answer(kappa, M, out, torsion, d):
     """C (in the plane) and C + M J of an element with bend kappa, moment M, stiffness out of the plane and in torsion.
 
-    d: the chord before it.  P = c I - kappa/2 J with c = kappa/2 cot(kappa/2); C = (D + P^T K) P, D = M (g kappa - J/2).
+    d: the chord before it.  P = c I - kappa/2 J, c = kappa/2 cot(kappa/2); C = (D + P^T K) P, D = M (g kappa - J/2).
     """
     g, _ = jacobian_functions(kappa * kappa)
     c, half = 1.0 - g * kappa * kappa, 0.5 * kappa
@@ -60,7 +60,7 @@ def times2(A, x):
 
 @inner
 def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
-    """Loads on node i across the plane: factors of w, of its rate and of its acceleration, and of the tilt before and after."""
+    """Loads on node i across the plane: factors of w, its rate, its acceleration, and of the tilt before and after."""
     bits, plane = line.bits, line.plane
     stiff, rate, inert = 0.0, 0.0, line.mass[i]
     before = after = 0.0
@@ -119,8 +119,9 @@ def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
 def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
     """Step the push from `was` to `now` (N+1, 4) over a step that has led to (r, e, v, vd, T, a1).
 
-    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy of the push at the
-    end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the step can follow.
+    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
+    of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the
+    step can follow.
     """
     am = (2.0 * rho - 1.0) / (rho + 1.0)
     af = rho / (rho + 1.0)
@@ -134,8 +135,8 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
         A[j] = 0.0
 
     # shear S_c = T zeta_c + m_c.(dM_{c+1} - dM_c)/l_c, spin row d_c.(dM_{c+1} - dM_c) + Q_c zeta_c, cell by cell
-    d, l, il = chord2(part2(plane, e, 0))
-    tilt, soft = 0.0, 0.0
+    d, _, il = chord2(part2(plane, e, 0))
+    soft = 0.0
     M = -across2(plane, ends.moment, 0)
     # dM of the element before cell c by the tilt and spin of cells c-1 and c
     z0, p0, z1, p1 = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
@@ -149,9 +150,9 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
         z1, p1 = times2(C, (d[1], -d[0])), times2(C, d)
         soft = line.kb[0, 2]
     for c in range(n):
-        dn, ln, iln = (0.0, 0.0), 0.0, 0.0
+        dn, iln = (0.0, 0.0), 0.0
         if c + 1 < n:
-            dn, ln, iln = chord2(part2(plane, e, c + 1))
+            dn, _, iln = chord2(part2(plane, e, c + 1))
         Mn, softn = 0.0, 0.0
         # dM of the element after cell c by the tilt and spin of cells c and c+1
         zc, pc, zn, pn = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
@@ -196,10 +197,9 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, rho, was, now, A):
                 A[o + 2], A[o + 3] = rp2, rz2
         else:
             A[o] = -1.0
-        # --- loads of node c
         z0, p0, z1, p1 = zc, pc, zn, pn
         il0 = il
-        d, l, il, M, soft = dn, ln, iln, Mn, softn
+        d, il, M, soft = dn, iln, Mn, softn
     A[(2 * n + 1) * BAND + REACH] = -1.0
 
     for i in range(n + 1):

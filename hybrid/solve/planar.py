@@ -212,9 +212,7 @@ def loads2(line, sea, i, r, u, e, v, vi, vdi, dl, ll, ill, dr, lr, ilr, left, ri
             w, b = (w[0] - U[0], w[1] - U[1]), (b[0] - af[0], b[1] - af[1])
             eta += sea.flow[i, 6]
         if left:
-            f, Df, GL = half_cell_water2(
-                line, i - 1, -1.0, up, z, eta, w, U1, vi, b, af, dl, ll, ill, cv, ca, report
-            )
+            f, Df, GL = half_cell_water2(line, i - 1, -1.0, up, z, eta, w, U1, vi, b, af, dl, ll, ill, cv, ca, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
         if right:
             f, Df, GR = half_cell_water2(line, i, 1.0, up, z, eta, w, U1, vi, b, af, dr, lr, ilr, cv, ca, report)
@@ -240,7 +238,7 @@ def end_chord(plane, frame, k):
 
 @inner
 def less2(l, t, X, p):
-    """(l, t) . (dr, dT rows of the block of X at p): what it takes from dT, dr, the next dr, and the right-hand side."""
+    """(l, t) . (dr, dT rows of the block of X at p): what it takes from dT, dr, the next dr, the right-hand side."""
     a, b, c = p + COLUMNS, p + 2 * COLUMNS, p
     return (
         l[0] * X[a] + l[1] * X[b] + t * X[c],
@@ -362,7 +360,7 @@ def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
 
 @kernel
 def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows):
-    """Assemble and eliminate all block rows of a cable in the plane `line.plane`; arguments and report as of solve.march.
+    """Assemble and eliminate all block rows of a cable in the plane `line.plane`; arguments, report as of solve.march.
 
     Returns -1, or the node whose block was singular.  `rows` with N+1 entries receives every block row before
     elimination, three rows of WIDE (for tests); with none it is not touched.
@@ -515,7 +513,7 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
 
 @inner
 def keep_rows(rows, i, row, hck, gap, K, L, back, D, ahead, U, V, b):
-    """Write the block row of node i: columns dr_{i-2}, dr_{i-1}, dT_{i-1}, dr_i, dT_i, dr_{i+1}, dr_{i+2}, right side."""
+    """The block row of node i: columns dr_{i-2}, dr_{i-1}, dT_{i-1}, dr_i, dT_i, dr_{i+1}, dr_{i+2}, right side."""
     for j in range(3 * WIDE):
         rows[i, j] = 0.0
     rows[i, 2], rows[i, 3], rows[i, 4], rows[i, 5], rows[i, 6] = -row[0], -row[1], -hck, row[0], row[1]

@@ -33,7 +33,7 @@ class Push:
         return out
 
     def pair(self, old: State, new: State) -> tuple[Floats, Floats]:
-        """Arrays before and after a step from `old` to `new`; a step that starts from where the last led has taken it."""
+        """Arrays before and after a step from `old` to `new`; one that starts where the last one led has taken it."""
         if old is self._led:
             self._pair = self._pair[::-1]
         self._led = new

@@ -65,9 +65,7 @@ class Equilibrium:
         return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
 
 
-def positive_definite(
-    rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None
-) -> bool:
+def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None) -> bool:
     """True when the stiffness in `rows` (N+1, 5 x 24) of the march, made symmetric, is positive definite.
 
     Tensions are eliminated through the stiffness `axial` (N, 3, 3), d d^T/(h ck), of each

@@ -148,7 +148,9 @@ class Stepper:
             state.vd[:] -= np.outer(state.vd @ self.line.plane[2], self.line.plane[2])
         state.a[:] = state.vd
         state.T[:] += self.x[1:, 0]
-        turning = (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)  # a spin without inertia has no acceleration
+        turning = (
+            (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)
+        )  # a spin without inertia has no acceleration
         state.wd[turning] = HEAVY * self.x[:-1, 4][turning]
         state.wa[:] = state.wd
         self.u[:] = 0.0

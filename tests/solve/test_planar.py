@@ -12,7 +12,7 @@ from test_jacobian import BITS, CA, CV, ZONES, random_case
 
 from hybrid.model.state import State
 from hybrid.physics import loads
-from hybrid.physics.loads import PLANAR, ROTARY, STIFFNESS_DAMPING
+from hybrid.physics.loads import PLANAR
 from hybrid.solve.aside import BAND, step_aside
 from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
@@ -49,7 +49,18 @@ def flat_case(seed, element, bits, held=(0, 0), anisotropic=False):
     angle = 0.5 * np.pi * g.integers(0, 4) if anisotropic else g.uniform(0, 6)
     a1 = np.cos(angle) * n + np.sin(angle) * m
     r = np.vstack([np.zeros(3), np.cumsum(e, axis=0)])
-    st = State(r, put(st.v), put(st.a), put(st.vd), e, st.T, a1, *(0 * x for x in (st.w, st.wa, st.wd)), put(st.slip), 0 * st.bed)
+    st = State(
+        r,
+        put(st.v),
+        put(st.a),
+        put(st.vd),
+        e,
+        st.T,
+        a1,
+        *(0 * x for x in (st.w, st.wa, st.wd)),
+        put(st.slip),
+        0 * st.bed,
+    )
     kb = line.kb.copy()
     k0 = 0.0 * line.k0
     if anisotropic:  # bent about the normal
@@ -155,9 +166,7 @@ def test_a_singular_block_is_named():
 @pytest.mark.parametrize("seed", range(4))
 def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     """One step of the push equals the linear answer of the march in space to it, frames and spins included."""
-    bits = sum(
-        getattr(loads, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES")
-    )
+    bits = sum(getattr(loads, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
     line, sea, ends, st = flat_case(seed, ZONES[zones], bits, (1, 0), anisotropic=seed > 1)
     st.vd[0] = st.v[0] = 0.0
     n, dt, rho = line.plane[2], 0.2, 0.5
@@ -195,4 +204,5 @@ def _assembled(line, sea, ends, st, cv, ca):
 
 
 def test_band_of_the_push_fits_its_work_array():
-    assert (2 * (N + 1) + 4) * BAND <= workspace(N)[1].size and ROTARY and STIFFNESS_DAMPING
+    assert workspace(N)[1].size >= (2 * (N + 1) + 4) * BAND
+    assert workspace(1)[1].size >= (2 * 2 + 4) * BAND
