@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
+from hybrid.flat import Flat
 from hybrid.model.build import Model
 from hybrid.model.effort import Effort
 from hybrid.model.plan import step_ends
@@ -71,6 +72,8 @@ class Motion:
         else:
             self.state = equilibrium.state.copy()
             self.watch.equilibrium(equilibrium)
+        self.flat = Flat(scene, model, self.state, lambda node, kind, text: self.watch.note(self.t, node, kind, text))
+        self._on(self.flat.model)
         self._ignite()
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
@@ -80,6 +83,15 @@ class Motion:
         if scene.time.rho_inf == 1.0 and not model.line.ck.all():
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             recorder.event(0.0, 0.0, model.length, "undamped", text)
+
+    def _on(self, model: Model) -> None:
+        """Go on with another line on the same nodes: in a plane, or in space."""
+        self.model = model
+        if self.zoning is not None:
+            self.zoning.model = model
+        self.watch.follow(model)
+        self.stepper = Stepper(model.line, model.length, model.tension_scale, self.stepper.floor)
+        self.flat.carry(self.stepper)
 
     def advance(self, until: float) -> None:
         """To the time `until`: in one step if all is well, else in halves of halves; with a controller, towards it."""
@@ -200,6 +212,7 @@ class Motion:
         assert self.scene.time is not None
         self.watch.step(end, dt, self.scene.time.rho_inf, self.spare, self.state)
         self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
+        leaves = self.flat.left(taken, self.stepper, lambda node, kind, text: self.watch.note(end, node, kind, text))
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)
         if self.zoning is not None:
@@ -207,6 +220,11 @@ class Motion:
             self.work[-1] += booked
             if change is not None:
                 self._switch(change)
+        if leaves:
+            self._on(self.flat.rise(self.model, self.state))
+            self.spare = self.state.copy()
+            self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
+            self.power = self._powers()
 
     def _rescued(self, taken: Taken, end: float, rescues: int) -> bool:
         """Whether a step was taken back and more of the line made rod: it failed, or a catenary went too far in it."""
@@ -257,6 +275,7 @@ class Motion:
         self.spare = self.state.copy()
         floor = self.stepper.floor
         self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)
+        self.flat.carry(self.stepper)
         self.watch.follow(self.model)
         self._stale = True
         self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)

@@ -14,7 +14,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.model.build import Model
 from hybrid.model.state import Ends, Floats, State
-from hybrid.physics.loads import FRICTION, SEABED
+from hybrid.physics.loads import FRICTION, PLANAR, SEABED
 from hybrid.results.notebook import Notebook
 from hybrid.results.record import Recorder
 from hybrid.solve.statics import Equilibrium, is_stable
@@ -101,6 +101,11 @@ class Watch:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
             self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
+        model = self._model
+        line, sea, ends = model.line, model.sea.values, model.ends.values
+        if line.bits & PLANAR and not is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
+            text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
+            self.note(0.0, int(np.argmin(found.state.T)), "out of plane", text)
         if not found.judged:
             why = (
                 "round-off of the bending of so short cells hides it"

@@ -16,8 +16,9 @@ from hybrid.model.build import Model
 from hybrid.model.coarse import picked
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
+from hybrid.model.plane import planar, untwist
 from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import FRICTION, SEABED
+from hybrid.physics.loads import FRICTION, PLANAR, SEABED
 from hybrid.physics.seabed import stored
 from hybrid.solve.observe import observe
 from hybrid.solve.statics import Equilibrium, solve_statics
@@ -89,6 +90,8 @@ def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     more = model.line.bits & (SEABED | FRICTION)
     line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
+    if model.line.bits & PLANAR:
+        line = planar(line, model.line.plane)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
@@ -256,6 +259,8 @@ class Zoning:
         changed = on_layout(model, new)
         target = changed.line
         carried = self._carried(old, new, line, target, ends, state)
+        if target.bits & PLANAR:
+            untwist(target, ends, model.cable.held_tangent, carried.state)
         fresh = new.rod & ~old.rod
         manager.take(new, change, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()

@@ -125,7 +125,7 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
             new,
             time.duration / steps,
             time.rho_inf,
-            (k > 1) * time.duration / steps,
+            time.duration / steps,
         )
         assert taken.outcome == Outcome.OK, f"{taken} at t = {t}"
         old, new = new, old

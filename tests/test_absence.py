@@ -21,6 +21,7 @@ from hybrid.physics.loads import (
     FORCES,
     FRICTION,
     MASS_DAMPING,
+    PLANAR,
     ROTARY,
     SEABED,
     STIFFNESS_DAMPING,
@@ -194,9 +195,9 @@ def test_a_joint_is_a_node_without_an_element() -> None:
 
 
 def test_a_catenary_has_fewer_unknowns() -> None:
-    assert hybrid.plan(scene(BENDS)).unknowns == 3 * 9 + 8
-    assert hybrid.plan(scene(BENDS, "rod")).unknowns == 3 * 9 + 8 + 8
-    assert hybrid.plan(scene(BENDS, HYBRID)).unknowns == 3 * 9 + 8 + 4
+    assert hybrid.plan(scene(BENDS, dimension=3)).unknowns == 3 * 9 + 8
+    assert hybrid.plan(scene(BENDS, "rod", dimension=3)).unknowns == 3 * 9 + 8 + 8
+    assert hybrid.plan(scene(BENDS, HYBRID, dimension=3)).unknowns == 3 * 9 + 8 + 4
 
 
 ROD_ONLY = {
@@ -252,3 +253,46 @@ def test_words_need_no_compiler_and_no_plots(command: str) -> None:
     code = "import sys\nfrom hybrid.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n"
     code += "    assert not leave.code\nassert not {'numba', 'matplotlib', 'h5py', 'scipy'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code, command], check=True, capture_output=True)
+
+
+TORSION = {"torsional_stiffness": 1.0e-2}
+PLANE = "computed in a plane (3 unknowns a node)"
+
+
+@each_scene
+def test_the_third_dimension_is_there_where_something_leaves_the_plane(asked: hybrid.Scene, bits: int) -> None:
+    """All scenes above lie in a plane; with a guess along x and an end load along y none does."""
+    said = {entry.what: entry for entry in hybrid.plan(asked).ledger}
+    assert said[PLANE].on and not said["torsion"].on
+    assert hybrid.plan(asked).unknowns == 3 * build(asked).cells + 2
+    data = asked.model_dump(exclude_none=True)
+    data["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, -1]}
+    data["ends"]["end"] = {"kind": "free", "force": [0.0, 0.1, 0.0]}
+    plan = hybrid.plan(hybrid.validate_scene(data))
+    said = {entry.what: entry for entry in plan.ledger}
+    assert not said[PLANE].on and "ends.end.force leaves" in said[PLANE].why
+    assert said["torsion"].on == ("rod" in {zone.kind for zone in plan.zones})
+    assert plan.unknowns > 3 * build(asked).cells + 2
+
+
+def test_a_plane_has_no_spins_no_torque_and_no_push_in_space() -> None:
+    """Nothing across the plane is computed in it; nothing of a plane is there in space."""
+    flat, space = (hybrid.run(scene(BENDS | TORSION, "rod", dimension=d)) for d in (2, 3))
+    assert not flat.velocity[..., 1].any() and not flat.torque.any() and not space.torque.any()
+    assert np.isnan(build(scene(BENDS, "rod", dimension=3)).line.plane).all()
+    assert build(scene(BENDS, "rod", dimension=3)).line.bits == build(scene(BENDS, "rod")).line.bits
+    assert build(scene(BENDS, "rod", dimension=2)).line.bits == PLANAR
+
+
+def test_the_ledger_names_every_optional_part() -> None:
+    """On or off, each with who asked or what would ask for it."""
+    said = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "rod")).ledger}
+    for what in (
+        PLANE, "torsion", "zones that move", "bending that differs in two directions", "curvature without load",
+        "attachments: 0", "axial compliance", "gravity", "buoyancy", *FORCES,
+    ):  # fmt: skip
+        assert said[what].why, what
+    moving = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive")).ledger}
+    assert not moving["criteria as fields"].on
+    asked = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive", output={"criteria": True})).ledger}
+    assert asked["criteria as fields"].on

@@ -19,7 +19,7 @@ PACKAGE = Path(hybrid.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # Which rooms and files a room may import, most special place first.  `scene` alone means a file or a room.
-# Only model/{build,effort,properties,start,ledger,material,plan,reasons,sea} see the scene; solve and adapt never meet; plots read files.
+# Only model/{build,effort,properties,start,ledger,material,plan,plane,reasons,sea} see the scene; solve and adapt never meet; plots read files.
 SEES_SCENE = ("errors", "physics", "model", "scene")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),
@@ -35,6 +35,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "model/reasons": SEES_SCENE,
     "model/material": SEES_SCENE,
     "model/effort": SEES_SCENE,
+    "model/plane": SEES_SCENE,
     "model": ("errors", "physics", "model"),
     "solve/shooting": ("errors", "scene", "solve/shooting"),  # the arbiter shares nothing with production but the scene
     "solve": ("errors", "compiled", "physics", "model/state", "solve"),
@@ -57,7 +58,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/touchdown": ("model",),
     "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/touchdown"),
     "watch": ("errors", "physics", "model", "solve", "results"),
-    "motion": ("errors", "watch", "zoning", "scene", "physics", "model", "solve", "adapt", "results"),
+    "flat": ("errors", "scene", "model", "solve"),
+    "motion": ("errors", "flat", "watch", "zoning", "scene", "physics", "model", "solve", "adapt", "results"),
     "accuracy": ("errors", "model"),
     "simulate": (
         "accuracy",
@@ -93,6 +95,7 @@ ONLY = {
         "accuracy",
         "watch",
         "zoning",
+        "flat",
         "simulate",
         "arbitrate",
         "scene/motion",

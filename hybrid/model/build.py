@@ -22,6 +22,7 @@ from hybrid.model.ledger import Entry, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, thinned
+from hybrid.model.plane import in_plane, planar
 from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
@@ -56,6 +57,7 @@ class Model:
     attached: tuple[float, ...]  # m, arc lengths of floats, clumps and end bodies
     cable: Material
     layout: Layout | None = None  # of a line whose zones move
+    plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
 
     @property
     def cells(self) -> int:
@@ -69,6 +71,8 @@ class Model:
     @property
     def unknowns(self) -> int:
         """Positions, tensions and spins that Newton solves for."""
+        if self.plane is not None:
+            return 2 * (self.cells + 1) + self.cells
         return 3 * (self.cells + 1) + self.cells + int(self.line.spin.sum())
 
 
@@ -146,13 +150,17 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
         spare.e[:] = np.diff(r, axis=0)
         spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
         others.append((name, spare))
+    plane, flat = in_plane(scene, start, others, ends.values)
+    if plane is not None and scene.dimension == 2:
+        line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,
+        ledger=ledger(scene, line, zones, flat), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
+        plane=plane,
     )  # fmt: skip
 
 
@@ -191,7 +199,7 @@ def _placed(
         s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
         ratio, given = (mesh.ratio, mesh.cells) if mesh is not None else (None, None)
-        s, zones = place_nodes(plans, cuts, given or (usual if len(plans) == 1 else None), ratio)
+        s, zones = place_nodes(plans, cuts, given, ratio, usual)
     if effort.fineness < 1.0:
         s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / effort.fineness))
     return s, zones

@@ -10,8 +10,9 @@ import numpy as np
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
 from hybrid.model.line import line_on
+from hybrid.model.plane import planar
 from hybrid.model.state import Floats, Line, State, blank_state
-from hybrid.physics.loads import FRICTION, ROTARY, SEABED
+from hybrid.physics.loads import FRICTION, PLANAR, ROTARY, SEABED
 
 FEWER = 4  # cells that become one
 FEWEST = 80  # cells below which a line is coarse enough
@@ -34,6 +35,8 @@ def coarser(model: Model) -> Model | None:
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
     new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
+    if line.bits & PLANAR:
+        new = planar(new, line.plane)
     start = picked(model.start, at)
     if start is None:
         return None

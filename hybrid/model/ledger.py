@@ -109,10 +109,25 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
     yield Entry("error figure, by coarser runs", wants, why)
 
 
-def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
-    """What is on and who asked for it, what is off and what would switch it on."""
+def _parts(scene: Scene, rods: bool, flat: Entry) -> Iterator[Entry]:
+    """Parts of the model of the cable itself: dimension, torsion, sections with axes of their own, attachments."""
+    yield flat
+    why = "rod cells" if rods else "no rod zone in model"
+    yield Entry("torsion", rods and not flat.on, "nothing twists in a plane" if rods and flat.on else why)
+    sections = scene.cable.sections
+    differ = any(x.anisotropic for x in sections)
+    yield Entry("bending that differs in two directions", differ, "sections[].bending_stiffness of two numbers")
+    curled = any(x.intrinsic_curvature is not None and any(x.intrinsic_curvature) for x in sections)
+    yield Entry("curvature without load", curled, "sections[].intrinsic_curvature")
+    attached = len(scene.cable.attachments) + len(scene.ends.bodies())
+    yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
+
+
+def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
+    """What is on and who asked for it, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
+    entries += _parts(scene, "rod" in kinds, flat)
     extensible = [x.axial_stiffness is not None for x in scene.cable.sections]
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if "rod" in kinds:
@@ -138,8 +153,11 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                 entries.append(Entry(what, True, why, event="implausible"))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
-    elif scene.output.criteria:
-        entries.append(Entry("criteria as fields", False, "only zones that move have criteria", event="ignored"))
+        entries.append(Entry("criteria as fields", scene.output.criteria, "output.criteria"))
+    else:
+        entries.append(Entry("zones that move", False, "model: adaptive"))
+        if scene.output.criteria:
+            entries.append(Entry("criteria as fields", False, "only zones that move have criteria", event="ignored"))
     entries += _accuracy(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))

@@ -11,6 +11,16 @@ from hybrid.model.build import build
 from hybrid.model.effort import first_effort, wants_errors
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
+from hybrid.physics.loads import (
+    ADDED_MASS,
+    DRAG,
+    FRICTION,
+    ROTARY,
+    SEABED,
+    STIFFNESS_DAMPING,
+    SURFACE,
+    WAVES,
+)
 from hybrid.scene.schema import Scene
 
 
@@ -28,11 +38,18 @@ class Plan:
     seconds: float  # of processor time, from the measured cost per cell and iteration
 
 
-# Processor time per cell and Newton iteration (s) and per step, as tests/bench/test_bench_cost.py
-# prints them on one core; a plan promises an order of magnitude, not more.
+# Processor time per cell and Newton iteration (s), per step and per output, as tests/bench/test_bench_cost.py and
+# test_bench_parts.py print them on one core; a plan promises an order of magnitude, not more.
 COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
-COST_STEP = 25e-6
-USUAL_ITERATIONS = 2.5
+FLAT_COST = {"rod": 0.15e-6, "catenary": 0.08e-6}  # in a plane, with the push that watches it
+# What optional forces add to that, in space and in a plane; those that are not here add nothing that can be seen.
+MORE = {
+    DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
+    ROTARY: (0.025e-6, 0.005e-6), SURFACE: (0.035e-6, 0.015e-6), WAVES: (0.025e-6, 0.025e-6),
+    SEABED: (0.03e-6, 0.018e-6), FRICTION: (0.01e-6, 0.005e-6),
+}  # fmt: skip
+COST_STEP, COST_MANAGER, COST_OUTPUT = 25e-6, 15e-6, 0.3e-3
+USUAL_ITERATIONS = 2.2
 COST_ERRORS = 1.6  # times a run that a run with its coarser ones costs
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often
@@ -93,8 +110,13 @@ def plan(scene: Scene) -> Plan:
     if scene.time:
         every = output_interval(scene)
         steps, step = count_steps(scene), every / parts(every, first_effort(scene).step)
-    each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
-    seconds = steps * (USUAL_ITERATIONS * each + COST_STEP) * (COST_ERRORS if wants_errors(scene) else 1.0)
+    cost = COST if model.plane is None else FLAT_COST
+    each = sum(cost[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
+    each += model.cells * sum(x[model.plane is not None] for bit, x in MORE.items() if model.line.bits & bit)
+    per_step = COST_STEP + (COST_MANAGER if model.layout is not None else 0.0)
+    outputs = len(output_times(scene)) if scene.time else 0
+    seconds = steps * (USUAL_ITERATIONS * each + per_step) + outputs * COST_OUTPUT
+    seconds *= COST_ERRORS if wants_errors(scene) else 1.0
     return Plan(
         model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
         seconds,

@@ -12,6 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
+NO_PLANE: Floats = np.full((3, 3), np.nan)  # of a line in space
+NO_PLANE.flags.writeable = False
 
 
 class Line(NamedTuple):
@@ -50,6 +52,7 @@ class Line(NamedTuple):
     point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
     footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
     bits: int  # which optional forces are on (physics.loads)
+    plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
 
 
 class Ends(NamedTuple):

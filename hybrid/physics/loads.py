@@ -36,6 +36,8 @@ SURFACE = 128
 BODIES = 256
 SEABED = 512
 FRICTION = 1024
+# No force: all of the cable and of what acts on it lies in a plane (hybrid.physics.plane).
+PLANAR = 2048
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),

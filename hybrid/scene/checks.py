@@ -12,9 +12,11 @@ from typing import Any
 
 from hybrid.scene import sea_checks, start_checks
 from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import Ends
+from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.table import Finding, Place
-from hybrid.scene.task import AdaptiveModel, Mesh, Model, Output, RodModel, RodZone, Time, ZonesModel
+from hybrid.scene.task import AdaptiveModel, Initial, Mesh, Model, Output, RodModel, RodZone, Time, ZonesModel
 
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
@@ -113,6 +115,17 @@ def _arbiter_steps(time: Time | None, solver: str) -> Iterator[Finding]:
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
 
+def _in_a_plane(
+    environment: Environment, cable: Cable, ends: Ends, initial: Initial, solver: str, dimension: int | None
+) -> Iterator[Finding]:
+    if dimension != 2:
+        return
+    if solver == "shooting":
+        yield Finding(("dimension",), "3 or nothing, because shooting computes in space", "or leave solver out")
+        return
+    yield from plane_of(environment, cable, ends, initial, TYPED)[1]
+
+
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
     if isinstance(model, AdaptiveModel):
@@ -172,6 +185,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _zones_that_move,
     _arbiter_steps,
     _sections_that_come_and_go,
+    _in_a_plane,
     _mesh_spans,
     _output_on_cable,
 )

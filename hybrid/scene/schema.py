@@ -85,6 +85,11 @@ class Scene(Table):
         default="elimination",
         description="elimination for all scenes; shooting is the slow, independent arbiter for short lines",
     )
+    dimension: Literal[2, 3] | None = Field(
+        default=None,
+        description="2: in a plane, refused if the scene does not lie in one; 3: in space; absent: a motion is "
+        "computed in a plane where the whole scene lies in one, for as long as nothing could push it out of it [-]",
+    )
 
     @property
     def length(self) -> float:

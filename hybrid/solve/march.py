@@ -37,13 +37,14 @@ from hybrid.physics.rotations import (
 from hybrid.solve.blocks import ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
 from hybrid.solve.node import Z3, Z9, get3, node_loads
 
-REPORT, STEP_REPORT = 31, 22  # numbers of `report`; those from 22 on are not the march's
+REPORT, STEP_REPORT = 33, 22  # numbers of `report`; those from 22 on are not the march's
 # report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
 #         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
 #         17 power into the added mass, 18 power of waves and of buoyancy at the surface,
 #         21 force of the seabed along its normal; of a whole step (solve.step.advance): 19 and
 #         20 work (J) of the seabed along its normal and in its plane, 28 energy that it stores, 22-25 `sharpest`,
-#         26 lowest tension of a catenary cell, 27 that cell, 29 local error of position (m), 30 its node
+#         26 lowest tension of a catenary cell, 27 that cell; 29 kinetic energy of the push out of a plane, 30 how
+#         many pivots of its equations have the wrong sign (solve.aside), 31 local error of position (m), 32 its node
 
 
 @inner

@@ -11,7 +11,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
+from hybrid.physics.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.solve.blocks import SIZE, WIDTH
 from hybrid.solve.march import march, workspace
 from hybrid.solve.step import lay, lowest, newton
@@ -69,11 +69,12 @@ class Equilibrium:
         return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
 
 
-def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray) -> bool:
+def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None) -> bool:
     """True when the stiffness in `rows` (N+1, 5 x 24) of the march, made symmetric, is positive definite.
 
     Tensions are eliminated through the stiffness `axial` (N, 3, 3), d d^T/(h ck), of each
-    cell; held nodes and cells without spin are left out.
+    cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q, normal, where the line may
+    move in that plane only.
     """
     n = rows.shape[0]
     J = -rows.reshape(n, SIZE, WIDTH)
@@ -86,9 +87,13 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray)
         K[a : n - 1 + b, 2, :3, :3] += axial
     K[:-1, 3, :3, :3] -= axial
     K[1:, 1, :3, :3] -= axial
+    if plane is not None:
+        K[..., :3, :3] = plane @ K[..., :3, :3] @ plane.T
     free = np.ones((n, 4), bool)
     free[0, :3], free[-1, :3] = not ends.held[0], not ends.held[1]
     free[:-1, 3], free[-1, 3] = spin != 0, False
+    if plane is not None:
+        free[:, 2:] = False
     held = ~free.ravel()
     reach = 11
     band = np.zeros((reach + 1, 4 * n))
@@ -121,7 +126,8 @@ def is_judged(line: Line, ends: Ends, length: float) -> bool:
 
 
 def is_stable(line: Line, sea: Sea, ends: Ends, state: State, length: float, scale: float) -> bool:
-    """True when the static stiffness of a state is positive definite, or cannot be judged."""
+    """True when the static stiffness of a state in space is positive definite, or cannot be judged."""
+    line = line._replace(bits=line.bits & ~PLANAR)
     return not is_judged(line, ends, length) or _Solver(line, sea, length, scale, -np.inf).stable(ends, state)
 
 
@@ -168,7 +174,8 @@ class _Solver:
         )  # fmt: skip
         d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
         stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
-        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin)
+        plane = line.plane if line.bits & PLANAR else None
+        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin, plane)
 
     def newton(
         self, line: Line, ends: Ends, start: State, turning: bool = False, sea: Sea | None = None
@@ -344,6 +351,9 @@ def _nudged(solver: _Solver, state: State) -> State:
     speed = PUSH * solver.length / np.sqrt(float(solver.line.mass.sum()) * solver.length / solver.scale)
     for k in range(3):
         pushed.v[:, k] = speed * np.sin((k + 1) * np.pi * x + 0.3 * k)
+    if solver.line.bits & PLANAR:
+        pushed.v[:] -= np.outer(pushed.v @ solver.line.plane[2], solver.line.plane[2])
+        return pushed
     d = pushed.e / np.linalg.norm(pushed.e, axis=1)[:, None]
     turned = np.cos(TURN) * pushed.a1 + np.sin(TURN) * np.cross(d, pushed.a1)
     pushed.a1[:] = np.where(solver.line.spin[:, None] == 1, turned, pushed.a1)

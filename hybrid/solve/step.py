@@ -12,13 +12,17 @@ import math
 from hybrid.compiled import inner, kernel
 from hybrid.physics.cell import chord
 from hybrid.physics.element import relative_rotation
-from hybrid.physics.loads import FRICTION, ROTARY, SEABED, WAVES
+from hybrid.physics.loads import FRICTION, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.physics.plane import chord2, part2
 from hybrid.physics.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.physics.seabed import stored
 from hybrid.physics.water import stir
+from hybrid.solve.alpha import weights
+from hybrid.solve.aside import step_aside
 from hybrid.solve.blocks import substitute
 from hybrid.solve.march import get9, march
 from hybrid.solve.node import get3
+from hybrid.solve.planar import carried, march_planar, sharpest_planar, substitute_planar, update_planar
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
 
@@ -45,12 +49,6 @@ LARGEST_STEP_TURN = 1.0
 # A chord that would turn by more than this in one iteration shortens the whole correction
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
-# Least distance in time, in steps, between the moments that two algorithmic accelerations stand for: below, the weights
-# of a step that is much longer than the one before grow without bound where rho_inf is small.
-LEAST_SPAN = 1.0 / 3.0
-# A step shorter than the one before by more than this is weighted as if by this: steps that change at random by as much
-# stay stable up to rho_inf = 0.9 (tests/solve/test_time_control.py), by 2.5 at every other step they do not.
-STEEPEST = 2.0
 
 
 @kernel
@@ -149,6 +147,7 @@ def newton(
     tension scale of the scene; `turning`: see `update`.  Returns outcome,
     iterations, last predicted correction, and the cell or node where it was worst.
     """
+    planar = line.bits & PLANAR
     before = math.inf
     left = math.inf
     where = -1
@@ -160,12 +159,15 @@ def newton(
         length += line.h[i]
     noise = min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
     for it in range(1, most + 1):
-        bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
+        if planar:
+            bad = march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows)
+        else:
+            bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
             if not report[15] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
                 return NOT_FINITE, it, left, int(report[16])
             return SINGULAR, it, left, bad
-        if not substitute(X, x):
+        if not (substitute_planar(line.plane, X, x) if planar else substitute(X, x)):
             return NOT_FINITE, it, left, first_bad(x, e)
         shift, turn, where, pull, big = measure(e, T, x)
         part = 1.0
@@ -175,7 +177,10 @@ def newton(
             part = LARGEST_TURN / turn
         if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
             part *= 0.5
-        update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
+        if planar and not turning:
+            update_planar(line, e, u, v, vd, T, a1, x, cv, ca, part)
+        else:
+            update(line, e, u, v, vd, T, a1, w, wd, x, cv, ca, part, turning)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
@@ -196,6 +201,8 @@ def sharpest(line, ends, e, T, a1):
     The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
     h/lambda where the cell is longer than lambda = sqrt(EI/T), over which a cable leaves its clamp.
     """
+    if line.bits & PLANAR:
+        return sharpest_planar(line, ends, e, T, CLAMP)
     bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
     n = e.shape[0]
     for i in range(n + 1):
@@ -268,27 +275,6 @@ def lay(sea, e, slip):
 
 
 @inner
-def weights(rho, ratio):
-    """am, af, ga, be of a step that is 1/ratio as long as the one before, and the constant of its local error.
-
-    At equal steps a stands for the acceleration theta dt later, and v is delta dt^2 a' off; a step of another length
-    has weights that carry both over to its own (docs/theory.md, 2), so that tension does not feel the change.  ratio 0:
-    a and v are exact, as after a start.  The error of a step is then error dt^2 |a' - a|.
-    """
-    am = (2.0 * rho - 1.0) / (rho + 1.0)
-    af = rho / (rho + 1.0)
-    theta = am - af
-    delta = (1.0 - 3.0 * theta) / 6.0 - 0.25 * (1.0 - theta) ** 2
-    ratio = min(ratio, STEEPEST)
-    if theta < 0.0:
-        ratio = max(ratio, 1.0 + (1.0 - LEAST_SPAN) / theta)
-    span = 1.0 + theta * (1.0 - ratio)  # between the moments that a and a' stand for, in dt
-    be = (1.0 / 6.0 - delta * ratio * ratio - 0.5 * theta * ratio) / span
-    ga = (0.5 + delta * (1.0 - ratio * ratio) - theta * ratio) / span
-    return am / span, af, ga, be, abs(delta) / span
-
-
-@inner
 def unrest(old, new):
     """Largest change of the algorithmic acceleration in a step, m/s2, and its node."""
     worst, where = 0.0, 0
@@ -301,13 +287,14 @@ def unrest(old, new):
 
 
 @kernel
-def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, gaps, W, X, x, report, rows):
+def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, gaps, W, X, x, report, rows, was, now):
     """One step of generalized-alpha (docs/theory.md, 2) from `old` to `new`, all in one call.
 
     Prediction with the algorithmic acceleration kept; then Newton.  Returns as `newton`.  before: s, the length of
     the step that led to `old`, 0 if none did.
     A step whose prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused:
     it has missed the motion, and Newton may end on a branch that has nothing to do with it.
+    was, now: a push out of the plane before and after the step (solve.aside); empty where there is none.
     """
     am, af, ga, be, slip = weights(rho, before / dt)
     cv = ga / (be * dt)
@@ -332,7 +319,15 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
         )
         new.e[i, 0], new.e[i, 1], new.e[i, 2] = en
         new.T[i] = old.T[i]
-        if line.spin[i]:
+        if line.bits & PLANAR:
+            a = get3(old.a1, i)
+            if line.spin[i]:
+                d, _, _ = chord2(part2(line.plane, old.e, i))
+                dn, _, _ = chord2(part2(line.plane, new.e, i))
+                a = carried(line.plane, a, d, dn)
+            new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
+            new.w[i], new.wd[i] = 0.0, 0.0
+        elif line.spin[i]:
             dpsi = dt * old.w[i] + 0.5 * dt * dt * old.wa[i]
             d, _, _ = chord(ei)
             dn, _, _ = chord(en)
@@ -371,7 +366,7 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
             for k in range(3):
                 new.slip[i, k] = sea.slid[i, k]
     for i in range(n):
-        if line.spin[i]:
+        if line.spin[i] and not line.bits & PLANAR:
             new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
         else:
             new.wa[i] = 0.0
@@ -382,7 +377,7 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
         report[22], report[23], report[24], report[25] = sharpest(line, ends, new.e, new.T, new.a1)
         report[26], report[27] = lowest(line, new.T)
         change, place = unrest(old, new)
-        report[29], report[30] = slip * dt * dt * change, place
+        report[31], report[32] = slip * dt * dt * change, place
         if line.bits & SEABED:
             for i in range(n + 1):  # force times way: bounded by the energy of a blow, however short the step is not
                 b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
@@ -393,4 +388,8 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
                 report[20] += dot(b, ui) - along
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
             report[28] = stored(line, sea, new.r)
+        if was.shape[0] > 0:
+            report[29], report[30] = step_aside(
+                line, sea, ends, new.r, new.e, new.v, new.vd, new.T, new.a1, dt, before, rho, was, now, X
+            )
     return outcome, iterations, left, where

@@ -11,11 +11,12 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import FRICTION, SEABED, WAVES
+from hybrid.physics.loads import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.physics.seabed import contact, pressure, stored
 from hybrid.physics.water import stir
 from hybrid.solve.blocks import SIZE, WIDTH, substitute
 from hybrid.solve.march import march, workspace
+from hybrid.solve.push import NOTHING, Push
 from hybrid.solve.step import advance, lay
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
@@ -81,6 +82,7 @@ class Stepper:
         n = line.h.size
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
         self.u = np.zeros((n + 1, 3))
+        self.push: Push | None = None  # out of the plane, of a planar motion that is watched
         self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
@@ -88,14 +90,15 @@ class Stepper:
 
         before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
         """
+        was, now = self.push.pair(old, new) if self.push is not None else (NOTHING, NOTHING)
         outcome, iterations, left, where = advance(
             self.line, sea, ends, old, new, self.u, dt, before, rho, self.reach, self.scale, MOST_ITERATIONS,
-            self.gaps, self.W, self.X, self.x, self.report, self.rows,
+            self.gaps, self.W, self.X, self.x, self.report, self.rows, was, now,
         )  # fmt: skip
         self.told = told = self.report.tolist()
         if outcome == OK and not told[26] > self.floor:
             outcome, where = Outcome.SLACK, int(told[27])
-        return Taken(OUTCOMES[outcome], iterations, left, where, told[15], told[29])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[15], told[31])
 
     def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
@@ -145,9 +148,13 @@ class Stepper:
         if bad >= 0 or not substitute(self.X, self.x):
             return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[15]))
         state.vd[:] = HEAVY * self.x[:, 1:4]
+        if self.line.bits & PLANAR:  # round-off across the plane would stay there
+            state.vd[:] -= np.outer(state.vd @ self.line.plane[2], self.line.plane[2])
         state.a[:] = state.vd
         state.T[:] += self.x[1:, 0]
-        turning = (self.line.spin == 1) & (self.line.polar > 0)  # a spin without inertia has no acceleration
+        turning = (
+            (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)
+        )  # a spin without inertia has no acceleration
         state.wd[turning] = HEAVY * self.x[:-1, 4][turning]
         state.wa[:] = state.wd
         self.u[:] = 0.0

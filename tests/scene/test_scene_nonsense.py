@@ -78,7 +78,7 @@ REQUIRED = {
     "length", "mass", "kind", "amplitude", "period", "density", "duration", "rod", "catenary", "z",
     "at", "over", "stiffness",
 }  # fmt: skip
-WORDS = {"title", "kind", "slack", "guess", "solver", "follow"}
+WORDS = {"title", "kind", "slack", "guess", "solver", "follow", "dimension"}
 
 
 def _id(case: Any) -> str:

@@ -1,0 +1,264 @@
+"""Whether a scene lies in a plane: its ends, loads, motions, sea and start, looked at table by table.
+
+A witness is a vector of the scene with its key.  Some must lie in the plane, some are places in it, and some (end
+moments, axes of rotation) must be along its normal.  The plane is that of the vertical, where there is gravity, and of
+the first witness that says more; what does not fit is a finding.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any, Literal
+
+from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import SHIFTS, TURNS, Clamped, Ends, Guided, Motion, Triple
+from hybrid.scene.record import RecordRefused, read_record
+from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
+from hybrid.scene.table import Finding, Place, unit
+from hybrid.scene.task import Initial, Points, Straight
+
+# What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
+# digits that people write.  A scene that does not insist is in a plane to round-off or not at all.
+TYPED, EXACT = 1e-6, 1e-9
+# A witness that is this close (a sine) to those before it says nothing about the plane.
+SAYS_NOTHING = 1e-3
+UP: Triple = (0.0, 0.0, 1.0)
+
+Kind = Literal["along", "place", "normal"]
+
+
+@dataclass(frozen=True)
+class Witness:
+    """A vector of the scene: where it is written, and what it must be to the plane."""
+
+    at: Place
+    kind: Kind
+    vector: Triple
+
+
+@dataclass(frozen=True)
+class Plane:
+    """A plane through a point of the cable: axes p and q, normal p x q; unit vectors, inertial frame."""
+
+    p: Triple
+    q: Triple
+
+    @property
+    def normal(self) -> Triple:
+        return _cross(self.p, self.q)
+
+    def said(self) -> str:
+        """What it is, for people."""
+        if self.q == UP:
+            return f"the vertical plane at {math.degrees(math.atan2(self.p[1], self.p[0])) + 0.0:.6g} deg from x"
+        n = self.normal
+        return f"the plane with normal [{n[0]:.4g}, {n[1]:.4g}, {n[2]:.4g}]"
+
+
+def plane_of(
+    environment: Environment, cable: Cable, ends: Ends, initial: Initial, tolerance: float = EXACT
+) -> tuple[Plane, list[Finding]]:
+    """The plane that a scene is in, or would be in but for what the findings say.
+
+    tolerance: by what part of its length a vector may leave the plane.
+    """
+    witnesses = list(_witnesses(environment, ends, initial))
+    places = [w.vector for w in witnesses if w.kind == "place"]
+    origin = places[0] if places else (0.0, 0.0, 0.0)
+    vertical = environment.gravity != 0.0 or (environment.fluid is not None and environment.fluid.surface is not None)
+    plane = _choose(witnesses, origin, vertical)
+    return plane, [
+        *_leaves(witnesses, plane, origin, cable.length, tolerance),
+        *_sections(cable, ends, plane),
+        *_twisted(ends, plane),
+    ]
+
+
+def _choose(witnesses: list[Witness], origin: Triple, vertical: bool) -> Plane:
+    """The plane of the first witnesses that say which."""
+    normals = [w.vector for w in witnesses if w.kind == "normal"]
+    ways = [w.vector if w.kind == "along" else _minus(w.vector, origin) for w in witnesses if w.kind != "normal"]
+    ways = [unit(v) for v in ways if math.hypot(*v) > 0.0]
+    if vertical:
+        ways = [UP, *ways]
+    if not ways:
+        ways = [(1.0, 0.0, 0.0)]
+    first = ways[0]
+    sines = [math.hypot(*_cross(first, v)) for v in ways]
+    telling = [v for v, sine in zip(ways, sines, strict=True) if sine > SAYS_NOTHING]
+    if not telling and max(sines) > TYPED:
+        telling = [ways[sines.index(max(sines))]]
+    if telling:
+        second = telling[0]
+    elif normals:  # a straight line under an end moment bends about it
+        second = _cross(normals[0], first)
+    else:
+        second = (1.0, 0.0, 0.0) if abs(first[0]) < 0.9 else UP
+    if not math.hypot(*_cross(first, second)) > 0.0:  # a moment along the line: any plane is as wrong as another
+        second = (1.0, 0.0, 0.0) if abs(first[0]) < 0.9 else UP
+    if vertical:
+        level = unit((second[0], second[1], 0.0))
+        return Plane(level if max(level, key=abs) > 0.0 else (-level[0], -level[1], 0.0), UP)
+    along = sum(a * b for a, b in zip(first, second, strict=True))
+    return Plane(first, unit(_minus(second, (along * first[0], along * first[1], along * first[2]))))
+
+
+def _leaves(
+    witnesses: list[Witness], plane: Plane, origin: Triple, length: float, tolerance: float
+) -> Iterator[Finding]:
+    """Witnesses that do not lie in the plane, or not along its normal."""
+    n = plane.normal
+    for w in witnesses:
+        v = _minus(w.vector, origin) if w.kind == "place" else w.vector
+        size = length if w.kind == "place" else math.hypot(*v)
+        out = abs(v[0] * n[0] + v[1] * n[1] + v[2] * n[2]) if w.kind != "normal" else math.hypot(*_cross(v, n))
+        if out > tolerance * size:
+            what = "a vector in" if w.kind == "along" else "a place in" if w.kind == "place" else "a vector normal to"
+            expected = f"{what} {plane.said()}, which the rest of the scene lies in, because dimension is 2"
+            yield Finding(w.at, expected, "write `dimension: 3`, or leave dimension out", _given(w.vector))
+
+
+def _sections(cable: Cable, ends: Ends, plane: Plane) -> Iterator[Finding]:
+    """Sections whose own axes would take the cable out of the plane."""
+    for i, x in enumerate(cable.sections):
+        kappa = x.intrinsic_curvature if x.intrinsic_curvature is not None and any(x.intrinsic_curvature) else None
+        if not x.anisotropic and kappa is None:
+            continue
+        key = "bending_stiffness" if kappa is None else "intrinsic_curvature"
+        axis = _director(ends.start, plane) or _director(ends.end, plane)
+        aligned = axis is not None and min(abs(axis[0]), abs(axis[1])) < TYPED
+        if aligned and kappa is not None:
+            assert axis is not None
+            aligned = kappa[2] == 0.0 and kappa[1 if abs(axis[0]) > 0.5 else 0] == 0.0
+        if not aligned:
+            expected = (
+                "a section that bends within the plane, because dimension is 2: one of its axes along the plane's "
+                "normal, by `normal` of an end, and its own curvature about that axis alone"
+            )
+            yield Finding(("cable", "sections", i, key), expected, "write `dimension: 3`, or leave dimension out")
+
+
+def _twisted(ends: Ends, plane: Plane) -> Iterator[Finding]:
+    """Two ends that hold the cable twisted."""
+    start, end = _director(ends.start, plane), _director(ends.end, plane)
+    if start is not None and end is not None and math.dist(start, end) > TYPED:
+        expected = "the material axis as at ends.start, carried along, because dimension is 2 and there is no torsion"
+        yield Finding(("ends", "end", "normal"), expected, "leave it out, or write `dimension: 3`")
+
+
+def _director(end: Any, plane: Plane) -> tuple[float, float] | None:
+    """Components of the axis a1 of an end along the normal and along (normal x tangent); None: it gives none."""
+    if not isinstance(end, Clamped | Guided) or end.normal is None:
+        return None
+    t = unit(end.tangent)
+    along = sum(a * b for a, b in zip(end.normal, t, strict=True))
+    a = unit(_minus(end.normal, (along * t[0], along * t[1], along * t[2])))
+    n = plane.normal
+    m = _cross(n, t)
+    return sum(x * y for x, y in zip(a, n, strict=True)), sum(x * y for x, y in zip(a, m, strict=True))
+
+
+def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterator[Witness]:
+    """Everything in a scene that has a direction, what says most first."""
+    for name in ("start", "end"):
+        here: Place = ("ends", name)
+        end = getattr(ends, name)
+        for key, kind in (("position", "place"), ("near", "place"), ("tangent", "along")):
+            value = getattr(end, key, None)
+            if value is not None:
+                yield Witness((*here, key), kind, value)  # type: ignore[arg-type]
+    if isinstance(initial, Straight):
+        if initial.origin is not None:
+            yield Witness(("initial", "origin"), "place", initial.origin)
+        yield Witness(("initial", "direction"), "along", initial.direction)
+        if initial.velocity is not None and any(initial.velocity):
+            yield Witness(("initial", "velocity"), "along", initial.velocity)
+    elif isinstance(initial, Points) or initial.points is not None:
+        for i, point in enumerate(initial.points or ()):
+            yield Witness(("initial", "points", i), "place", point)
+    elif initial.direction is not None:
+        yield Witness(("initial", "direction"), "along", initial.direction)
+    for name in ("start", "end"):
+        here = ("ends", name)
+        end = getattr(ends, name)
+        for key, kind in (("force", "along"), ("thrust", "along"), ("moment", "normal")):
+            load = getattr(end, key, None)
+            value = getattr(load, "value", load)
+            if value is not None and any(value):
+                where = (*here, key, "value") if hasattr(load, "value") else (*here, key)
+                yield Witness(where, kind, value)  # type: ignore[arg-type]
+        if getattr(end, "motion", None) is not None:
+            yield from _moved(end.motion, (*here, "motion"))
+    yield from _sea(environment)
+
+
+def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
+    """Directions in which an end moves, and axes about which it turns."""
+    for name, parts in motion.harmonics().items():
+        if any(h.amplitude != 0.0 for h in parts):
+            k = (SHIFTS if name in SHIFTS else TURNS).index(name)
+            axis: Triple = (float(k == 0), float(k == 1), float(k == 2))
+            yield Witness((*here, name), "along" if name in SHIFTS else "normal", axis)
+    if motion.velocity is not None and any(motion.velocity):
+        yield Witness((*here, "velocity"), "along", motion.velocity)
+    if motion.travel is not None and any(motion.travel.by):
+        yield Witness((*here, "travel", "by"), "along", motion.travel.by)
+    if motion.follow is not None:
+        yield Witness((*here, "follow"), "along", UP)
+    if motion.file is not None:
+        try:
+            record = read_record(motion.file)
+        except RecordRefused:
+            return  # whoever follows it says why
+        for rows, kind in ((record.shift, "along"), (record.turn, "normal")):
+            if rows is not None:
+                for row in (rows - rows[0]).tolist():
+                    if any(row):
+                        yield Witness((*here, "file"), kind, (row[0], row[1], row[2]))  # type: ignore[arg-type]
+
+
+def _sea(environment: Environment) -> Iterator[Witness]:
+    """Directions of current, waves and seabed."""
+    fluid, bed = environment.fluid, environment.seabed
+    if bed is not None:
+        rise_x, rise_y = bed.slope or (0.0, 0.0)
+        yield Witness(("environment", "seabed", "slope"), "along", (-rise_x, -rise_y, 1.0))
+    if fluid is None:
+        return
+    here: Place = ("environment", "fluid", "current")
+    current = fluid.current
+    if isinstance(current, UniformCurrent | PowerLawCurrent):
+        if any(current.velocity):
+            yield Witness((*here, "velocity"), "along", current.velocity)
+        if isinstance(current, PowerLawCurrent) and current.turn != 0.0 and any(current.velocity[:2]):
+            x, y, _ = current.velocity
+            yield Witness((*here, "turn"), "along", (-y, x, 0.0))
+    elif current is not None:
+        profile = isinstance(current, CurrentProfile)
+        table = current.table if isinstance(current, CurrentProfile) else current
+        points = [p for p in table if isinstance(p, CurrentPoint)]
+        for i, point in enumerate(points):
+            if any(point.velocity):
+                where: Place = (*here, "table", i, "velocity") if profile else (*here, i, "velocity")
+                yield Witness(where, "along", point.velocity)
+        if not points and any(table):
+            x, y, z = (float(v) for v in table if not isinstance(v, CurrentPoint))
+            yield Witness(here, "along", (x, y, z))
+    if fluid.waves is not None:
+        towards = math.radians(fluid.waves.direction)
+        level = (round(math.cos(towards), 15), round(math.sin(towards), 15), 0.0)
+        yield Witness(("environment", "fluid", "waves", "direction"), "along", level)
+
+
+def _given(v: Triple) -> str:
+    return f"[{v[0]:.8g}, {v[1]:.8g}, {v[2]:.8g}]"
+
+
+def _minus(a: Triple, b: Triple) -> Triple:
+    return (a[0] - b[0], a[1] - b[1], a[2] - b[2])
+
+
+def _cross(a: Triple, b: Triple) -> Triple:
+    return (a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0])
