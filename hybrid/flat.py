@@ -43,6 +43,9 @@ class Flat:
             self.model = replace(model, plane=None)
             return
         self.model = replace(model, line=planar(model.line, model.plane))
+        n = model.plane[2]
+        for x, origin in ((state.r, state.r[0].copy()), (state.e, np.zeros(3))):  # what Newton's tolerance has left
+            x -= np.outer((x - origin) @ n, n)
         untwist(self.model.line, model.ends.values, model.cable.held_tangent, state)
         self.push = Push(model.line, model.length, model.time_scale)
 

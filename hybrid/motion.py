@@ -73,7 +73,8 @@ class Motion:
             self.state = equilibrium.state.copy()
             self.watch.equilibrium(equilibrium)
         self.flat = Flat(scene, model, self.state, lambda node, kind, text: self.watch.note(self.t, node, kind, text))
-        self._on(self.flat.model)
+        if self.flat.model is not model:
+            self._on(self.flat.model)
         self._ignite()
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
