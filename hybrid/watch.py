@@ -51,6 +51,8 @@ HARDLY_MOVED = 1e-7
 # An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
 # next node is a boundary layer.
 ASKEW, LAYER = 1e-5, 0.5
+# A jump of tension within a step, as a part of the largest that anything in the scene can ask for.
+SNAP = 3.0
 # A turn of one end against the other (rad) whose torque is worth a word where no rod carries it.
 TURNED = 0.01
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
@@ -74,7 +76,7 @@ class Watch:
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = False
         self._placed: Floats | None = None  # m, of base nodes at the start
-        self._jump = model.tension_scale  # N
+        self._jump = SNAP * model.tension_scale  # N
         self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
         self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
         self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps

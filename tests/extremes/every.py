@@ -29,7 +29,7 @@ def takes_long(case: Case) -> bool:
     time = case.scene.get("time")
     steps = time["duration"] / time["step"] if time else 0
     stiff = case.family == "whips and chains" and "(1 w L" in case.name
-    return stiff or (case.model == "adaptive" and (cells >= 1000 or steps > 700))
+    return stiff or (case.model == "adaptive" and (cells >= 1000 or steps > 600))
 
 
 def parameters(cases: Sequence[Case]) -> list[Any]:

@@ -41,7 +41,7 @@ def test_a_slack_catenary_stops_the_run(tmp_path):
     assert "tension" in kept.message
     assert kept.times[-1] == pytest.approx(error.t)
     assert kept.tension[:-1].min() > 0.0
-    assert [e.kind for e in kept.events] == ["slack"]
+    assert [e.kind for e in kept.events] == ["snap", "slack"]  # it jerks, of 110 N within a step, before it goes slack
     with np.load(error.snapshot) as snapshot:
         assert float(snapshot["t"]) == error.t
         assert snapshot["r"].shape == (41, 3)
