@@ -1,0 +1,85 @@
+"""The model error of a line along its run: what leaving bending out of its catenaries shifts it by.
+
+One way only: nothing of it goes back into the line.  docs/theory.md, 15; the kernels are in solve.correct.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.model.state import Ends, Floats, Line, Sea, State
+from hybrid.physics.loads import FRICTION, WAVES
+from hybrid.solve.correct import follow
+from hybrid.solve.march import march, workspace
+from hybrid.solve.timestep import Stepper
+
+# Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
+MOST = 0.1
+# dvd'/dr' of an equilibrium, over tension scale / (mass x length): holds what would drift freely, as in solve.statics.
+ANCHOR = 1e-12
+
+
+class Corrector:
+    """Follows the error of one line, step by step; owns the work arrays and the error, not the state.
+
+    error: (4, N+1, 4) of position (m), velocity, algorithmic and true acceleration, and of the spin of the cell after
+    a node in the last column; x: (N+1, 5) the same with the tension (N) of the cell before in front; moment: (N+1, 3)
+    N m inertial, of the rod less that of the line, pull_of: (N+1, 3) N m, what of it is left out.
+    """
+
+    def __init__(self, line: Line, ki: Floats, floor: Floats, tangent: np.ndarray, length: float, scale: float) -> None:
+        """ki: (N+1,) N m, bending stiffness of full elements, EI/hn; floor: (N,) N, least tension that counts;
+
+        tangent: (2,) 1 where an end prescribes one; length: m; scale: tension scale, N.
+        """
+        n = line.h.size
+        self.line, self.ki, self.floor, self.tangent = line, ki, floor, np.asarray(tangent, np.int8)
+        self.length, self.scale = length, scale
+        self.error, self._spare = np.zeros((2, 4, n + 1, 4))
+        self.slid = np.zeros((n + 1, 3))
+        self.x, self._b = np.zeros((2, n + 1, 5))
+        self.moment, self.left = np.zeros((2, n + 1, 3))
+        self._work = np.zeros((4, n + 1, 4))
+        self.clipped, self.where, self.finite = 0, -1, True
+
+    @property
+    def position(self) -> Floats:
+        """Error (N+1, 3) m of the nodes: where the rod is, less where the line is."""
+        return self.error[0, :, :3]
+
+    @property
+    def tension(self) -> Floats:
+        """Error (N,) N of the cells' tension."""
+        return self.x[1:, 0]
+
+    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0) -> None:
+        """The error of an equilibrium."""
+        line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
+        W, X, _, report, rows, gaps = workspace(line.h.size, keep=True)
+        ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
+        still = np.zeros_like(state.r)
+        march(
+            line, sea, ends, state.e, still, state.r, still, still, state.T, state.a1, np.zeros_like(state.w),
+            np.zeros_like(state.w), 0.0, ca, gaps, W, X, report, rows,
+        )  # fmt: skip
+        self.slid[:] = 0.0
+        self._follow(line, sea, ends, state, still, torque, 0.0, 0.0, X, W)
+
+    def step(
+        self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, rho: float, torque: float = 0.0
+    ) -> None:
+        """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
+        self._follow(self.line, sea, ends, state, stepper.u, torque, dt, rho, stepper.X, stepper.W)
+
+    def _follow(
+        self, line: Line, sea: Sea, ends: Ends, state: State, u: Floats, torque: float, dt: float, rho: float,
+        X: Floats, W: Floats,
+    ) -> None:  # fmt: skip
+        self.finite, self.clipped, self.where = follow(
+            line, sea, ends, self.ki, self.tangent, self.floor, state, u, self.error, self.slid, self._spare, torque,
+            dt, rho, MOST * self.length, X, W, self._work, self._b, self.x, self.moment, self.left,
+        )  # fmt: skip
+        if self.finite:
+            self.error, self._spare = self._spare, self.error
+        else:
+            self.error[:], self.x[:], self.slid[:] = 0.0, 0.0, 0.0
