@@ -95,6 +95,7 @@ EVENTS_BY_WEIGHT = (
     "loses energy",
     "ignored",
     "undamped",
+    "error beyond estimate",
     "not judged",
     "clamp left out",
     "zones held",

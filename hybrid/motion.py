@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.adapt.manager import Change
+from hybrid.correction import Correction
 from hybrid.errors import ComputationError, Outcome
 from hybrid.model.build import Model
 from hybrid.physics.loads import SEABED
@@ -41,11 +42,13 @@ class Motion:
         target: Path | io.BytesIO,
         equilibrium: Equilibrium | None,
         zoning: Zoning | None = None,
+        correction: Correction | None = None,
     ) -> None:
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
-        self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
+        self.correction, self._beyond = correction, -np.inf
+        self.stepper = self._new_stepper(floor)
         self.watch = Watch(recorder, model)
         self.zoning, self._stale = zoning, False
         self.t, self.steps, self.iterations = 0.0, 0, 0
@@ -64,6 +67,8 @@ class Motion:
         self._ignite()
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
+        if self.correction is not None:
+            self.correction.begin(model.ends.at(0.0), self.state, equilibrium is not None)
         self.spare = self.state.copy()
         self.power = self._powers()
         self._look(self.watch.still(model.ends.values, self.state))
@@ -116,7 +121,8 @@ class Motion:
             self._stale = False
         ends = self.model.ends.at(self.t)
         ratios = self.zoning.manager.told if self.zoning is not None else None
-        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios)
+        shift = self.correction.shift(self.state) if self.correction is not None else None
+        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios, shift)
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
         self.watch.mesh(self.t, self.state)
@@ -137,6 +143,8 @@ class Motion:
     def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:
         dt = end - self.t
         self.state, self.spare = self.spare, self.state
+        if self.correction is not None:
+            self._correct(end, dt)
         self.t, self.steps, self.iterations = end, self.steps + 1, taken.iterations
         power = self._powers()
         half = 0.5 * dt
@@ -163,6 +171,20 @@ class Motion:
             self.work[-1] += booked
             if change is not None:
                 self._switch(change)
+
+    def _correct(self, end: float, dt: float) -> None:
+        """Follow what leaving bending out makes of the step just taken; where it is beyond estimate, say so."""
+        assert self.correction is not None and self.scene.time is not None
+        self.correction.step(self.stepper, self.model.ends.values, self.state, dt, self.scene.time.rho_inf)
+        beyond = self.correction.beyond
+        if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
+            s = float(self.model.line.s[max(self.correction.corrector.where, 0)])
+            self.recorder.event(end, s, s, "error beyond estimate", beyond)
+            self._beyond = end + self.model.time_scale
+
+    def _new_stepper(self, floor: float) -> Stepper:
+        model = self.model
+        return Stepper(model.line, model.length, model.tension_scale, floor, keep=self.correction is not None)
 
     def _rescued(self, taken: Taken, end: float, rescues: int) -> bool:
         """Whether a step was taken back and more of the line made rod: it failed, or a catenary went too far in it."""
@@ -212,7 +234,9 @@ class Motion:
             )  # fmt: skip
         self.spare = self.state.copy()
         floor = self.stepper.floor
-        self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)
+        self.stepper = self._new_stepper(floor)
+        if self.correction is not None:
+            self.correction.switch(self.model)
         self.watch.follow(self.model)
         self._stale = True
         self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)

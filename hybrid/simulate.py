@@ -19,6 +19,7 @@ import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.adapt.table import CRITERIA
+from hybrid.correction import Correction
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones
 from hybrid.model.coarse import coarser, refined
@@ -116,13 +117,16 @@ def run(
         model.attached,
         kinds,
         [(x.name, x.ratio) for x in CRITERIA] if scene.output.criteria and zoning else (),
+        model.follows_error and bool(scene.output.errors),
+        model.corrected,
     )
+    correction = Correction(model, zoning.torque if zoning else None) if model.follows_error else None
     target = _target(output)
     recorder = _recorder(scene, model, observer, target, overwrite, len(outputs), equilibrium)
     if zoning and zoning.manager.held:
         recorder.event(0.0, 0.0, model.length, "zones held", HELD)
     with recorder, _interrupts() as interrupted, _Told(progress, scene.time.duration, model.zones) as told:
-        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning)
+        motion = Motion(scene, model, observer, recorder, target, equilibrium, zoning, correction)
         motion.save()
         for stop in stops:
             for until in step_ends(motion.t, stop, scene.time.step):
@@ -193,6 +197,8 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         output_points(scene.output.points, model.length),
         False,
         model.attached,
+        errors=model.follows_error and bool(scene.output.errors),
+        corrected=model.corrected,
     )
     target = _target(output)
     with _recorder(scene, model, observer, target, overwrite, 0, found) as recorder:
@@ -204,7 +210,14 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         stop = watch.still(ends, found.state)
         if stop is not None:
             raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
-        recorder.save(0.0, observer.values(ends, found.state, found.report, np.zeros(len(POWERS))), observer.zone_rows)
+        shift = None
+        if model.follows_error:
+            model.sea.at(np.inf)
+            correction = Correction(model)
+            correction.begin(ends, found.state, at_rest=True)
+            shift = correction.shift(found.state)
+        values = observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
+        recorder.save(0.0, values, observer.zone_rows)
         recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
     return open_result(target)
 

@@ -197,6 +197,10 @@ class Zoning:
         self.strain = NO_STRAIN  # of the last step, while bending is being blended
         self.joints = Joints(model.line) if loaded else None
 
+    def torque(self, ends: Ends, state: State) -> float:
+        """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
+        return self.manager.torque
+
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""
         self.manager.begin()

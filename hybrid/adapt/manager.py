@@ -114,7 +114,7 @@ class DomainManager:
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
         self.moments, self.loaded = np.zeros((2, 3)), False  # N m, given at the ends
         self.twisted = all(cable.held_twist) and all(cable.held_tangent)
-        self.total_twist = 0.0
+        self.total_twist = self.torque = 0.0  # rad; N m that no rod carries
         self.follow(layout)
 
     def follow(self, layout: Layout) -> None:
@@ -170,7 +170,7 @@ class DomainManager:
             self.age = self.recent_age = 0.0
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
         ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
-        torque = self._torque(line, ends, state) if self.twisted else 0.0
+        self.torque = torque = self._torque(line, ends, state) if self.twisted else 0.0
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
             self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, torque, self.base_of_cell, self.free,

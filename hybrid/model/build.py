@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.ends import EndConditions
 from hybrid.model.layout import Layout
-from hybrid.model.ledger import Entry, ledger
+from hybrid.model.ledger import Entry, followed, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone, ZonePlan, given_nodes, place_nodes
@@ -24,7 +24,17 @@ from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import corners, ends_and_frames, hung, initial_nodes, spare_shapes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import FRICTION, SEABED
-from hybrid.scene.schema import AdaptiveModel, Points, RodZone, Scene, Straight, ZonesModel
+from hybrid.scene.schema import (
+    AdaptiveModel,
+    CorrectedModel,
+    CorrectedZone,
+    Points,
+    RodModel,
+    RodZone,
+    Scene,
+    Straight,
+    ZonesModel,
+)
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
@@ -53,6 +63,8 @@ class Model:
     attached: tuple[float, ...]  # m, arc lengths of floats, clumps and end bodies
     cable: Material
     layout: Layout | None = None  # of a line whose zones move
+    follows_error: bool = False  # whether the error of leaving bending out is followed
+    corrected: bool = False  # whether results are corrected for it
 
     @property
     def cells(self) -> int:
@@ -76,10 +88,18 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
         return tuple(
             ZonePlan("rod", z.rod, z.cells, z.ratio)
             if isinstance(z, RodZone)
-            else ZonePlan("catenary", z.catenary, z.cells, z.ratio)
+            else ZonePlan("catenary", z.corrected if isinstance(z, CorrectedZone) else z.catenary, z.cells, z.ratio)
             for z in model.zones
         )
-    return (ZonePlan("rod" if isinstance(model, AdaptiveModel) else model.kind, scene.length),)
+    return (ZonePlan("rod" if isinstance(model, AdaptiveModel | RodModel) else "catenary", scene.length),)
+
+
+def corrects(scene: Scene) -> bool:
+    """Whether the results of a scene are corrected for the bending that its catenaries leave out."""
+    model = scene.model
+    if isinstance(model, ZonesModel):
+        return any(isinstance(z, CorrectedZone) for z in model.zones)
+    return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
 def build(scene: Scene) -> Model:
@@ -148,11 +168,12 @@ def build(scene: Scene) -> Model:
             others.append((name, spare))
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        ledger=ledger(scene, line, zones), length=float(s[-1]), tension_scale=scale,
+        ledger=ledger(scene, line, zones, corrects(scene)), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
-        attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
+        attached=tuple(cable.at.tolist()), cable=cable, layout=layout, corrected=corrects(scene),
+        follows_error=followed(scene, zones, corrects(scene)).on,
     )  # fmt: skip
 
 

@@ -87,7 +87,25 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
     yield Entry(f"joints that carry {carry}", True, "model.joint; where rod and catenary meet")
 
 
-def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]:
+def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
+    """Whether the error of leaving bending out is followed along the run; corrects: whether results are corrected."""
+    what, sections = "model error (bending left out), along the run", scene.cable.sections
+    why = "output.errors" if scene.output.errors else "results are corrected for it (model)"
+    if not (scene.output.errors or corrects):
+        return Entry(what, False, "output.errors: true")
+    if not isinstance(scene.model, AdaptiveModel):
+        if all(z.kind == "rod" for z in zones):
+            return Entry(what, False, "rod everywhere: nothing is left out")
+        if not any(x.weakest_bending for x in sections):
+            return Entry(what, False, "no bending stiffness: there is nothing to leave out")
+        if any(x.anisotropic for x in sections):
+            return Entry(what, False, "bends differently in two directions: a catenary does not know which way it lies")
+    if any(x.intrinsic_curvature and any(x.intrinsic_curvature[:2]) for x in sections):
+        return Entry(what, False, "curved without stress: a catenary does not know which way it lies")
+    return Entry(what, True, why)
+
+
+def ledger(scene: Scene, line: Line, zones: Sequence[Zone], corrects: bool = False) -> tuple[Entry, ...]:
     """What is on and who asked for it, what is off and what would switch it on."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
@@ -114,6 +132,10 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone]) -> tuple[Entry, ...]
                 what = f"sections[{i}] has a mean density of {density:.3g} kg/m^3"
                 why = f"mass {section.mass:g} kg/m, diameter {section.diameter:g} m: are both in these units?"
                 entries.append(Entry(what, True, why, event="implausible"))
+    entries.append(followed(scene, zones, corrects))
+    if corrects:
+        text = "position, tension, curvature and moment with what bending adds to them"
+        entries.append(Entry("corrected catenary zones", True, f"model; {text}"))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
     elif scene.output.criteria:

@@ -67,7 +67,7 @@ def left_out(line, ends, ki, tangent, floor, e, T, torque, work, dM, M):
     for i in range(n + 1):
         d, a = Z3, 0.0
         if i < n:
-            d, l, il = chord(get3(e, i))
+            d, _, il = chord(get3(e, i))
             a = il / max(T[i], floor[i])
         beta = 0.0
         if line.element[i] and ki[i] > 0.0:
@@ -345,7 +345,9 @@ def follow(
                 y[i, k] = q + dt * (1.0 - ga) * a - cv * rp
                 z[i, k] = (am * a - af * ad) / (1.0 - af) - ca * rp
                 ahead[i, k] = p + dt * q + 0.5 * dt * dt * a
-    right_side(line, sea, ends, state.r, u, state.e, state.v, state.vd, M, y, z, ahead, old[0], slid, work[3], moving, b)
+    right_side(
+        line, sea, ends, state.r, u, state.e, state.v, state.vd, M, y, z, ahead, old[0], slid, work[3], moving, b
+    )
     if not again(X, W, b, x):
         return False, 0, -1
     clipped, where, far = 0, -1, 0.0

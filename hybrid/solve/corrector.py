@@ -5,6 +5,8 @@ One way only: nothing of it goes back into the line.  docs/theory.md, 15; the ke
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from hybrid.model.state import Ends, Floats, Line, Sea, State
@@ -19,12 +21,28 @@ MOST = 0.1
 ANCHOR = 1e-12
 
 
+class Shift(NamedTuple):
+    """What the error makes of an output: true value less the one computed, to first order.
+
+    position, velocity: (N+1, 3) m, m/s; tension: (N,) N; moment: (N+1, 3) N m, inertial; stiffness: (N+1,) N m2, by
+    which all of a moment makes a curvature; resultants: (2, 3) N, of the forces on the first and the last node, zero
+    where they are given.
+    """
+
+    position: Floats
+    velocity: Floats
+    tension: Floats
+    moment: Floats
+    stiffness: Floats
+    resultants: Floats
+
+
 class Corrector:
     """Follows the error of one line, step by step; owns the work arrays and the error, not the state.
 
     error: (4, N+1, 4) of position (m), velocity, algorithmic and true acceleration, and of the spin of the cell after
     a node in the last column; x: (N+1, 5) the same with the tension (N) of the cell before in front; moment: (N+1, 3)
-    N m inertial, of the rod less that of the line, pull_of: (N+1, 3) N m, what of it is left out.
+    N m inertial, of the rod less that of the line; left: (N+1, 3) N m, what of it nodes lack.
     """
 
     def __init__(self, line: Line, ki: Floats, floor: Floats, tangent: np.ndarray, length: float, scale: float) -> None:
@@ -51,6 +69,43 @@ class Corrector:
     def tension(self) -> Floats:
         """Error (N,) N of the cells' tension."""
         return self.x[1:, 0]
+
+    @property
+    def most(self) -> float:
+        """Error, m, beyond which it is clipped."""
+        return MOST * self.length
+
+    def taking_over(self, old: Corrector) -> Corrector:
+        """The error of another line of the same length, between its nodes; spins that it does not have are gone."""
+        s, then, now = self.line.s, old.line.s, self.line
+        for mine, its in ((self.error, old.error), (self.slid[None], old.slid[None])):
+            for k in range(its.shape[0]):
+                for j in range(its.shape[2]):
+                    mine[k, :, j] = np.interp(s, then, its[k, :, j])
+        self.error[:, :-1, 3] *= now.spin
+        self.error[:, -1, 3] = 0.0
+        for mine, its in ((self.moment, old.moment), (self.left, old.left)):
+            for j in range(3):
+                mine[:, j] = np.interp(s, then, its[:, j])
+        self.x[:, 1:] = self.error[0]
+        self.x[1:, 0] = np.interp(0.5 * (s[1:] + s[:-1]), 0.5 * (then[1:] + then[:-1]), old.x[1:, 0])
+        return self
+
+    def shift(self, ends: Ends, state: State) -> Shift:
+        """What the error makes of an output of `state`."""
+        line, n = self.line, self.line.h.size
+        l = np.linalg.norm(state.e, axis=1)
+        d = state.e / l[:, None]
+        forces = np.zeros((2, 3))
+        for k, cell, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):
+            if ends.held[k]:
+                de = self.position[cell + 1] - self.position[cell]
+                across = de - (de @ d[cell]) * d[cell]
+                Q = np.cross(d[cell], self.left[cell + 1] - self.left[cell])
+                forces[k] = sign * (self.tension[cell] * d[cell] + (state.T[cell] * across + Q) / l[cell])
+        velocity = self.error[1, :, :3]
+        EI = self.ki * line.hn
+        return Shift(self.position.copy(), velocity.copy(), self.tension.copy(), self.moment.copy(), EI, forces)
 
     def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0) -> None:
         """The error of an equilibrium."""

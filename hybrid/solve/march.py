@@ -314,7 +314,7 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
 
 
 def workspace(n_cells: int, keep: bool = False):
-    """Arrays the march needs: W, X (with room to keep the factors, or not), x, report, and an empty `rows` and `gaps`."""
+    """Arrays the march needs: W, X (with room for the factors, if kept), x, report, and an empty `rows` and `gaps`."""
     return (
         np.zeros(SIZE * WIDTH),
         np.zeros((n_cells + 1) * (ROW + KEPT if keep else ROW)),
