@@ -168,7 +168,9 @@ class View:
         ends = []
         for k, first, second in ((0, 0, 1), (1, -1, -2)):
             t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
-            if self.line.element[first]:  # a clamp or guide knows the tangent
+            if self.line.element[first] or (
+                self.shift is not None and self.shift.clamped[k]
+            ):  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
             at_end = self.line.s[first]
@@ -215,7 +217,7 @@ class View:
         return np.einsum("ij,ij->i", self.moment, self.tangent)
 
     @cached_property
-    def strains(self) -> Floats:
+    def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2), 1/m."""
         line, out = self.line, np.zeros((len(self.grid.side_nodes), 2))
         d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
@@ -262,20 +264,20 @@ class View:
 
     @cached_property
     def curvature_twist(self) -> Floats:
-        strains = self.strains
+        strains = self._strains
         if self.shift is not None:
-            strains = np.column_stack([self.rod_curvature(self.shift), strains[:, 1]])
+            strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
         return np.asarray(self.grid.sides @ strains)
 
-    def rod_curvature(self, shift: Shift) -> Floats:
-        """Curvature (n sides,) 1/m that all of the moment makes, with what is left out; without stiffness, as it is."""
-        d, moment = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None], self._observed[0] + shift.moment
+    def _curvature_of_moment(self, shift: Shift) -> Floats:
+        """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
+        d, moment = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None], self.node_moment
         t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
         t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
         bending = np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1)
         side = self.grid.side_nodes
         EI = shift.stiffness[side]
-        return np.divide(bending[side], EI, out=self.strains[:, 0].copy(), where=EI > 0.0)
+        return np.divide(bending[side], EI, out=self._strains[:, 0].copy(), where=EI > 0.0)
 
     @cached_property
     def shear(self) -> Floats:
@@ -394,25 +396,17 @@ MODEL_ERRORS = {
 LEFT = 0.25
 
 
-def model_errors(view: View, shift: Shift) -> dict[str, object]:
-    """MODEL_ERRORS on the output grid."""
-    grid, d = view.grid, view.computed.e / np.linalg.norm(view.computed.e, axis=1)[:, None]
-    tangent = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
-    tangent /= np.maximum(np.linalg.norm(tangent, axis=1), 1e-12)[:, None]
-    moment = shift.moment - np.einsum("ij,ij->i", shift.moment, tangent)[:, None] * tangent
+def model_errors(plain: View, corrected: View) -> dict[str, object]:
+    """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not."""
     out: dict[str, object] = {
-        "position": np.linalg.norm(grid.nodes @ shift.position, axis=1),
-        "tension": np.abs(grid.cells @ shift.tension),
-        "curvature": np.abs(grid.sides @ (view.rod_curvature(shift) - view.strains[:, 0])),
-        "bending_moment": np.linalg.norm(grid.sides @ moment[grid.side_nodes], axis=1),
+        "position": np.linalg.norm(plain.grid.nodes @ (corrected.state.r - plain.state.r), axis=1),
+        "tension": np.abs(corrected.tension - plain.tension),
+        "curvature": np.abs(corrected.curvature_twist[:, 0] - plain.curvature_twist[:, 0]),
+        "bending_moment": np.abs(corrected.bending_moment() - plain.bending_moment()),
     }
     for k, name in enumerate(("pull_start", "pull_end")):
-        force = view.report[3 * k : 3 * k + 3]
-        size = float(np.linalg.norm(force))
-        held = bool(view.ends.held[k])
-        out[name] = abs(float(shift.resultants[k] @ force)) / size if held and size > 0.0 else 0.0
-        if any(abs(x - view.line.s[-k]) < 1e-9 * view.line.s[-1] for x in grid.loads):
-            out[name] = abs(float(shift.tension[-k]))
+        sizes = [float(np.linalg.norm(view.reaction(k))) for view in (plain, corrected)]
+        out[name] = abs(sizes[1] - sizes[0])
     return out
 
 
@@ -500,13 +494,13 @@ class Observer:
     ) -> dict[str, object]:
         """All fields at one moment; `work` J in the order of POWERS since the start; ratios: criteria at places, m;
         shift: what bending that is left out would change."""
-        correction = shift if self._corrected else None
-        view = View(self.line, self.sea, self.zones, ends, state, self.grid, report, correction)
+        plain = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
+        corrected = View(self.line, self.sea, self.zones, ends, state, self.grid, report, shift) if shift else plain
+        view = corrected if self._corrected else plain
         out = {name: p.value(view) for name, p in self._probes.items()}
         if self._errors:
-            assert shift is not None
             part = LEFT if self._corrected else 1.0
-            found = model_errors(view, shift)
+            found = model_errors(plain, corrected)
             out |= {f"errors/model/{name}": part * np.asarray(x) for name, x in found.items()}
         if self._criteria:
             assert ratios is not None

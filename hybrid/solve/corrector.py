@@ -26,7 +26,7 @@ class Shift(NamedTuple):
 
     position, velocity: (N+1, 3) m, m/s; tension: (N,) N; moment: (N+1, 3) N m, inertial; stiffness: (N+1,) N m2, by
     which all of a moment makes a curvature; resultants: (2, 3) N, of the forces on the first and the last node, zero
-    where they are given.
+    where they are given; clamped: (2,) 1 where an end prescribes a tangent.
     """
 
     position: Floats
@@ -35,6 +35,7 @@ class Shift(NamedTuple):
     moment: Floats
     stiffness: Floats
     resultants: Floats
+    clamped: np.ndarray
 
 
 class Corrector:
@@ -103,9 +104,10 @@ class Corrector:
                 across = de - (de @ d[cell]) * d[cell]
                 Q = np.cross(d[cell], self.left[cell + 1] - self.left[cell])
                 forces[k] = sign * (self.tension[cell] * d[cell] + (state.T[cell] * across + Q) / l[cell])
-        velocity = self.error[1, :, :3]
-        EI = self.ki * line.hn
-        return Shift(self.position.copy(), velocity.copy(), self.tension.copy(), self.moment.copy(), EI, forces)
+        return Shift(
+            self.position.copy(), self.error[1, :, :3].copy(), self.tension.copy(), self.moment.copy(),
+            self.ki * line.hn, forces, self.tangent,
+        )  # fmt: skip
 
     def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0) -> None:
         """The error of an equilibrium."""
