@@ -33,11 +33,14 @@ class Correction:
         self._torque = torque or _TurnOfEnds(model)
         self.ends = model.ends.values
 
-    def begin(self, ends: Ends, state: State, at_rest: bool) -> None:
-        """At the start of a run: the error of the equilibrium; a motion that starts from a given shape has none."""
+    def begin(self, ends: Ends, state: State, at_rest: bool, rubbed: bool = False) -> None:
+        """At the start of a run: the error of the equilibrium; a motion that starts from a given shape has none.
+
+        rubbed: whether friction took part in the equilibrium.
+        """
         self.ends = ends
         if at_rest:
-            self.corrector.rest(self.model.sea.values, ends, state, self._torque(ends, state))
+            self.corrector.rest(self.model.sea.values, ends, state, self._torque(ends, state), rubbed)
 
     def step(self, stepper: Stepper, ends: Ends, state: State, dt: float, rho: float) -> None:
         """After the step of dt that led to `state`, before anything else uses the stepper."""

@@ -68,7 +68,9 @@ class Motion:
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
         if self.correction is not None:
-            self.correction.begin(model.ends.at(0.0), self.state, equilibrium is not None)
+            self.correction.begin(
+                model.ends.at(0.0), self.state, equilibrium is not None, equilibrium is not None and equilibrium.rubbed
+            )
         self.spare = self.state.copy()
         self.power = self._powers()
         self._look(self.watch.still(model.ends.values, self.state))

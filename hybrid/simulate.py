@@ -214,7 +214,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         if model.follows_error:
             model.sea.at(np.inf)
             correction = Correction(model)
-            correction.begin(ends, found.state, at_rest=True)
+            correction.begin(ends, found.state, at_rest=True, rubbed=found.rubbed)
             shift = correction.shift(found.state)
         values = observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
         recorder.save(0.0, values, observer.zone_rows)

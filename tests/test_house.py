@@ -42,7 +42,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "adapt/criteria": ("compiled", "physics", "adapt/table"),
     "adapt/plan": ("compiled", "model/state", "adapt/table"),
     "adapt": ("errors", "physics", "model", "adapt"),
-    "zoning": ("errors", "physics", "model", "solve", "adapt"),
+    "zoning": ("errors", "correction", "physics", "model", "solve", "adapt"),
     "correction": ("model", "solve", "adapt"),
     "results/read": ("errors",),
     "results/look": ("errors", "results/read"),

@@ -16,6 +16,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
+from hybrid.model.bend import LEFT
 from hybrid.model.mesh import Zone
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import SEABED
@@ -391,9 +392,6 @@ MODEL_ERRORS = {
     "pull_start": ("N", "change of the force that holds the start, along it", ()),
     "pull_end": ("N", "change of the force that holds the end, along it", ()),
 }
-# Part of the error that a corrected result still has: a quarter, because the most that correction has left
-# where bending is not all there is were 22 % (docs/zones.md).
-LEFT = 0.25
 
 
 def model_errors(plain: View, corrected: View) -> dict[str, object]:

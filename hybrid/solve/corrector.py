@@ -13,6 +13,7 @@ from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import FRICTION, WAVES
 from hybrid.solve.correct import follow
 from hybrid.solve.march import march, workspace
+from hybrid.solve.step import lay
 from hybrid.solve.timestep import Stepper
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
@@ -109,9 +110,11 @@ class Corrector:
             self.ki * line.hn, forces, self.tangent,
         )  # fmt: skip
 
-    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0) -> None:
-        """The error of an equilibrium."""
-        line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
+    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, rubbed: bool = False) -> None:
+        """The error of an equilibrium; rubbed: friction took part in it, so that a shift is felt as friction."""
+        line = self.line._replace(bits=self.line.bits & ~(WAVES if rubbed else FRICTION | WAVES))
+        if line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
         W, X, _, report, rows, gaps = workspace(line.h.size, keep=True)
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
         still = np.zeros_like(state.r)
