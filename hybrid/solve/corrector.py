@@ -13,11 +13,14 @@ from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import FRICTION, WAVES
 from hybrid.solve.correct import follow
 from hybrid.solve.march import march, workspace
+from hybrid.solve.observe import observe
 from hybrid.solve.step import lay
 from hybrid.solve.timestep import Stepper
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
 MOST = 0.1
+# Part of the error by which a rod's end is moved to see how its forces answer, to first order as all else is here.
+SMALL = 1e-4
 # dvd'/dr' of an equilibrium, over tension scale / (mass x length): holds what would drift freely, as in solve.statics.
 ANCHOR = 1e-12
 
@@ -95,20 +98,32 @@ class Corrector:
 
     def shift(self, ends: Ends, state: State) -> Shift:
         """What the error makes of an output of `state`."""
-        line, n = self.line, self.line.h.size
-        l = np.linalg.norm(state.e, axis=1)
-        d = state.e / l[:, None]
-        forces = np.zeros((2, 3))
-        for k, cell, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):
-            if ends.held[k]:
-                de = self.position[cell + 1] - self.position[cell]
-                across = de - (de @ d[cell]) * d[cell]
-                Q = np.cross(d[cell], self.left[cell + 1] - self.left[cell])
-                forces[k] = sign * (self.tension[cell] * d[cell] + (state.T[cell] * across + Q) / l[cell])
+        now = self._end_forces(ends, state, 0.0)
+        forces = (self._end_forces(ends, state, SMALL) - now) / SMALL * ends.held[:, None]
         return Shift(
             self.position.copy(), self.error[1, :, :3].copy(), self.tension.copy(), self.moment.copy(),
-            self.ki * line.hn, forces, self.tangent,
+            self.ki * self.line.hn, forces, self.tangent,
         )  # fmt: skip
+
+    def _end_forces(self, ends: Ends, state: State, part: float) -> Floats:
+        """Forces (2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""
+        line, e = self.line, state.e + part * np.diff(self.position, axis=0)
+        T = state.T + part * self.tension
+        M, strain = np.zeros((2, T.size + 1, 3))
+        if line.spin[0] or line.spin[-1]:  # directors carried to the chords, and spun
+            d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+            to = e / np.linalg.norm(e, axis=1)[:, None]
+            a = state.a1 - np.einsum("ij,ij,i->i", state.a1, to, 1.0 / (1.0 + (d * to).sum(axis=1)))[:, None] * (d + to)
+            psi = part * self.error[0, :-1, 3, None]
+            a = np.cos(psi) * a + np.sin(psi) * np.cross(to, a)
+            observe(line, ends, e, state.v, a, state.w, M, strain, np.zeros(4))
+        M += part * self.left
+        out = np.zeros((2, 3))
+        for k, c, sign in ((0, 0, 1.0), (1, T.size - 1, -1.0)):
+            l = float(np.linalg.norm(e[c]))
+            d = e[c] / l
+            out[k] = sign * (T[c] * d + np.cross(d, M[c + 1] - M[c]) / l)
+        return out
 
     def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, rubbed: bool = False) -> None:
         """The error of an equilibrium; rubbed: friction took part in it, so that a shift is felt as friction."""
