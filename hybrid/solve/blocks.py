@@ -322,25 +322,6 @@ def substitute(X, x):
 
 
 @inner
-def gone(p, b):
-    """The row b (with its right-hand side last) without its first unknown, by the pivot row p."""
-    f = b[0] / p[0]
-    return (b[1] - f * p[1], b[2] - f * p[2], b[3] - f * p[3], b[4] - f * p[4])
-
-
-@inner
-def gone3(p, b):
-    f = b[0] / p[0]
-    return (b[1] - f * p[1], b[2] - f * p[2], b[3] - f * p[3])
-
-
-@inner
-def gone2(p, b):
-    f = b[0] / p[0]
-    return (b[1] - f * p[1], b[2] - f * p[2])
-
-
-@inner
 def solve4(A0, A1, A2, A3):
     """Four unknowns from four rows (five numbers, the last the right-hand side), with pivoting."""
     if abs(A1[0]) > abs(A0[0]):
@@ -349,19 +330,27 @@ def solve4(A0, A1, A2, A3):
         A0, A2 = A2, A0
     if abs(A3[0]) > abs(A0[0]):
         A0, A3 = A3, A0
-    B1, B2, B3 = gone(A0, A1), gone(A0, A2), gone(A0, A3)
+    i0 = 1.0 / A0[0]
+    f1, f2, f3 = i0 * A1[0], i0 * A2[0], i0 * A3[0]
+    B1 = (A1[1] - f1 * A0[1], A1[2] - f1 * A0[2], A1[3] - f1 * A0[3], A1[4] - f1 * A0[4])
+    B2 = (A2[1] - f2 * A0[1], A2[2] - f2 * A0[2], A2[3] - f2 * A0[3], A2[4] - f2 * A0[4])
+    B3 = (A3[1] - f3 * A0[1], A3[2] - f3 * A0[2], A3[3] - f3 * A0[3], A3[4] - f3 * A0[4])
     if abs(B2[0]) > abs(B1[0]):
         B1, B2 = B2, B1
     if abs(B3[0]) > abs(B1[0]):
         B1, B3 = B3, B1
-    C2, C3 = gone3(B1, B2), gone3(B1, B3)
+    i1 = 1.0 / B1[0]
+    f2, f3 = i1 * B2[0], i1 * B3[0]
+    C2 = (B2[1] - f2 * B1[1], B2[2] - f2 * B1[2], B2[3] - f2 * B1[3])
+    C3 = (B3[1] - f3 * B1[1], B3[2] - f3 * B1[2], B3[3] - f3 * B1[3])
     if abs(C3[0]) > abs(C2[0]):
         C2, C3 = C3, C2
-    D3 = gone2(C2, C3)
-    x3 = D3[1] / D3[0]
-    x2 = (C2[2] - C2[1] * x3) / C2[0]
-    x1 = (B1[3] - B1[1] * x2 - B1[2] * x3) / B1[0]
-    x0 = (A0[4] - A0[1] * x1 - A0[2] * x2 - A0[3] * x3) / A0[0]
+    i2 = 1.0 / C2[0]
+    f3 = i2 * C3[0]
+    x3 = (C3[2] - f3 * C2[2]) / (C3[1] - f3 * C2[1])
+    x2 = i2 * (C2[2] - C2[1] * x3)
+    x1 = i1 * (B1[3] - B1[1] * x2 - B1[2] * x3)
+    x0 = i0 * (A0[4] - A0[1] * x1 - A0[2] * x2 - A0[3] * x3)
     return x0, x1, x2, x3
 
 
@@ -435,13 +424,21 @@ def again(X, W, b, x):
     total = 0.0
     for i in range(n - 1, -1, -1):
         p = i * ROW
-        for j in range(SIZE):
-            q = p + SPAN * j
-            y = x[i, j]
-            for m in range(SIZE):
-                y -= X[q + m] * x[i + 1, m]
-            if i + 2 <= n:
-                y -= X[q + 5] * x[i + 2, 1] + X[q + 6] * x[i + 2, 2] + X[q + 7] * x[i + 2, 3]
-            x[i, j] = y
-            total += abs(y)
+        if X[(n + 1) * ROW + i * KEPT + 63] > 0.0:
+            for j in range(SIZE):
+                q = p + SPAN * j
+                y = x[i, j]
+                for m in range(SIZE):
+                    y -= X[q + m] * x[i + 1, m]
+                if i + 2 <= n:
+                    y -= X[q + 5] * x[i + 2, 1] + X[q + 6] * x[i + 2, 2] + X[q + 7] * x[i + 2, 3]
+                x[i, j] = y
+                total += abs(y)
+        else:
+            y0, y1, y2, y3 = x[i + 1, 0], x[i + 1, 1], x[i + 1, 2], x[i + 1, 3]
+            for j in range(SIZE - 1):
+                q = p + SPAN * j
+                y = x[i, j] - X[q] * y0 - X[q + 1] * y1 - X[q + 2] * y2 - X[q + 3] * y3
+                x[i, j] = y
+                total += abs(y)
     return total < math.inf

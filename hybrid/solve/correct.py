@@ -55,23 +55,38 @@ def bend(a, b):
     return scale(2.0 / max(1.0 + dot(a, b), SHARPEST), cross(a, b))
 
 
-@kernel
-def left_out(line, ends, ki, tangent, floor, e, T, torque, work, dM, M):
-    """The moments dM and M (docs/theory.md, T24), by one tridiagonal solve from end to end.
+@inner
+def chord_of(chords, i):
+    """Direction, length and its inverse, as `lay_out` has left them."""
+    return (chords[i, 0], chords[i, 1], chords[i, 2]), chords[i, 3], chords[i, 4]
 
+
+@kernel
+def lay_out(e, chords):
+    """chords (N, 5): direction, length (m) and its inverse of the chords e (N, 3)."""
+    for i in range(e.shape[0]):
+        d, l, il = chord(get3(e, i))
+        chords[i, 0], chords[i, 1], chords[i, 2], chords[i, 3], chords[i, 4] = d[0], d[1], d[2], l, il
+
+
+@kernel
+def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
+    """The moments dM and M (docs/theory.md, T25), by one tridiagonal solve from end to end.
+
+    soft: (N+1,) 1/ki, 0 where there is no bending stiffness; chords: as of `lay_out`;
     tangent: (2,) 1 where an end prescribes one; floor: (N,) N, least tension that counts; torque: N m, of the whole
     line as far as its rods do not carry it; work: (N+1, 3) to work in.
     """
-    n = e.shape[0]
-    before, d_before, a_before = 0.0, Z3, 0.0
+    n = T.shape[0]
+    before, d_before, a_before, last = 0.0, Z3, 0.0, Z3
     for i in range(n + 1):
         d, a = Z3, 0.0
         if i < n:
-            d, _, il = chord(get3(e, i))
+            d, _, il = chord_of(chords, i)
             a = il / max(T[i], floor[i])
         beta = 0.0
-        if line.element[i] and ki[i] > 0.0:
-            beta = min(0.5 * (line.kb[i, 0] + line.kb[i, 1]) / ki[i], 1.0)
+        if line.element[i] and soft[i] > 0.0:
+            beta = min(0.5 * (line.kb[i, 0] + line.kb[i, 1]) * soft[i], 1.0)
         work[i, 2] = beta
         theta = Z3
         given = False
@@ -87,35 +102,35 @@ def left_out(line, ends, ki, tangent, floor, e, T, torque, work, dM, M):
             cell = 0 if i == 0 else n - 1
             if not line.spin[cell]:  # a moment that a catenary's end is given; a rod's is in the march
                 rhs = scale(-1.0, get3(ends.moment, 0)) if i == 0 else get3(ends.moment, 1)
-        if not ki[i] > 0.0:
+        if not soft[i] > 0.0:
             given = True
             rhs = Z3
         diagonal = 1.0
         lower = 0.0
         if not given:
-            diagonal = 1.0 / ki[i] + a_before + a
+            diagonal = soft[i] + a_before + a
             lower = -a_before
             rhs = scale(1.0 - beta, theta)
         # forward elimination: work[:, 0] the upper factor, dM the right-hand side, M keeps beta ki theta for the end
-        k = scale(beta * ki[i], theta)
+        k = Z3
+        if beta > 0.0:
+            k = scale(beta / soft[i], theta)
         M[i, 0], M[i, 1], M[i, 2] = k
-        pivot = diagonal - lower * before
-        upper = 0.0 if given else -a
-        before = upper / pivot
+        inverse = 1.0 / (diagonal - lower * before)
+        before = 0.0 if given else -a * inverse
         work[i, 0] = before
-        if i > 0:
-            rhs = sub(rhs, scale(lower, get3(dM, i - 1)))
-        rhs = scale(1.0 / pivot, rhs)
+        rhs = scale(inverse, sub(rhs, scale(lower, last)))
+        last = rhs
         dM[i, 0], dM[i, 1], dM[i, 2] = rhs
         d_before, a_before = d, a
     for i in range(n - 1, -1, -1):
-        q = sub(get3(dM, i), scale(work[i, 0], get3(dM, i + 1)))
-        dM[i, 0], dM[i, 1], dM[i, 2] = q
+        last = sub(get3(dM, i), scale(work[i, 0], last))
+        dM[i, 0], dM[i, 1], dM[i, 2] = last
     d_before = Z3
     for i in range(n + 1):
         d = Z3
         if i < n:
-            d, _, _ = chord(get3(e, i))
+            d, _, _ = chord_of(chords, i)
         left = 1.0 - work[i, 2]
         m = scale(left, add(get3(M, i), get3(dM, i)))
         # a joint passes no torque to the rod beside it, and a chord feels none of a moment along it
@@ -260,8 +275,8 @@ def damped_moment(line, i, n, d_before, il_before, d, il, y):
 
 
 @kernel
-def right_side(line, sea, ends, r, u, e, v, vd, M, y, z, ahead, old, slid, travel, moving, b):
-    """The right-hand side b (N+1, 5) of J x = b; r, e, v, vd: the converged step, u its displacement.
+def right_side(line, sea, ends, chords, r, u, e, v, vd, M, y, z, ahead, old, slid, travel, moving, b):
+    """The right-hand side b (N+1, 5) of J x = b; chords, r, e, v, vd: the converged step, u its displacement.
 
     moving: whether there is a history; without one (statics) y, z and what follows are not read.
     """
@@ -270,7 +285,7 @@ def right_side(line, sea, ends, r, u, e, v, vd, M, y, z, ahead, old, slid, trave
     force_before = Z3
     damped = moving and line.bits & STIFFNESS_DAMPING
     rotary = moving and line.bits & ROTARY
-    d, l, il = chord(get3(e, 0))
+    d, l, il = chord_of(chords, 0)
     m = get3(M, 0)
     if damped and line.element[0]:
         m = add(m, damped_moment(line, 0, n, Z3, 0.0, d, il, y))
@@ -284,7 +299,7 @@ def right_side(line, sea, ends, r, u, e, v, vd, M, y, z, ahead, old, slid, trave
         if cell:
             mn = get3(M, i + 1)
             if i + 1 < n:
-                dn, ln, iln = chord(get3(e, i + 1))
+                dn, ln, iln = chord_of(chords, i + 1)
             if damped:
                 if line.element[i + 1]:
                     mn = add(mn, damped_moment(line, i + 1, n, d, il, dn, iln, y))
@@ -318,7 +333,8 @@ def right_side(line, sea, ends, r, u, e, v, vd, M, y, z, ahead, old, slid, trave
 
 @kernel
 def follow(
-    line, sea, ends, ki, tangent, floor, state, u, old, slid, new, torque, dt, rho, most, X, W, work, b, x, dM, M
+    line, sea, ends, soft, tangent, floor, state, u, old, slid, new, torque, dt, rho, most, X, W, chords, work, b, x,
+    dM, M
 ):  # fmt: skip
     """The error at the end of a step of dt from that before it, `old`, to `new`: (4, N+1, 4) of r, v, a, vd.
 
@@ -328,7 +344,8 @@ def follow(
     """
     n = state.e.shape[0]
     y, z, ahead = work[0], work[1], work[2]
-    left_out(line, ends, ki, tangent, floor, state.e, state.T, torque, y, dM, M)
+    lay_out(state.e, chords)
+    left_out(line, ends, soft, tangent, floor, chords, state.T, torque, y, dM, M)
     cv = ca = be = 0.0
     moving = dt > 0.0
     if moving:
@@ -346,7 +363,24 @@ def follow(
                 z[i, k] = (am * a - af * ad) / (1.0 - af) - ca * rp
                 ahead[i, k] = p + dt * q + 0.5 * dt * dt * a
     right_side(
-        line, sea, ends, state.r, u, state.e, state.v, state.vd, M, y, z, ahead, old[0], slid, work[3], moving, b
+        line,
+        sea,
+        ends,
+        chords,
+        state.r,
+        u,
+        state.e,
+        state.v,
+        state.vd,
+        M,
+        y,
+        z,
+        ahead,
+        old[0],
+        slid,
+        work[3],
+        moving,
+        b,
     )
     if not again(X, W, b, x):
         return False, 0, -1
