@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
@@ -31,6 +31,7 @@ class Plan:
 # prints them on one core; a plan promises an order of magnitude, not more.
 COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
 COST_STEP = 25e-6
+COST_CORRECTOR = 0.3  # of the catenary's own, where the error of leaving bending out is followed
 USUAL_ITERATIONS = 2.5
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often
@@ -88,7 +89,10 @@ def plan(scene: Scene) -> Plan:
         every = output_interval(scene)
         steps, step = count_steps(scene), every / parts(every, scene.time.step)
     each = sum(COST[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
+    names = {"catenary": "corrected"} if model.corrected else {}
+    zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
+    each *= 1.0 + COST_CORRECTOR * model.follows_error
     return Plan(
-        model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
+        model.ledger, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
         steps * (USUAL_ITERATIONS * each + COST_STEP),
     )  # fmt: skip

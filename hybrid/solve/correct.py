@@ -42,7 +42,6 @@ from hybrid.physics.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.physics.seabed import contact, friction, pressure
 from hybrid.physics.water import current_at, wetted, wetted_stretch
 from hybrid.solve.blocks import again
-from hybrid.solve.march import get9
 from hybrid.solve.node import WATER, Z3, get3
 
 # Turns beyond this (1 + cosine) count as one of a half turn less 11 degrees: a fold has no direction.
@@ -69,24 +68,59 @@ def lay_out(e, chords):
         chords[i, 0], chords[i, 1], chords[i, 2], chords[i, 3], chords[i, 4] = d[0], d[1], d[2], l, il
 
 
+@inner
+def share(line, soft, i):
+    """beta of node i."""
+    if line.element[i] and soft[i] > 0.0:
+        return min(0.5 * (line.kb[i, 0] + line.kb[i, 1]) * soft[i], 1.0)
+    return 0.0
+
+
+@inner
+def tangent_of(ends, k):
+    """Tangent of the frame at the start (k = 0) or end (1)."""
+    return (ends.frame[k, 2], ends.frame[k, 5], ends.frame[k, 8])
+
+
+@inner
+def torque_at(line, ends, soft, tangent, chords, i, torque):
+    """Moment along the cable at node i of a torque that its rods do not carry."""
+    n = chords.shape[0]
+    t = Z3
+    if i > 0:
+        t, _, _ = chord_of(chords, i - 1)
+    if i < n:
+        d, _, _ = chord_of(chords, i)
+        t = add(t, d)
+    if (i == 0 and tangent[0]) or (i == n and tangent[1]):
+        t = tangent_of(ends, 0 if i == 0 else 1)
+    return scale((1.0 - share(line, soft, i)) * torque / math.sqrt(dot(t, t)), t)
+
+
 @kernel
-def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
+def left_out(line, ends, soft, tangent, floor, chords, turned, T, torque, work, dM, M):
     """The moments dM and M (docs/theory.md, T25), by one tridiagonal solve from end to end.
 
-    soft: (N+1,) 1/ki, 0 where there is no bending stiffness; chords: as of `lay_out`;
+    soft: (N+1,) 1/ki, 0 where there is no bending stiffness; chords: as of `lay_out`; turned: the same as dM without
+    torque turns them, along which a torque acts;
     tangent: (2,) 1 where an end prescribes one; floor: (N,) N, least tension that counts; torque: N m, of the whole
     line as far as its rods do not carry it; work: (N+1, 3) to work in.
     """
     n = T.shape[0]
-    before, d_before, a_before, last = 0.0, Z3, 0.0, Z3
+    before, d_before, a_before, last, by_before, mt_before = 0.0, Z3, 0.0, Z3, Z3, Z3
+    if torque != 0.0:
+        mt_before = torque_at(line, ends, soft, tangent, turned, 0, torque)
     for i in range(n + 1):
-        d, a = Z3, 0.0
+        d, a, by = Z3, 0.0, Z3
         if i < n:
             d, _, il = chord_of(chords, i)
             a = il / max(T[i], floor[i])
-        beta = 0.0
-        if line.element[i] and soft[i] > 0.0:
-            beta = min(0.5 * (line.kb[i, 0] + line.kb[i, 1]) * soft[i], 1.0)
+            if torque != 0.0:
+                mt = torque_at(line, ends, soft, tangent, turned, i + 1, torque)
+                by = sub(mt, mt_before)
+                by = scale(a, sub(by, scale(dot(d, by), d)))
+                mt_before = mt
+        beta = share(line, soft, i)
         work[i, 2] = beta
         theta = Z3
         given = False
@@ -94,9 +128,7 @@ def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
         if 0 < i < n:
             theta = bend(d_before, d)
         elif tangent[0 if i == 0 else 1]:
-            Rg = get9(ends.frame, 0 if i == 0 else 1)
-            t = (Rg[2], Rg[5], Rg[8])
-            theta = bend(t, d) if i == 0 else bend(d_before, t)
+            theta = bend(tangent_of(ends, 0), d) if i == 0 else bend(d_before, tangent_of(ends, 1))
         else:
             given = True
             cell = 0 if i == 0 else n - 1
@@ -111,6 +143,8 @@ def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
             diagonal = soft[i] + a_before + a
             lower = -a_before
             rhs = scale(1.0 - beta, theta)
+            if torque != 0.0:  # it turns chords as well
+                rhs = add(rhs, sub(by, by_before))
         # forward elimination: work[:, 0] the upper factor, dM the right-hand side, M keeps beta ki theta for the end
         k = Z3
         if beta > 0.0:
@@ -122,7 +156,7 @@ def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
         rhs = scale(inverse, sub(rhs, scale(lower, last)))
         last = rhs
         dM[i, 0], dM[i, 1], dM[i, 2] = rhs
-        d_before, a_before = d, a
+        d_before, a_before, by_before = d, a, by
     for i in range(n - 1, -1, -1):
         last = sub(get3(dM, i), scale(work[i, 0], last))
         dM[i, 0], dM[i, 1], dM[i, 2] = last
@@ -139,10 +173,19 @@ def left_out(line, ends, soft, tangent, floor, chords, T, torque, work, dM, M):
         if i > 0 and line.spin[i - 1]:
             m = sub(m, scale(dot(m, d_before), d_before))
         if torque != 0.0:
-            t = add(d, d_before)
-            m = add(m, scale(left * torque / math.sqrt(dot(t, t)), t))
+            m = add(m, torque_at(line, ends, soft, tangent, turned, i, torque))
         M[i, 0], M[i, 1], M[i, 2] = m
         d_before = d
+
+
+@kernel
+def turn(chords, T, floor, dM, turned):
+    """Chords as the moments dM turn them: by the difference of the moments at their ends over l T."""
+    for c in range(chords.shape[0]):
+        d, l, il = chord_of(chords, c)
+        w = scale(il / max(T[c], floor[c]), sub(get3(dM, c + 1), get3(dM, c)))
+        t, _, _ = chord(add(d, cross(w, d)))
+        turned[c, 0], turned[c, 1], turned[c, 2], turned[c, 3], turned[c, 4] = t[0], t[1], t[2], l, il
 
 
 @inner
@@ -309,12 +352,11 @@ def right_side(line, sea, ends, chords, r, u, e, v, vd, M, y, z, ahead, old, sli
             force = scale(il, cross(d, Q))
             if line.spin[i]:
                 b[i, 4] = -dot(d, Q)
-            if rotary:
+            if rotary and line.spin[i]:
                 across = sub(get3(z, i + 1), get3(z, i))
                 across = sub(across, scale(dot(d, across), d))
                 force = add(force, scale(line.rotary[i] * il * il, across))
-                if line.spin[i]:
-                    b[i, 4] += line.polar[i] * z[i, 3]
+                b[i, 4] += line.polar[i] * z[i, 3]
         F = sub(force, force_before)
         if moving:
             F = add(
@@ -333,8 +375,8 @@ def right_side(line, sea, ends, chords, r, u, e, v, vd, M, y, z, ahead, old, sli
 
 @kernel
 def follow(
-    line, sea, ends, soft, tangent, floor, state, u, old, slid, new, torque, dt, rho, most, X, W, chords, work, b, x,
-    dM, M
+    line, sea, ends, soft, tangent, floor, state, u, old, slid, new, torque, dt, rho, most, X, W, chords, turned, work,
+    b, x, dM, M
 ):  # fmt: skip
     """The error at the end of a step of dt from that before it, `old`, to `new`: (4, N+1, 4) of r, v, a, vd.
 
@@ -345,7 +387,10 @@ def follow(
     n = state.e.shape[0]
     y, z, ahead = work[0], work[1], work[2]
     lay_out(state.e, chords)
-    left_out(line, ends, soft, tangent, floor, chords, state.T, torque, y, dM, M)
+    left_out(line, ends, soft, tangent, floor, chords, chords, state.T, 0.0, y, dM, M)
+    if torque != 0.0:
+        turn(chords, state.T, floor, dM, turned)
+        left_out(line, ends, soft, tangent, floor, chords, turned, state.T, torque, y, dM, M)
     cv = ca = be = 0.0
     moving = dt > 0.0
     if moving:

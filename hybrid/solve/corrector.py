@@ -62,7 +62,8 @@ class Corrector:
         self.slid = np.zeros((n + 1, 3))
         self.x, self._b = np.zeros((2, n + 1, 5))
         self.moment, self.left = np.zeros((2, n + 1, 3))
-        self._work, self._chords = np.zeros((4, n + 1, 4)), np.zeros((n, 5))
+        self._work = np.zeros((4, n + 1, 4))
+        self._chords, self._turned = np.zeros((2, n, 5))
         self._soft = np.divide(1.0, ki, out=np.zeros(n + 1), where=ki > 0.0)
         self.clipped, self.where, self.finite = 0, -1, True
 
@@ -153,7 +154,7 @@ class Corrector:
     ) -> None:  # fmt: skip
         self.finite, self.clipped, self.where = follow(
             line, sea, ends, self._soft, self.tangent, self.floor, state, u, self.error, self.slid, self._spare, torque,
-            dt, rho, MOST * self.length, X, W, self._chords, self._work, self._b, self.x, self.moment, self.left,
+            dt, rho, self.most, X, W, self._chords, self._turned, self._work, self._b, self.x, self.moment, self.left,
         )  # fmt: skip
         if self.finite:
             self.error, self._spare = self._spare, self.error
