@@ -38,7 +38,7 @@ class Correction:
 
         rubbed: whether friction took part in the equilibrium.
         """
-        self.ends = ends
+        self.ends, self.corrector.sea = ends, self.model.sea.values
         if at_rest:
             self.corrector.rest(self.model.sea.values, ends, state, self._torque(ends, state), rubbed)
 
@@ -51,6 +51,7 @@ class Correction:
         """Zones have changed: the error goes on from where it was."""
         self.model = model
         self.corrector = corrector_for(model).taking_over(self.corrector)
+        self.corrector.sea = model.sea.values
 
     @property
     def beyond(self) -> str:

@@ -133,18 +133,25 @@ class View:
     """One state looked at: everything the probes share is computed once, and only if a probe needs it."""
 
     def __init__(
-        self, line: Line, sea: Sea, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats,
-        shift: Shift | None = None,
-    ) -> None:  # fmt: skip
-        """shift: what position, tension, curvature and moment are corrected by; energies and contact are not."""
+        self, line: Line, sea: Sea, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats
+    ) -> None:
         self.line, self.sea, self.zones, self.ends = line, sea, zones, ends
-        self.computed, self.grid, self.report, self.shift = state, grid, report, shift
+        self.computed, self.grid, self.report = state, grid, report
         self.state = state
-        if shift is not None:
-            self.state = state._replace(
-                r=state.r + shift.position, v=state.v + shift.velocity, T=state.T + shift.tension,
-                e=state.e + np.diff(shift.position, axis=0),
-            )  # fmt: skip
+        self.shift: Shift | None = None
+        self._plain: View | None = None  # the view that this one corrects
+
+    def corrected(self, shift: Shift) -> View:
+        """The same state with position, tension, curvature and moment corrected; energies and contact stay."""
+        other, state = copy(self), self.computed
+        for name in ("d", "tension", "tangent", "moment", "torque", "curvature_twist", "shear"):
+            other.__dict__.pop(name, None)
+        other.shift, other._plain = shift, self
+        other.state = state._replace(
+            r=state.r + shift.position, v=state.v + shift.velocity, T=state.T + shift.tension,
+            e=state.e + np.diff(shift.position, axis=0),
+        )  # fmt: skip
+        return other
 
     @cached_property
     def touchdown(self) -> Touchdown:
@@ -194,6 +201,8 @@ class View:
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats]:
+        if self._plain is not None:
+            return self._plain._observed
         n, st = self.line.h.size, self.computed
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
         observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
@@ -220,6 +229,8 @@ class View:
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2), 1/m."""
+        if self._plain is not None:
+            return self._plain._strains
         line, out = self.line, np.zeros((len(self.grid.side_nodes), 2))
         d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
         cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
@@ -493,7 +504,7 @@ class Observer:
         """All fields at one moment; `work` J in the order of POWERS since the start; ratios: criteria at places, m;
         shift: what bending that is left out would change."""
         plain = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
-        corrected = View(self.line, self.sea, self.zones, ends, state, self.grid, report, shift) if shift else plain
+        corrected = plain.corrected(shift) if shift is not None else plain
         view = corrected if self._corrected else plain
         out = {name: p.value(view) for name, p in self._probes.items()}
         if self._errors:

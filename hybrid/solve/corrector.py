@@ -5,12 +5,14 @@ One way only: nothing of it goes back into the line.  docs/theory.md, 15; the ke
 
 from __future__ import annotations
 
+from math import sqrt
 from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import FRICTION, WAVES
+from hybrid.model.state import Ends, Floats, Line, Sea, State, no_sea
+from hybrid.physics.loads import FRICTION, SEABED, WAVES
+from hybrid.physics.seabed import contact
 from hybrid.solve.correct import follow
 from hybrid.solve.march import march, workspace
 from hybrid.solve.observe import observe
@@ -66,6 +68,7 @@ class Corrector:
         self._chords, self._turned = np.zeros((2, n, 5))
         self._soft = np.divide(1.0, ki, out=np.zeros(n + 1), where=ki > 0.0)
         self.clipped, self.where, self.finite = 0, -1, True
+        self.sea = no_sea(n)  # of the last step
 
     @property
     def position(self) -> Floats:
@@ -109,23 +112,41 @@ class Corrector:
 
     def _end_forces(self, ends: Ends, state: State, part: float) -> Floats:
         """Forces (2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""
-        line, e = self.line, state.e + part * np.diff(self.position, axis=0)
-        T = state.T + part * self.tension
-        M, strain = np.zeros((2, T.size + 1, 3))
+        line, n = self.line, self.line.h.size
+        M = part * self.left[[0, 1, n - 1, n]]
         if line.spin[0] or line.spin[-1]:  # directors carried to the chords, and spun
+            e = state.e + part * np.diff(self.position, axis=0)
             d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
             to = e / np.linalg.norm(e, axis=1)[:, None]
             a = state.a1 - np.einsum("ij,ij,i->i", state.a1, to, 1.0 / (1.0 + (d * to).sum(axis=1)))[:, None] * (d + to)
             psi = part * self.error[0, :-1, 3, None]
             a = np.cos(psi) * a + np.sin(psi) * np.cross(to, a)
-            observe(line, ends, e, state.v, a, state.w, M, strain, np.zeros(4))
-        M += part * self.left
+            found, strain = np.zeros((2, n + 1, 3))
+            observe(line, ends, e, state.v, a, state.w, found, strain, np.zeros(4))
+            M += found[[0, 1, n - 1, n]]
         out = np.zeros((2, 3))
-        for k, c, sign in ((0, 0, 1.0), (1, T.size - 1, -1.0)):
-            l = float(np.linalg.norm(e[c]))
-            d = e[c] / l
-            out[k] = sign * (T[c] * d + np.cross(d, M[c + 1] - M[c]) / l)
+        for k, c, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):
+            d = state.e[c] + part * (self.position[c + 1] - self.position[c])
+            l = sqrt(d @ d)
+            d /= l
+            x, y, z = d.tolist()
+            p, q, r = (M[2 * k + 1] - M[2 * k]).tolist()
+            across = np.array((y * r - z * q, z * p - x * r, x * q - y * p))
+            out[k] = sign * ((state.T[c] + part * self.tension[c]) * d + across / l)
+            if line.bits & SEABED:
+                out[k] += self._bed(k, c, state, part)
         return out
+
+    def _bed(self, k: int, cell: int, state: State, part: float) -> Floats:
+        """Force (3,) N of the seabed on the first or last node, which is held, as its neighbour moves."""
+        sea, near = self.sea, (cell, cell + 1) if k == 0 else (cell + 1, cell)
+        shift, rate = self.error[0, :, :3], self.error[1, :, :3]
+        p = [sea.offset + 0.5 * sea.onset - float(sea.normal @ (state.r[i] + part * shift[i])) for i in near]
+        if max(p) <= 0.0:
+            return np.zeros(3)
+        rates = [-float(sea.normal @ (state.v[i] + part * rate[i])) for i in near]
+        N = contact(*p, *rates, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0]
+        return np.asarray(N * sea.normal)
 
     def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, rubbed: bool = False) -> None:
         """The error of an equilibrium; rubbed: friction took part in it, so that a shift is felt as friction."""
@@ -152,6 +173,7 @@ class Corrector:
         self, line: Line, sea: Sea, ends: Ends, state: State, u: Floats, torque: float, dt: float, rho: float,
         X: Floats, W: Floats,
     ) -> None:  # fmt: skip
+        self.sea = sea
         self.finite, self.clipped, self.where = follow(
             line, sea, ends, self._soft, self.tangent, self.floor, state, u, self.error, self.slid, self._spare, torque,
             dt, rho, self.most, X, W, self._chords, self._turned, self._work, self._b, self.x, self.moment, self.left,
