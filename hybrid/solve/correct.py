@@ -1,4 +1,4 @@
-"""What leaving bending out shifts the cable by: one more right-hand side a step (docs/theory.md, 15).
+"""What leaving bending out shifts the cable by: one more right-hand side a step (docs/theory.md, 14).
 
 The balance of a cable that bends is that of the one computed plus the forces of the moments left out.  So its
 distance from the one computed, x + e, obeys the same equations linearised, J e = - (what is left out), in the same
@@ -99,7 +99,7 @@ def torque_at(line, ends, soft, tangent, chords, i, torque):
 
 @kernel
 def left_out(line, ends, soft, tangent, floor, chords, turned, T, torque, work, dM, M):
-    """The moments dM and M (docs/theory.md, T25), by one tridiagonal solve from end to end.
+    """The moments dM and M (docs/theory.md, T24), by one tridiagonal solve from end to end.
 
     soft: (N+1,) 1/ki, 0 where there is no bending stiffness; chords: as of `lay_out`; turned: the same as dM without
     torque turns them, along which a torque acts;

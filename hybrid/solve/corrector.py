@@ -1,6 +1,6 @@
 """The model error of a line along its run: what leaving bending out of its catenaries shifts it by.
 
-One way only: nothing of it goes back into the line.  docs/theory.md, 15; the kernels are in solve.correct.
+One way only: nothing of it goes back into the line.  docs/theory.md, 14; the kernels are in solve.correct.
 """
 
 from __future__ import annotations

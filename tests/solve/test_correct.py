@@ -1,4 +1,4 @@
-"""The model error: what leaving bending out shifts a cable by (docs/theory.md, 15)."""
+"""The model error: what leaving bending out shifts a cable by (docs/theory.md, 14)."""
 
 from __future__ import annotations
 
