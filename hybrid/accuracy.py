@@ -52,6 +52,7 @@ class Sketch:
     every: int = 1  # outputs of the result to one of these; the last is there always
     unresolved: bool = False  # whether a bend was sharper than its cells can show
     model_error: Mapping[str, np.ndarray] = field(default_factory=dict)
+    notes: tuple[tuple[str, str], ...] = ()  # what the result should say of it: kind and text of events
 
     @property
     def step(self) -> float:
@@ -101,6 +102,10 @@ class Estimate:
         """
         self.run = final
         self.order = {name: _order(name, final, coarse, coarsest) for name in final.values if name in coarse.values}
+        self.model = dict(final.model_error)
+        for name, left in coarse.model_error.items():  # hardly depends on cells and steps
+            if name not in self.model and len(left):
+                self.model[name] = _spread(left, len(next(iter(final.values.values()))), coarse.every)
         self.late: dict[str, np.ndarray] = {}
         self.cells: dict[str, np.ndarray] = {}
         for name, p in self.order.items():
@@ -136,14 +141,14 @@ class Estimate:
     @property
     def errors(self) -> Errors:
         """What it comes to.  Causes add up in size: that they cancel is seldom true at all times."""
-        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "total": {}}
+        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": dict(self.model), "total": {}}
         for name, cells in self.cells.items():
             late, called = self.late.get(name), PULLS.get(name, name)
             out["mesh"][called] = total = _size(cells, name)
             if late is not None:
                 out["time"][called] = _size(late, name)
                 total = total + out["time"][called]
-            out["total"][called] = total + self.run.model_error.get(called, 0.0)
+            out["total"][called] = total + self.model.get(called, 0.0)
         return Errors({kind: fields for kind, fields in out.items() if fields})
 
 
@@ -206,7 +211,7 @@ def judge(asked: Asked, errors: Errors, run: Sketch) -> Verdict:
             continue
         total = errors.largest("total", name)
         if total / bound >= worst.ratio:
-            model = float(np.max(run.model_error.get(name, np.zeros(1)), initial=0.0))
+            model = errors.largest("model", name)
             mesh, time = (errors.largest(kind, name) / bound for kind in ("mesh", "time"))
             text = f"{name.replace('_', ' at the ')}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text)
@@ -310,6 +315,7 @@ class Climb:
 
     def _counted(self, run: Sketch) -> Sketch:
         self.runs.append(run)
+        self.notes += run.notes
         return run
 
     def _coarse(self, effort: Effort) -> tuple[Sketch, Sketch | None, Sketch | None] | None:
@@ -319,7 +325,8 @@ class Climb:
         for cells, steps in ((COARSER, longer), (COARSER, longer**2), (COARSER**2, longer**2)):
             try:
                 same = not self.moves and cells == COARSER and found
-                found.append(None if same else self._counted(self.sketch(effort.coarser(cells, steps))))
+                rough = replace(effort.coarser(cells, steps), follow=not found)
+                found.append(None if same else self._counted(self.sketch(rough)))
             except ComputationError as error:
                 if not found:
                     text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"

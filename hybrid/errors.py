@@ -98,6 +98,7 @@ EVENTS_BY_WEIGHT = (
     "torque left out",
     "ignored",
     "undamped",
+    "error beyond estimate",
     "not judged",
     "clamp left out",
     "point left out",

@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.adapt.manager import Change
+from hybrid.correction import Correction
 from hybrid.errors import ComputationError, Outcome
 from hybrid.flat import Flat
 from hybrid.model.build import Model
@@ -49,12 +50,14 @@ class Motion:
         target: Path | io.BytesIO | None,
         equilibrium: Equilibrium | None,
         zoning: Zoning | None = None,
+        correction: Correction | None = None,
     ) -> None:
         """target: the file of the result, beside which a failure leaves a snapshot; None: it leaves none."""
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
-        self.stepper = Stepper(model.line, model.length, model.tension_scale, floor)
+        self.correction, self._beyond = correction, -np.inf
+        self.stepper = self._new_stepper(floor)
         self.watch = Watch(recorder, model)
         self.zoning, self.effort, self._stale = zoning, effort, False
         self.control = None if effort.local is None else Controller(effort.local, effort.step, effort.shortest)
@@ -78,6 +81,10 @@ class Motion:
         self._ignite()
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
+        if self.correction is not None:
+            self.correction.begin(
+                model.ends.at(0.0), self.state, equilibrium is not None, equilibrium is not None and equilibrium.rubbed
+            )
         self.spare = self.state.copy()
         self.power = self._powers()
         self._look(self.watch.still(model.ends.values, self.state))
@@ -91,7 +98,7 @@ class Motion:
         if self.zoning is not None:
             self.zoning.model = model
         self.watch.follow(model)
-        self.stepper = Stepper(model.line, model.length, model.tension_scale, self.stepper.floor)
+        self.stepper = self._new_stepper(self.stepper.floor)
         self.flat.carry(self.stepper)
 
     def advance(self, until: float) -> None:
@@ -163,7 +170,8 @@ class Motion:
             self._stale = False
         ends = self.model.ends.at(self.t)
         ratios = self.zoning.manager.told if self.zoning is not None else None
-        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios)
+        shift = self.correction.shift(self.state) if self.correction is not None else None
+        values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios, shift)
         self.recorder.save(self.t, values, self.observer.zone_rows)
         self.watch.strain(self.t, self.state)
         self.watch.mesh(self.t, self.state)
@@ -191,6 +199,8 @@ class Motion:
     def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:
         dt = end - self.t
         self.state, self.spare = self.spare, self.state
+        if self.correction is not None:
+            self._correct(end, dt)
         self.t, self.dt, self.steps, self.iterations = end, dt, self.steps + 1, taken.iterations
         power = self._powers()
         half = 0.5 * dt
@@ -226,6 +236,21 @@ class Motion:
             self.spare = self.state.copy()
             self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
             self.power = self._powers()
+
+    def _correct(self, end: float, dt: float) -> None:
+        """Follow what leaving bending out makes of the step just taken; where it is beyond estimate, say so."""
+        assert self.correction is not None and self.scene.time is not None
+        before = dt if self.control is None else self.dt
+        self.correction.step(self.stepper, self.model.ends.values, self.state, dt, before, self.scene.time.rho_inf)
+        beyond = self.correction.beyond
+        if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
+            s = float(self.model.line.s[max(self.correction.corrector.where, 0)])
+            self.recorder.event(end, s, s, "error beyond estimate", beyond)
+            self._beyond = end + self.model.time_scale
+
+    def _new_stepper(self, floor: float) -> Stepper:
+        model = self.model
+        return Stepper(model.line, model.length, model.tension_scale, floor, keep=self.correction is not None)
 
     def _rescued(self, taken: Taken, end: float, rescues: int) -> bool:
         """Whether a step was taken back and more of the line made rod: it failed, or a catenary went too far in it."""
@@ -275,7 +300,9 @@ class Motion:
             )  # fmt: skip
         self.spare = self.state.copy()
         floor = self.stepper.floor
-        self.stepper = Stepper(self.model.line, self.model.length, self.model.tension_scale, floor)
+        self.stepper = self._new_stepper(floor)
+        if self.correction is not None:
+            self.correction.switch(self.model)
         self.flat.carry(self.stepper)
         self.watch.follow(self.model)
         self._stale = True

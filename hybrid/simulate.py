@@ -10,7 +10,7 @@ import io
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -30,6 +30,7 @@ from hybrid.accuracy import (
 )
 from hybrid.adapt.manager import UserCriterion
 from hybrid.adapt.table import CRITERIA
+from hybrid.correction import Correction
 from hybrid.errors import ComputationError, SceneError
 from hybrid.model.build import Model, build, given_zones, rod_cells
 from hybrid.model.coarse import coarser, refined
@@ -155,7 +156,8 @@ class Job:
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones held", HELD)
         with recorder:
-            motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning)
+            correction = _correction(model, zoning)
+            motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning, correction)
             self._move(motion, outputs)
             recorder.close("complete", f"{motion.steps} steps")
         if not wants_errors(self.scene):
@@ -182,10 +184,14 @@ class Job:
         times = output_times(self.scene)
         if effort.every > 1:
             times = [*times[effort.every - 1 : -1 : effort.every], times[-1]]
-        motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning)
+        correction = _correction(model, zoning)
+        motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning, correction)
         self._move(motion, times)
         values = {name: notebook[name] for name in COMPARED if name in notebook}
-        return Sketch(effort, values, cells_of(model), motion.steps, clock.process_time() - begin, effort.every)
+        model_error = {name.removeprefix(MODEL): notebook[name] for name in notebook.names if name.startswith(MODEL)}
+        spent = clock.process_time() - begin
+        notes = tuple({kind: (kind, text) for kind, text in reversed(notebook.events) if kind == BEYOND}.values())
+        return Sketch(effort, values, cells_of(model), motion.steps, spent, effort.every, False, model_error, notes)
 
     def survey(self, effort: Effort) -> Grading | None:
         """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
@@ -208,8 +214,7 @@ class Job:
             target.truncate()
         begin = clock.process_time()
         model, found = self._rest(effort)
-        s = output_points(self.scene.output.points, model.length)
-        observer = Observer(model.line, model.sea.values, model.zones, s, False, model.attached)
+        observer = self._at_rest(model)
         with _recorder(self.scene, model, observer, target, overwrite, 0, found) as recorder:
             ends = model.ends.at(np.inf)
             watch = Watch(recorder, model)
@@ -219,21 +224,25 @@ class Job:
             stop = watch.still(ends, found.state)
             if stop is not None:
                 raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
-            values = observer.values(ends, found.state, found.report, np.zeros(len(POWERS)))
+            values = _values_at_rest(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
             recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
-        kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
-        return Sketch(effort, kept, cells_of(model), 1, clock.process_time() - begin)
+        return _sketch_at_rest(effort, model, values, clock.process_time() - begin)
 
     def sketch_rest(self, effort: Effort) -> Sketch:
         """The equilibrium for comparison only."""
         begin = clock.process_time()
         model, found = self._rest(effort)
+        values = _values_at_rest(model, found, self._at_rest(model, COMPARED))
+        return _sketch_at_rest(effort, model, values, clock.process_time() - begin)
+
+    def _at_rest(self, model: Model, only: Sequence[str] | None = None) -> Observer:
         s = output_points(self.scene.output.points, model.length)
-        observer = Observer(model.line, model.sea.values, model.zones, s, False, model.attached, only=COMPARED)
-        values = observer.values(model.ends.at(np.inf), found.state, found.report, np.zeros(len(POWERS)))
-        kept = {name: np.array(x)[None] for name, x in values.items()}
-        return Sketch(effort, kept, cells_of(model), 1, clock.process_time() - begin)
+        errors = model.follows_error and wants_errors(self.scene)
+        return Observer(
+            model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
+            corrected=model.corrected,
+        )  # fmt: skip
 
     def _rest(self, effort: Effort) -> tuple[Model, Equilibrium]:
         model = build(self.scene, effort)
@@ -253,7 +262,11 @@ class Job:
     def _observer(self, model: Model, zoning: Zoning | None, s: Floats, only: Sequence[str] | None = None) -> Observer:
         kinds = {"rod", "catenary"} if zoning else None
         criteria = [(x.name, x.ratio) for x in CRITERIA] if self.scene.output.criteria and zoning and not only else ()
-        return Observer(model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only)
+        errors = model.follows_error and wants_errors(self.scene)
+        return Observer(
+            model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
+            model.corrected,
+        )  # fmt: skip
 
     def _move(self, motion: Motion, outputs: Sequence[float]) -> None:
         """The loop over time."""
@@ -275,6 +288,31 @@ class Job:
                 motion.restart()
         motion.watch.finish()
         self.told(motion, finished=True)
+
+
+MODEL, BEYOND = "errors/model/", "error beyond estimate"
+
+
+def _correction(model: Model, zoning: Zoning | None) -> Correction | None:
+    """What follows the error of leaving bending out, where that is wanted."""
+    return Correction(model, zoning.torque if zoning else None) if model.follows_error else None
+
+
+def _values_at_rest(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
+    """All fields of an equilibrium."""
+    ends, shift = model.ends.at(np.inf), None
+    if model.follows_error:
+        model.sea.at(np.inf)
+        correction = Correction(model)
+        correction.begin(ends, found.state, at_rest=True, rubbed=found.rubbed)
+        shift = correction.shift(found.state)
+    return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
+
+
+def _sketch_at_rest(effort: Effort, model: Model, values: Mapping[str, object], cpu: float) -> Sketch:
+    kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
+    left = {k.removeprefix(MODEL): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL)}
+    return Sketch(effort, kept, cells_of(model), 1, cpu, 1, False, left)
 
 
 def cells_of(model: Model) -> int:
@@ -302,6 +340,8 @@ def _amend(target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Error
             for name, values in quantities.items():
                 unit, dims = UNITS_OF_ERRORS[name], ("s",) if values.ndim == 2 else ()
                 text = f"{WORDS_OF_ERRORS[kind]} of {name.replace('_', ' ')}, estimated"
+                if kind == "model" and final.model_error:
+                    continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
     amend(target, fields, attributes, climb.notes)
 
@@ -309,7 +349,10 @@ def _amend(target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Error
 UNITS_OF_ERRORS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", "pull_start": "N", "pull_end": "N",
 }  # fmt: skip
-WORDS_OF_ERRORS = {"mesh": "error by the mesh", "time": "error by the time step", "total": "error by all causes"}
+WORDS_OF_ERRORS = {
+    "mesh": "error by the mesh", "time": "error by the time step", "model": "error by bending that is left out",
+    "total": "error by all causes",
+}  # fmt: skip
 
 
 class _Told:

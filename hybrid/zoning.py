@@ -11,7 +11,9 @@ from hybrid.adapt.criteria import twist_of_rods
 from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
 from hybrid.adapt.remap import Clamp, Remapped, balance, remap
+from hybrid.correction import Correction
 from hybrid.errors import ComputationError, Outcome
+from hybrid.model.bend import LEFT
 from hybrid.model.build import Model
 from hybrid.model.coarse import picked
 from hybrid.model.layout import Layout
@@ -80,6 +82,7 @@ def manager_for(
         model.tension_scale,
         user,
         min(max(wait, FASTEST * step), SLOWEST * pace),
+        LEFT if model.corrected else 1.0,
     )
     manager.moments = model.ends.moments
     manager.loaded = bool(manager.moments.any())
@@ -117,7 +120,7 @@ def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibri
             answer = _zones_within(model, found, manager, t)
             if answer is None:
                 break
-            if _apart(equilibrium.state, most.layout, answer) <= allowed:
+            if _apart(equilibrium.state, most.layout, answer, t) <= allowed:
                 return answer
         else:
             manager.held = True
@@ -163,11 +166,16 @@ def _zones_within(
     return None
 
 
-def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium]) -> float:
-    """Largest distance, m, of base nodes between the equilibrium of a rod and another."""
-    other = answer[0].layout
-    assert other is not None
-    return float(np.linalg.norm(full.r[layout.first] - answer[1].state.r[other.first], axis=1).max())
+def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
+    """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
+    model, found = answer
+    assert model.layout is not None
+    r = found.state.r
+    if model.corrected:
+        correction = Correction(model)
+        correction.begin(model.ends.at(t), found.state, at_rest=True, rubbed=found.rubbed)
+        r = r + correction.corrector.position
+    return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
 
 
 def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
@@ -199,6 +207,10 @@ class Zoning:
         self.letting_go = False
         self.strain = NO_STRAIN  # of the last step, while bending is being blended
         self.joints = Joints(model.line) if loaded else None
+
+    def torque(self, ends: Ends, state: State) -> float:
+        """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
+        return self.manager.torque
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""

@@ -94,14 +94,17 @@ class DomainManager:
         scale: float,
         user: UserCriterion | None = None,
         pace: float | None = None,
+        left: float = 1.0,
     ) -> None:
         """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N.
 
+        left: part of what catenaries leave out that results still lack (1: they are not corrected);
         dwell: s, for which a rod must have been calm; pace: s, in which bending comes and goes (None: dwell).
         """
         n = layout.rod.size
         self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
         self.pace, self.held = pace or dwell, False
+        self.left = left
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
         self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
@@ -173,7 +176,8 @@ class DomainManager:
         self.torque = self._torque(line, ends, state) if self.twisted else 0.0
         self.loudest = weigh(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
-            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance, self.torque, self.base_of_cell,
+            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance / self.left, self.torque,
+            self.base_of_cell,
             self.free, self.turn, self.twisting, self.ratios,
         )  # fmt: skip
         if self.loaded:
@@ -191,11 +195,11 @@ class DomainManager:
             moment = float(np.linalg.norm(self.moments[k]))
             T = max(float(state.T[k]), float(self.floor[node]), 1e-300)
             ratio = self.ratios[CLAMP]
-            ratio[k] = max(ratio[k], min(moment / (T * self.tolerance), MOST))
+            ratio[k] = max(ratio[k], min(moment * self.left / (T * self.tolerance), MOST))
             along = float(self.moments[k] @ state.e[k] / np.linalg.norm(state.e[k]))
             loosest = max(float(state.T.min()), float(self.floor.min()), 1e-300)
             twisting = along**2 / (2.0 * float(self.EI.min()) * TWISTED)
-            torsion = max(twisting, abs(along) * float(self.turn.sum()) / self.tolerance) / (2.0 * loosest)
+            torsion = max(twisting, abs(along) * self.left * float(self.turn.sum()) / self.tolerance) / (2.0 * loosest)
             np.maximum(self.ratios[TORSION], min(torsion, MOST), out=self.ratios[TORSION])
         quiet = self.layout.rod | (self.given < 0)
         asked = self.ratios[[CLAMP, TORSION]].max(axis=0)

@@ -7,7 +7,7 @@ keeps a ledger: what is on and who asked for it, what is off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -18,7 +18,7 @@ from hybrid.model.effort import Effort, first_effort, mesh_is_free
 from hybrid.model.ends import EndConditions
 from hybrid.model.grade import Grading
 from hybrid.model.layout import Layout
-from hybrid.model.ledger import Entry, ledger
+from hybrid.model.ledger import Entry, followed, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, thinned
@@ -28,7 +28,17 @@ from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.start import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.state import Floats, Line, State, blank_state
 from hybrid.physics.loads import FRICTION, SEABED
-from hybrid.scene.schema import AdaptiveModel, Points, RodZone, Scene, Straight, ZonesModel
+from hybrid.scene.schema import (
+    AdaptiveModel,
+    CorrectedModel,
+    CorrectedZone,
+    Points,
+    RodModel,
+    RodZone,
+    Scene,
+    Straight,
+    ZonesModel,
+)
 
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
@@ -58,6 +68,8 @@ class Model:
     cable: Material
     layout: Layout | None = None  # of a line whose zones move
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
+    follows_error: bool = False  # whether the error of leaving bending out is followed
+    corrected: bool = False  # whether results are corrected for it
 
     @property
     def cells(self) -> int:
@@ -83,10 +95,18 @@ def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
         return tuple(
             ZonePlan("rod", z.rod, z.cells, z.ratio)
             if isinstance(z, RodZone)
-            else ZonePlan("catenary", z.catenary, z.cells, z.ratio)
+            else ZonePlan("catenary", z.corrected if isinstance(z, CorrectedZone) else z.catenary, z.cells, z.ratio)
             for z in model.zones
         )
-    return (ZonePlan("rod" if isinstance(model, AdaptiveModel) else model.kind, scene.length),)
+    return (ZonePlan("rod" if isinstance(model, AdaptiveModel | RodModel) else "catenary", scene.length),)
+
+
+def corrects(scene: Scene) -> bool:
+    """Whether the results of a scene are corrected for the bending that its catenaries leave out."""
+    model = scene.model
+    if isinstance(model, ZonesModel):
+        return any(isinstance(z, CorrectedZone) for z in model.zones)
+    return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
 def build(scene: Scene, effort: Effort | None = None) -> Model:
@@ -150,17 +170,21 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
         spare.e[:] = np.diff(r, axis=0)
         spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
         others.append((name, spare))
+    corrected = corrects(scene)
+    follows = (effort.follow or corrected) and followed(scene, zones, corrected).on
     plane, flat = in_plane(scene, start, others, ends.values)
+    if follows and scene.dimension is None:
+        plane, flat = None, replace(flat, on=False, why="what leaving bending out does is followed in space")
     if plane is not None and scene.dimension == 2:
         line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        ledger=ledger(scene, line, zones, flat), length=float(s[-1]), tension_scale=scale,
+        ledger=ledger(scene, line, zones, flat, corrected), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
-        plane=plane,
+        plane=plane, corrected=corrected, follows_error=follows,
     )  # fmt: skip
 
 

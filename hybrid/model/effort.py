@@ -57,6 +57,7 @@ class Effort:
     fineness: cells, in times those of the mesh as it is; grading: where they go, None: as the scene or the program
     places them; step: s, fixed, or the largest; local: m, error of a step, None: steps are fixed; zones: error that
     leaving bending out may make, as a part of the length; every: outputs of the result to one of such a run.
+    follow: whether the error of leaving bending out is followed along the run.
     """
 
     fineness: float
@@ -65,6 +66,7 @@ class Effort:
     zones: float
     grading: Grading | None = None
     every: int = 1
+    follow: bool = False
 
     def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Effort:
         """With cells and steps so many times as long; the error of a step is of third order."""

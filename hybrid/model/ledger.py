@@ -123,7 +123,25 @@ def _parts(scene: Scene, rods: bool, flat: Entry) -> Iterator[Entry]:
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
 
 
-def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tuple[Entry, ...]:
+def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
+    """Whether the error of leaving bending out is followed along the run; corrects: whether results are corrected."""
+    what, sections = "model error (bending left out), along the run", scene.cable.sections
+    why = "error figure; in a coarser run" if wants_errors(scene) else "results are corrected for it (model)"
+    if not (wants_errors(scene) or corrects):
+        return Entry(what, False, "output.errors: true")
+    if not isinstance(scene.model, AdaptiveModel):
+        if all(z.kind == "rod" for z in zones):
+            return Entry(what, False, "rod everywhere: nothing is left out")
+        if not any(x.weakest_bending for x in sections):
+            return Entry(what, False, "no bending stiffness: there is nothing to leave out")
+        if any(x.anisotropic for x in sections):
+            return Entry(what, False, "bends differently in two directions: a catenary does not know which way it lies")
+    if any(x.intrinsic_curvature and any(x.intrinsic_curvature[:2]) for x in sections):
+        return Entry(what, False, "curved without stress: a catenary does not know which way it lies")
+    return Entry(what, True, why)
+
+
+def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False) -> tuple[Entry, ...]:
     """What is on and who asked for it, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
@@ -151,6 +169,10 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry) -> tupl
                 what = f"sections[{i}] has a mean density of {density:.3g} kg/m^3"
                 why = f"mass {section.mass:g} kg/m, diameter {section.diameter:g} m: are both in these units?"
                 entries.append(Entry(what, True, why, event="implausible"))
+    entries.append(followed(scene, zones, corrects))
+    if corrects:
+        text = "position, tension, curvature and moment with what bending adds to them"
+        entries.append(Entry("corrected catenary zones", True, f"model; {text}"))
     if isinstance(scene.model, AdaptiveModel):
         entries += _watched(scene)
         entries.append(Entry("criteria as fields", scene.output.criteria, "output.criteria"))

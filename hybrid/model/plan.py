@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
@@ -51,6 +51,7 @@ MORE = {
 COST_STEP, COST_MANAGER, COST_OUTPUT = 25e-6, 15e-6, 0.3e-3
 USUAL_ITERATIONS = 2.2
 COST_ERRORS = 1.6  # times a run that a run with its coarser ones costs
+COST_CORRECTOR = 0.3  # of the catenary's own, where the error of leaving bending out is followed
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 OUTPUTS = 100  # of a run whose scene does not say how often
 
@@ -113,11 +114,14 @@ def plan(scene: Scene) -> Plan:
     cost = COST if model.plane is None else FLAT_COST
     each = sum(cost[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     each += model.cells * sum(x[model.plane is not None] for bit, x in MORE.items() if model.line.bits & bit)
+    each *= 1.0 + COST_CORRECTOR * model.follows_error
+    names = {"catenary": "corrected"} if model.corrected else {}
+    zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     per_step = COST_STEP + (COST_MANAGER if model.layout is not None else 0.0)
     outputs = len(output_times(scene)) if scene.time else 0
     seconds = steps * (USUAL_ITERATIONS * each + per_step) + outputs * COST_OUTPUT
     seconds *= COST_ERRORS if wants_errors(scene) else 1.0
     return Plan(
-        model.ledger, model.zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
+        model.ledger, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
         seconds,
     )  # fmt: skip

@@ -18,7 +18,11 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 INK, GREY, ALARM = "#222222", "#6E6E6E", "#C00000"
-KIND_COLOURS = {"rod": "#D55E00", "catenary": "#0072B2"}  # kinds that are not named here are drawn in ink
+KIND_COLOURS = {
+    "rod": "#D55E00",
+    "catenary": "#0072B2",
+    "corrected": "#009E73",
+}  # kinds that are not named here are drawn in ink
 SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
 SMALL, NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
 ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off

@@ -15,7 +15,7 @@ class Notebook:
 
     def __init__(self) -> None:
         self.times: list[float] = []
-        self.events: list[tuple[float, float, str]] = []  # s, m, kind
+        self.events: list[tuple[str, str]] = []  # kind, text
         self.steps = 0
         self._kept: dict[str, list[Any]] = {}
 
@@ -39,10 +39,15 @@ class Notebook:
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
         """Note that something happened at time t (s) from s_a to s_b (m)."""
-        self.events.append((t, 0.5 * (s_a + s_b), kind))
+        self.events.append((kind, f"{text} (at t = {t:.4g} s, s = {0.5 * (s_a + s_b):.4g} m)"))
 
     def close(self, status: str, message: str) -> None:
         """There is no file to close."""
+
+    @property
+    def names(self) -> list[str]:
+        """What is kept."""
+        return list(self._kept)
 
     def __contains__(self, name: str) -> bool:
         return name in self._kept

@@ -16,12 +16,14 @@ from itertools import pairwise
 import numpy as np
 from scipy.sparse import csr_array
 
+from hybrid.model.bend import LEFT
 from hybrid.model.mesh import Zone
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import SEABED
 from hybrid.physics.seabed import stored
 from hybrid.results.record import Field
 from hybrid.results.touchdown import Touchdown, contact_pressure, touchdown
+from hybrid.solve.corrector import Shift
 from hybrid.solve.observe import observe
 from hybrid.solve.timestep import POWERS
 
@@ -134,19 +136,34 @@ class View:
         self, line: Line, sea: Sea, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats
     ) -> None:
         self.line, self.sea, self.zones, self.ends = line, sea, zones, ends
-        self.state, self.grid, self.report = state, grid, report
+        self.computed, self.grid, self.report = state, grid, report
+        self.state = state
+        self.shift: Shift | None = None
+        self._plain: View | None = None  # the view that this one corrects
+
+    def corrected(self, shift: Shift) -> View:
+        """The same state with position, tension, curvature and moment corrected; energies and contact stay."""
+        other, state = copy(self), self.computed
+        for name in ("d", "tension", "tangent", "moment", "torque", "curvature_twist", "shear"):
+            other.__dict__.pop(name, None)
+        other.shift, other._plain = shift, self
+        other.state = state._replace(
+            r=state.r + shift.position, v=state.v + shift.velocity, T=state.T + shift.tension,
+            e=state.e + np.diff(shift.position, axis=0),
+        )  # fmt: skip
+        return other
 
     @cached_property
     def touchdown(self) -> Touchdown:
-        return touchdown(self.line, self.sea, self.state)
+        return touchdown(self.line, self.sea, self.computed)
 
     @property
     def stored(self) -> float:
-        return float(stored(self.line, self.sea, self.state.r))
+        return float(stored(self.line, self.sea, self.computed.r))
 
     @property
     def contact(self) -> Floats:
-        return contact_pressure(self.line, self.sea, self.state, self.grid.s)
+        return contact_pressure(self.line, self.sea, self.computed, self.grid.s)
 
     @cached_property
     def d(self) -> Floats:
@@ -159,7 +176,9 @@ class View:
         ends = []
         for k, first, second in ((0, 0, 1), (1, -1, -2)):
             t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
-            if self.line.element[first]:  # a clamp or guide knows the tangent
+            if self.line.element[first] or (
+                self.shift is not None and self.shift.clamped[k]
+            ):  # a clamp or guide knows the tangent
                 t = self.ends.frame[k].reshape(3, 3)[:, 2]
             force = self.reaction(k) if k else -self.reaction(k)
             at_end = self.line.s[first]
@@ -182,7 +201,9 @@ class View:
 
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats]:
-        n, st = self.line.h.size, self.state
+        if self._plain is not None:
+            return self._plain._observed
+        n, st = self.line.h.size, self.computed
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
         observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
         return M, strain, energy
@@ -190,7 +211,7 @@ class View:
     @property
     def node_moment(self) -> Floats:
         """(N+1, 3) N m, inertial."""
-        return self._observed[0]
+        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
 
     @property
     def energy(self) -> Floats:
@@ -208,8 +229,10 @@ class View:
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2), 1/m."""
-        line, d = self.line, self.d
-        out = np.zeros((len(self.grid.side_nodes), 2))
+        if self._plain is not None:
+            return self._plain._strains
+        line, out = self.line, np.zeros((len(self.grid.side_nodes), 2))
+        d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
         cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
         sine = np.linalg.norm(cross(d[:-1], d[1:]), axis=1)
         sharp = np.zeros(line.s.size)
@@ -253,13 +276,27 @@ class View:
 
     @cached_property
     def curvature_twist(self) -> Floats:
-        return np.asarray(self.grid.sides @ self._strains)
+        strains = self._strains
+        if self.shift is not None:
+            strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
+        return np.asarray(self.grid.sides @ strains)
+
+    def _curvature_of_moment(self, shift: Shift) -> Floats:
+        """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
+        d, moment = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None], self.node_moment
+        t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
+        t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
+        bending = np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1)
+        side = self.grid.side_nodes
+        EI = shift.stiffness[side]
+        return np.divide(bending[side], EI, out=self._strains[:, 0].copy(), where=EI > 0.0)
 
     @cached_property
     def shear(self) -> Floats:
         Q = np.diff(self.node_moment, axis=0)
         V = cross(self.d, Q) / np.linalg.norm(self.state.e, axis=1)[:, None]
-        V[self.line.spin == 0] = 0.0
+        if self.shift is None:
+            V[self.line.spin == 0] = 0.0
         return np.asarray(np.linalg.norm(self.grid.cells @ V, axis=1))
 
     def bending_moment(self) -> Floats:
@@ -268,7 +305,8 @@ class View:
     def reaction(self, k: int) -> Floats:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
         if self.ends.held[k]:
-            return -self.report[3 * k : 3 * k + 3]
+            force = -self.report[3 * k : 3 * k + 3]
+            return force if self.shift is None else force - self.shift.resultants[k]
         first, out = (0, -1.0) if k == 0 else (-1, 1.0)
         if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
             return self.ends.force[k].copy()
@@ -327,7 +365,10 @@ PROBES: dict[str, Probe] = {
     "touchdown_position": Probe("m", "where they are", _EX, lambda v: v.touchdown.places, "seabed", frame="inertial"),
     "energy/kinetic": Probe("J", "kinetic energy, with rotary inertia", (), lambda v: v.energy[0]),
     "energy/potential": Probe(
-        "J", "potential energy of weight and buoyancy, zero at z = 0", (), lambda v: -np.sum(v.line.force * v.state.r)
+        "J",
+        "potential energy of weight and buoyancy, zero at z = 0",
+        (),
+        lambda v: -np.sum(v.line.force * v.computed.r),
     ),
     "energy/stretch": Probe("J", "energy of stretching", (), lambda v: v.energy[3]),
     "energy/bending": Probe("J", "energy of bending", (), lambda v: v.energy[1], "rod"),
@@ -351,6 +392,33 @@ WORK = {
 }
 
 
+# Probes that a corrected catenary has as a rod has them.
+CORRECTED = ("bending_moment", "moment_start", "moment_end", "shear")
+# What leaving bending out makes of each quantity, by name: unit, description, dimensions.
+MODEL_ERRORS = {
+    "position": ("m", "distance", _S),
+    "tension": ("N", "change of tension", _S),
+    "curvature": ("1/m", "change of curvature", _S),
+    "bending_moment": ("N m", "change of the bending moment", _S),
+    "pull_start": ("N", "change of the force that holds the start, along it", ()),
+    "pull_end": ("N", "change of the force that holds the end, along it", ()),
+}
+
+
+def model_errors(plain: View, corrected: View) -> dict[str, object]:
+    """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not."""
+    out: dict[str, object] = {
+        "position": np.linalg.norm(plain.grid.nodes @ (corrected.state.r - plain.state.r), axis=1),
+        "tension": np.abs(corrected.tension - plain.tension),
+        "curvature": np.abs(corrected.curvature_twist[:, 0] - plain.curvature_twist[:, 0]),
+        "bending_moment": np.abs(corrected.bending_moment() - plain.bending_moment()),
+    }
+    for k, name in enumerate(("pull_start", "pull_end")):
+        sizes = [float(np.linalg.norm(view.reaction(k))) for view in (plain, corrected)]
+        out[name] = abs(sizes[1] - sizes[0])
+    return out
+
+
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
@@ -365,18 +433,25 @@ class Observer:
         kinds: set[str] | None = None,
         criteria: Sequence[tuple[str, str]] = (),
         only: Sequence[str] | None = None,
+        errors: bool = False,
+        corrected: bool = False,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
         criteria: name and description of those that are written as well; `values` gets them; only: names of probes,
         None: all.
+        errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
+        for it.  `values` gets the shift for both.
         """
         self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
         self._loads = tuple(loads)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {
-            name: p for name, p in PROBES.items() if (not p.needs or p.needs in has) and (only is None or name in only)
+            name: p
+            for name, p in PROBES.items()
+            if (not p.needs or p.needs in has or (corrected and name in CORRECTED)) and (only is None or name in only)
         }
+        self._errors, self._corrected = errors, corrected
         self._first_energy: float | None = None
         self._with_work = with_work
         size = {"s": s.size, "xyz": 3, "edge": 2}
@@ -391,6 +466,18 @@ class Observer:
             Field(name, "", f"largest since the last output: {text}", (s.size,), _S)
             for name, (_, text) in zip(self._criteria, criteria, strict=True)
         ]
+        if errors:
+            left = f", what correction leaves of it ({LEFT:g})" if corrected else ""
+            fields += [
+                Field(
+                    f"errors/model/{name}",
+                    unit,
+                    f"{text} by bending that is left out{left}",
+                    (s.size,) * len(dims),
+                    dims,
+                )
+                for name, (unit, text, dims) in MODEL_ERRORS.items()
+            ]
         self.fields = tuple(fields)
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
@@ -406,14 +493,28 @@ class Observer:
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:
-        return [(z.kind, z.s_a, z.s_b) for z in self.zones]
+        names = {"catenary": "corrected"} if self._corrected else {}
+        return [(names.get(z.kind, z.kind), z.s_a, z.s_b) for z in self.zones]
 
     def values(
-        self, ends: Ends, state: State, report: Floats, work: Floats, ratios: Callable[[Floats], Floats] | None = None
+        self,
+        ends: Ends,
+        state: State,
+        report: Floats,
+        work: Floats,
+        ratios: Callable[[Floats], Floats] | None = None,
+        shift: Shift | None = None,
     ) -> dict[str, object]:
-        """All fields at one moment; `work` J in the order of POWERS since the start; ratios: criteria at places, m."""
-        view = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
+        """All fields at one moment; `work` J in the order of POWERS since the start; ratios: criteria at places, m;
+        shift: what bending that is left out would change."""
+        plain = View(self.line, self.sea, self.zones, ends, state, self.grid, report)
+        corrected = plain.corrected(shift) if shift is not None else plain
+        view = corrected if self._corrected else plain
         out = {name: p.value(view) for name, p in self._probes.items()}
+        if self._errors:
+            part = LEFT if self._corrected else 1.0
+            found = model_errors(plain, corrected)
+            out |= {f"errors/model/{name}": part * np.asarray(x) for name, x in found.items()}
         if self._criteria:
             assert ratios is not None
             out |= dict(zip(self._criteria, ratios(self.grid.s), strict=True))

@@ -16,7 +16,20 @@ from hybrid.scene.ends import Ends
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.start_checks import SAME_LENGTH
 from hybrid.scene.table import Finding, Place
-from hybrid.scene.task import AdaptiveModel, Initial, Mesh, Model, Output, RodModel, RodZone, Time, ZonesModel
+from hybrid.scene.task import (
+    AdaptiveModel,
+    CatenaryZone,
+    CorrectedModel,
+    CorrectedZone,
+    Initial,
+    Mesh,
+    Model,
+    Output,
+    RodModel,
+    RodZone,
+    Time,
+    ZonesModel,
+)
 
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
@@ -70,7 +83,10 @@ def _zones_fill(cable: Cable, model: Model) -> Iterator[Finding]:
 
 
 def _zone_length(zone: Any) -> float:
-    return zone.rod if isinstance(zone, RodZone) else zone.catenary
+    for kind in ("rod", "catenary"):
+        if hasattr(zone, kind):
+            return float(getattr(zone, kind))
+    return float(zone.corrected)
 
 
 def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
@@ -92,6 +108,29 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
             yield Finding((*here, "torsional_stiffness"), f"a number > 0, in N m^2, because {over}", fix)
 
 
+def _corrections_know_the_bending(cable: Cable, model: Model) -> Iterator[Finding]:
+    """What is corrected must bend, and the same in all directions: a catenary does not know which way it lies."""
+    zones = model.zones if isinstance(model, ZonesModel) else ()
+    corrected = any(isinstance(z, CorrectedZone) for z in zones)
+    for k, zone in enumerate(zones):
+        if corrected and isinstance(zone, CatenaryZone):
+            fix = "write {corrected: length} for this zone too, or {catenary: length} for all"
+            yield Finding(("model", "zones", k), "no catenary beside a corrected one: a correction shifts all", fix)
+    if not (corrected or isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)):
+        return
+    for i, section in enumerate(cable.sections):
+        here: Place = ("cable", "sections", i)
+        if not section.weakest_bending and not isinstance(model, AdaptiveModel):
+            fix = "add `bending_stiffness: ...` (N m^2), or make the model a catenary"
+            yield Finding((*here, "bending_stiffness"), "a number > 0, in N m^2, because model corrects for it", fix)
+        if section.anisotropic and not isinstance(model, AdaptiveModel):
+            expected = "one number, because a corrected catenary (model) does not know which way its sections lie"
+            yield Finding((*here, "bending_stiffness"), expected, "give one number, or write `model: rod`")
+        if section.intrinsic_curvature and any(section.intrinsic_curvature[:2]):
+            expected = "no curvature, because a corrected catenary (model) does not know which way its sections lie"
+            yield Finding((*here, "intrinsic_curvature"), expected, "leave it out, or write `model: rod`")
+
+
 def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
     if not isinstance(model, AdaptiveModel):
         return
@@ -108,6 +147,9 @@ def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
 def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
     if isinstance(model, AdaptiveModel) and solver == "shooting":
         yield Finding(("solver",), "elimination, because zones move (model)", "or write `model: rod`")
+    zones = model.zones if isinstance(model, ZonesModel) else ()
+    if solver == "shooting" and (isinstance(model, CorrectedModel) or any(isinstance(z, CorrectedZone) for z in zones)):
+        yield Finding(("solver",), "elimination, because the arbiter corrects nothing (model)", "or leave solver out")
 
 
 def _arbiter_steps(time: Time | None, solver: str) -> Iterator[Finding]:
@@ -181,6 +223,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     sea_checks.arbiter_knows,
     _zones_fill,
     _rods_can_bend,
+    _corrections_know_the_bending,
     _stretches_on_cable,
     _zones_that_move,
     _arbiter_steps,

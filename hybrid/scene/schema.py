@@ -35,6 +35,8 @@ from hybrid.scene.task import (
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
+    CorrectedModel,
+    CorrectedZone,
     Equilibrium,
     Initial,
     Mesh,
@@ -50,13 +52,13 @@ from hybrid.scene.task import (
 )
 
 __all__ = [
-    "Accuracy", "AdaptiveModel",
-    "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump", "Current",
-    "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends", "Environment", "Equilibrium", "Float",
-    "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial", "JonswapWaves", "Load", "Mesh", "Model", "Modules",
-    "Motion", "Output", "Pinned", "Points", "PowerLawCurrent", "RegularWaves", "RodModel", "RodZone", "Scene",
-    "Seabed", "Section", "Straight", "Table", "Time", "Travel", "UniformCurrent", "Vector", "Waves", "ZonesModel",
-    "missing_time",
+    "Accuracy",
+    "AdaptiveModel", "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump",
+    "CorrectedModel", "CorrectedZone", "Current", "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends",
+    "Environment", "Equilibrium", "Float", "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial",
+    "JonswapWaves", "Load", "Mesh", "Model", "Modules", "Motion", "Output", "Pinned", "Points", "PowerLawCurrent",
+    "RegularWaves", "RodModel", "RodZone", "Scene", "Seabed", "Section", "Straight", "Table", "Time", "Travel",
+    "UniformCurrent", "Vector", "Waves", "ZonesModel", "missing_time",
 ]  # fmt: skip
 
 

@@ -140,26 +140,41 @@ class CatenaryZone(Table):
     ratio: Positive | None = Field(default=None, description=_RATIO)
 
 
+class CorrectedZone(Table):
+    """A stretch that carries tension only, its results corrected for the bending left out."""
+
+    corrected: Positive = Field(description="unstretched length of this corrected catenary zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+_ZONES: dict[str, type[Table]] = {"rod": RodZone, "catenary": CatenaryZone, "corrected": CorrectedZone}
+
+
 def _zone_tag(value: Any) -> str:
-    rod = "rod" in value if isinstance(value, Mapping) else isinstance(value, RodZone)
-    return "<rod zone>" if rod else "<catenary zone>"
+    for kind, table in _ZONES.items():
+        if kind in value if isinstance(value, Mapping) else isinstance(value, table):
+            return f"<{kind} zone>"
+    return "<catenary zone>"
 
 
 def _one_zone_kind(value: Any) -> Any:
-    """Every zone says either rod or catenary: the key is its kind and the value its length."""
-    if isinstance(value, RodZone | CatenaryZone):
+    """Every zone says rod, catenary or corrected: the key is its kind and the value its length."""
+    if isinstance(value, RodZone | CatenaryZone | CorrectedZone):
         return value
     fix = "write {rod: length} or {catenary: length}"
     if not isinstance(value, Mapping):
         refuse([Finding((), "a zone", fix)])
-    kinds = [kind for kind in ("rod", "catenary") if kind in value]
+    kinds = [kind for kind in _ZONES if kind in value]
     if len(kinds) != 1:
-        refuse([Finding((), "either rod or catenary, with the length of the zone in m", fix)])
+        refuse([Finding((), "either rod or catenary (or corrected), with the length of the zone in m", fix)])
     return value
 
 
 Zone = Annotated[
-    Annotated[RodZone, Tag("<rod zone>")] | Annotated[CatenaryZone, Tag("<catenary zone>")],
+    Annotated[RodZone, Tag("<rod zone>")]
+    | Annotated[CatenaryZone, Tag("<catenary zone>")]
+    | Annotated[CorrectedZone, Tag("<corrected zone>")],
     Discriminator(_zone_tag),
     BeforeValidator(_one_zone_kind),
 ]
@@ -178,6 +193,16 @@ class CatenaryModel(Table):
     """The whole cable is perfectly flexible."""
 
     kind: Literal["catenary"] = Field(default="catenary", description="tension only")
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+class CorrectedModel(Table):
+    """The whole cable is a catenary, its results corrected for the bending left out."""
+
+    kind: Literal["corrected"] = Field(
+        default="corrected",
+        description="tension only; position, tension, curvature and moment corrected for the bending left out",
+    )
     slack: Slack = Field(default="stop", description=_SLACK)
 
 
@@ -225,6 +250,11 @@ class AdaptiveModel(Table):
         description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
         "of the catenary's curvature, relaxed in time (curvature)",
     )
+    correct: bool = Field(
+        default=False,
+        description="results corrected for the bending that catenary zones leave out, and criteria that count what "
+        "is left after it",
+    )
 
 
 def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
@@ -238,11 +268,12 @@ def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
 Model = Annotated[
     Annotated[RodModel, Tag("<rod>")]
     | Annotated[CatenaryModel, Tag("<catenary>")]
+    | Annotated[CorrectedModel, Tag("<corrected>")]
     | Annotated[ZonesModel, Tag("<zones>")]
     | Annotated[AdaptiveModel, Tag("<adaptive>")],
     Discriminator(by_kind),
     Kinds(
-        ("rod", "catenary", "zones", "adaptive"),
+        ("rod", "catenary", "corrected", "zones", "adaptive"),
         usual=("adaptive", "rod", "catenary"),
         implied=(("zones", "zones"), *((key, "adaptive") for key in AdaptiveModel.model_fields if key != "kind")),
     ),

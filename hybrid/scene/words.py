@@ -72,6 +72,7 @@ OTHER_KIND = {
     ("rod", "slack"): "a rod may go slack; leave slack out",
     ("rod", "zones"): "use kind: zones",
     ("catenary", "zones"): "use kind: zones",
+    ("corrected", "zones"): "use kind: zones",
 }
 
 # A larger number would not help, as an example of how to write it.

@@ -118,7 +118,7 @@ def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
 
 @kernel
 def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, before, rho, was, now, A):
-    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, that led to (r, e, v, vd, T, a1).
+    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, to (r, e, v, vd, T, a1).
 
     A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
     of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the

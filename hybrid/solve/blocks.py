@@ -12,6 +12,13 @@ case ck = 0 and nothing else.  W holds one block row, five rows of
 After elimination  x_i = X_i[8] - X_i[0..4] x_{i+1} - X_i[5..7] dr_{i+2}:  the linear
 relation that everything before node i imposes on what follows (docs/theory.md, 5).
 Rows without bending have four unknowns and take a path of their own in the same march.
+
+Where X has room for more than the X_i, the march keeps there what another right-hand side of the same
+matrix needs (`again`): KEPT numbers a block,
+
+    wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
+    narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
+    both     62 unit of the length row;  63 whether it is wide
 """
 
 from __future__ import annotations
@@ -24,6 +31,7 @@ SIZE = 5  # unknowns of a block
 WIDTH = 24  # columns of W
 SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
+KEPT = 64  # numbers kept of a block, for another right-hand side
 
 
 @inner
@@ -150,12 +158,24 @@ def solve_block(W, X, i):
 
 
 @inner
-def eliminate_wide(W, X, i):
-    """Eliminate block row i (5 unknowns); False when the block is singular."""
+def eliminate_wide(W, X, i, kept, size):
+    """Eliminate block row i (5 unknowns); False when the block is singular.
+
+    kept: where its factors go in X, 0: nowhere; size: unit of its length row.
+    """
+    if kept > 0:
+        for r in range(1, 4):
+            for j in range(4):
+                X[kept + 4 * (r - 1) + j] = W[r * WIDTH + 1 + j]
+        X[kept + 62], X[kept + 63] = size, 1.0
     if i >= 2:
         for r in range(1, 4):  # only the balance of the node reaches back to block i-2
             o = r * WIDTH
             W[o + 23] -= take(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
+    if kept > 0:
+        for r in range(SIZE):
+            for j in range(SIZE):
+                X[kept + 12 + SIZE * r + j] = W[r * WIDTH + 5 + j]
     if i >= 1:
         for r in range(SIZE):
             o = r * WIDTH
@@ -163,12 +183,16 @@ def eliminate_wide(W, X, i):
             W[o + 23] -= take(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
             if l0 != 0.0:  # the balance of the node, through block i-2
                 W[o + 23] -= take_tension(W, o + 10, X, i - 1, l0)
+    if kept > 0:
+        for r in range(SIZE):
+            for j in range(SIZE):
+                X[kept + 37 + SIZE * r + j] = W[r * WIDTH + 10 + j]
     return solve_block(W, X, i)
 
 
 @inner
-def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i):
-    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.
+def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
+    """Eliminate a block of four unknowns (dT_{i-1}, dr_i); X_i keeps zeros elsewhere.  kept, size: as of a wide one.
 
     length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
     balance  L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} = b
@@ -185,6 +209,15 @@ def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i):
         A1 = less(A1, (L[0], L[1], L[2]), X, p, q, s)
         A2 = less(A2, (L[3], L[4], L[5]), X, p, q, s)
         A3 = less(A3, (L[6], L[7], L[8]), X, p, q, s)
+    if kept > 0:
+        for j in range(9):
+            X[kept + j] = L[j]
+        X[kept + 9], X[kept + 10], X[kept + 11] = row
+        X[kept + 12], X[kept + 13], X[kept + 14], X[kept + 15] = A0[0], A0[1], A0[2], A0[3]
+        X[kept + 16], X[kept + 17], X[kept + 18], X[kept + 19] = A1[0], A1[1], A1[2], A1[3]
+        X[kept + 20], X[kept + 21], X[kept + 22], X[kept + 23] = A2[0], A2[1], A2[2], A2[3]
+        X[kept + 24], X[kept + 25], X[kept + 26], X[kept + 27] = A3[0], A3[1], A3[2], A3[3]
+        X[kept + 62], X[kept + 63] = size, 0.0
     B0 = (A0[0], A0[1], A0[2], A0[3], 0.0, 0.0, 0.0, 0.0, A0[4])
     B1 = (A1[0], A1[1], A1[2], A1[3], ahead[0], U[0], U[1], U[2], A1[4])
     B2 = (A2[0], A2[1], A2[2], A2[3], ahead[1], U[3], U[4], U[5], A2[4])
@@ -285,4 +318,127 @@ def substitute(X, x):
             total += abs(x[i, k])
         z0, z1, z2 = y[1], y[2], y[3]
         y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    return total < math.inf
+
+
+@inner
+def solve4(A0, A1, A2, A3):
+    """Four unknowns from four rows (five numbers, the last the right-hand side), with pivoting."""
+    if abs(A1[0]) > abs(A0[0]):
+        A0, A1 = A1, A0
+    if abs(A2[0]) > abs(A0[0]):
+        A0, A2 = A2, A0
+    if abs(A3[0]) > abs(A0[0]):
+        A0, A3 = A3, A0
+    i0 = 1.0 / A0[0]
+    f1, f2, f3 = i0 * A1[0], i0 * A2[0], i0 * A3[0]
+    B1 = (A1[1] - f1 * A0[1], A1[2] - f1 * A0[2], A1[3] - f1 * A0[3], A1[4] - f1 * A0[4])
+    B2 = (A2[1] - f2 * A0[1], A2[2] - f2 * A0[2], A2[3] - f2 * A0[3], A2[4] - f2 * A0[4])
+    B3 = (A3[1] - f3 * A0[1], A3[2] - f3 * A0[2], A3[3] - f3 * A0[3], A3[4] - f3 * A0[4])
+    if abs(B2[0]) > abs(B1[0]):
+        B1, B2 = B2, B1
+    if abs(B3[0]) > abs(B1[0]):
+        B1, B3 = B3, B1
+    i1 = 1.0 / B1[0]
+    f2, f3 = i1 * B2[0], i1 * B3[0]
+    C2 = (B2[1] - f2 * B1[1], B2[2] - f2 * B1[2], B2[3] - f2 * B1[3])
+    C3 = (B3[1] - f3 * B1[1], B3[2] - f3 * B1[2], B3[3] - f3 * B1[3])
+    if abs(C3[0]) > abs(C2[0]):
+        C2, C3 = C3, C2
+    i2 = 1.0 / C2[0]
+    f3 = i2 * C3[0]
+    x3 = (C3[2] - f3 * C2[2]) / (C3[1] - f3 * C2[1])
+    x2 = i2 * (C2[2] - C2[1] * x3)
+    x1 = i1 * (B1[3] - B1[1] * x2 - B1[2] * x3)
+    x0 = i0 * (A0[4] - A0[1] * x1 - A0[2] * x2 - A0[3] * x3)
+    return x0, x1, x2, x3
+
+
+@inner
+def solve5(X, k, W, x, i):
+    """x_i from the pivot block kept at X[k:] and the right-hand side in x_i; W: room for 30 numbers."""
+    for r in range(SIZE):
+        for j in range(SIZE):
+            W[6 * r + j] = X[k + SIZE * r + j]
+        W[6 * r + 5] = x[i, r]
+    for c in range(SIZE):
+        best, where = abs(W[7 * c]), c
+        for r in range(c + 1, SIZE):
+            if abs(W[6 * r + c]) > best:
+                best, where = abs(W[6 * r + c]), r
+        if where != c:
+            for j in range(c, 6):
+                W[6 * c + j], W[6 * where + j] = W[6 * where + j], W[6 * c + j]
+        for r in range(c + 1, SIZE):
+            f = W[6 * r + c] / W[7 * c]
+            for j in range(c + 1, 6):
+                W[6 * r + j] -= f * W[6 * c + j]
+    for c in range(SIZE - 1, -1, -1):
+        y = W[6 * c + 5]
+        for j in range(c + 1, SIZE):
+            y -= W[6 * c + j] * x[i, j]
+        x[i, c] = y / W[7 * c]
+
+
+@kernel
+def again(X, W, b, x):
+    """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
+
+    b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles
+    them; of a held node nothing, because it stays.  x as in `substitute`; False if it is not finite.
+    """
+    n = x.shape[0] - 1
+    for i in range(n + 1):
+        k = (n + 1) * ROW + i * KEPT
+        size = X[k + 62]
+        if X[k + 63] > 0.0:
+            x[i, 0], x[i, 4] = size * b[i, 0], b[i, 4]
+            for r in range(3):
+                y = b[i, r + 1]
+                if i >= 2:
+                    for j in range(4):
+                        y -= X[k + 4 * r + j] * x[i - 2, j + 1]
+                x[i, r + 1] = y
+            if i >= 1:
+                for r in range(SIZE):
+                    y = x[i, r]
+                    for j in range(SIZE):
+                        y -= X[k + 12 + SIZE * r + j] * x[i - 1, j]
+                    x[i, r] = y
+            solve5(X, k + 37, W, x, i)
+        else:
+            b0, b1, b2, b3 = size * b[i, 0], b[i, 1], b[i, 2], b[i, 3]
+            if i >= 1:
+                y0, y1, y2 = x[i - 1, 1], x[i - 1, 2], x[i - 1, 3]
+                b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
+                b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
+                b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
+                b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
+            x[i, 0], x[i, 1], x[i, 2], x[i, 3] = solve4(
+                (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
+                (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
+                (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
+                (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
+            )
+            x[i, 4] = 0.0
+    total = 0.0
+    for i in range(n - 1, -1, -1):
+        p = i * ROW
+        if X[(n + 1) * ROW + i * KEPT + 63] > 0.0:
+            for j in range(SIZE):
+                q = p + SPAN * j
+                y = x[i, j]
+                for m in range(SIZE):
+                    y -= X[q + m] * x[i + 1, m]
+                if i + 2 <= n:
+                    y -= X[q + 5] * x[i + 2, 1] + X[q + 6] * x[i + 2, 2] + X[q + 7] * x[i + 2, 3]
+                x[i, j] = y
+                total += abs(y)
+        else:
+            y0, y1, y2, y3 = x[i + 1, 0], x[i + 1, 1], x[i + 1, 2], x[i + 1, 3]
+            for j in range(SIZE - 1):
+                q = p + SPAN * j
+                y = x[i, j] - X[q] * y0 - X[q + 1] * y1 - X[q + 2] * y2 - X[q + 3] * y3
+                x[i, j] = y
+                total += abs(y)
     return total < math.inf

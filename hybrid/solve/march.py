@@ -34,7 +34,7 @@ from hybrid.physics.rotations import (
     scale,
     sub,
 )
-from hybrid.solve.blocks import ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
+from hybrid.solve.blocks import KEPT, ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
 from hybrid.solve.node import Z3, Z9, get3, node_loads
 
 REPORT, STEP_REPORT = 33, 22  # numbers of `report`; those from 22 on are not the march's
@@ -71,8 +71,12 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
     with N+1 entries receives every assembled block row before elimination (for tests
     and independent solvers); with none it is not touched.  `gaps` with N entries stands
     in for the change of length asked of inextensible cells; with none, the law of length does.
+    An X with room for more keeps the factors for another right-hand side (solve.blocks).
     """
     n = e.shape[0]
+    kept, next_kept = 0, 0
+    if X.shape[0] > (n + 1) * ROW:
+        kept, next_kept = (n + 1) * ROW, KEPT
     bits = line.bits
     moving = bits & (ROTARY | STIFFNESS_DAMPING)
     for j in range(STEP_REPORT):
@@ -282,18 +286,21 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
             for j in range(6, 14):
                 W[j] *= size
             W[23] *= size
-            good = eliminate_wide(W, X, i)
+            good = eliminate_wide(W, X, i, kept, size)
         else:
             sized = (size * row_before[0], size * row_before[1], size * row_before[2])
             hck_sized, gap_sized = size * hck_before, size * gap_before
             if held:
                 one = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
-                good = eliminate_narrow(sized, hck_sized, gap_sized, Z3, Z9, one, Z3, Z9, rhs, X, i)
+                good = eliminate_narrow(sized, hck_sized, gap_sized, Z3, Z9, one, Z3, Z9, rhs, X, i, kept, size)
             else:
                 back = scale(-1.0, d_before)
-                good = eliminate_narrow(sized, hck_sized, gap_sized, back, mscale(-1.0, G1), Dii, d, G2, rhs, X, i)
+                good = eliminate_narrow(
+                    sized, hck_sized, gap_sized, back, mscale(-1.0, G1), Dii, d, G2, rhs, X, i, kept, size
+                )
         if not good:
             return i
+        kept += next_kept
 
         # --- step along s
         if i == n - 1:
@@ -307,11 +314,11 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
     return -1
 
 
-def workspace(n_cells: int):
-    """Arrays the march needs: W, X, x, report, and an empty `rows` and `gaps`."""
+def workspace(n_cells: int, keep: bool = False):
+    """Arrays the march needs: W, X (with room for the factors, if kept), x, report, and an empty `rows` and `gaps`."""
     return (
         np.zeros(SIZE * WIDTH),
-        np.zeros((n_cells + 1) * ROW),
+        np.zeros((n_cells + 1) * (ROW + KEPT if keep else ROW)),
         np.zeros((n_cells + 1, SIZE)),
         np.zeros(REPORT),
         np.zeros((0, SIZE * WIDTH)),

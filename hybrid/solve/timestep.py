@@ -75,12 +75,15 @@ OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
 class Stepper:
     """Takes steps of one line; owns the work arrays, not the state."""
 
-    def __init__(self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf) -> None:
+    def __init__(
+        self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf, keep: bool = False
+    ) -> None:
+        """keep: whether the factors of the last matrix are kept for another right-hand side (`solve.corrector`)."""
         self.line = line
         self.reach, self.scale = REACH * length, tension_scale
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
         n = line.h.size
-        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
+        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n, keep)
         self.u = np.zeros((n + 1, 3))
         self.push: Push | None = None  # out of the plane, of a planar motion that is watched
         self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers

@@ -92,7 +92,7 @@ def eliminate(rows, W, X):
     for i in range(rows.shape[0]):
         for j in range(rows.shape[1]):
             W[j] = rows[i, j]
-        if not eliminate_wide(W, X, i):
+        if not eliminate_wide(W, X, i, 0, 1.0):
             return False
     return True
 

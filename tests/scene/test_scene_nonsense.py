@@ -24,16 +24,23 @@ ADAPTIVE = (
     OCEAN.replace(
         "model: {kind: catenary}",
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
-        "always_catenary: [[200.0, 250.0]], joint: curvature}",
+        "always_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
     )
     + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%}\n"
 )
+CORRECTED = """\
+cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: zones, zones: [{corrected: 4.0}, {rod: 6.0}]}
+"""
 TEXTS = {
     "adaptive": ADAPTIVE,
     "everything": EVERYTHING,
     "everything else": EVERYTHING_ELSE,
     "ocean": OCEAN,
     "at rest": AT_REST,
+    "corrected": CORRECTED,
 } | SEAS
 
 
@@ -98,7 +105,14 @@ def _say(name: str, path: tuple[str | int, ...], nonsense: str) -> list[Any]:
 
 def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
     """A title may be any line, true is a word for swivel and criteria, and damping may be an empty table."""
-    harmless = {"title": ("nonsense",), "swivel": (True,), "criteria": (True,), "errors": (True,), "damping": ({},)}
+    harmless = {
+        "title": ("nonsense",),
+        "swivel": (True,),
+        "criteria": (True,),
+        "correct": (True,),
+        "errors": (True,),
+        "damping": ({},),
+    }
     return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
 
 
@@ -141,7 +155,7 @@ def _loaded(name: str) -> Any:
 
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
-SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "errors"}
+SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "correct", "errors"}
 SIGNED |= {"z", "slope", "surface", "top", "bottom", "turn", "near", "thrust", "by", "shape"}
 
 

@@ -168,7 +168,7 @@ def _zones(scene: Scene, length: float) -> list[tuple[bool, Array]]:
     total, grading = (None, None) if mesh is None else (mesh.cells, mesh.ratio)
     if isinstance(model, ZonesModel):
         kinds = [isinstance(z, RodZone) for z in model.zones]
-        spans = [z.rod if isinstance(z, RodZone) else z.catenary for z in model.zones]
+        spans = [z.rod if isinstance(z, RodZone) else getattr(z, "catenary", 0.0) for z in model.zones]
         wanted = [(z.cells, z.ratio) for z in model.zones]
         if grading is not None and len(kinds) > 1:
             raise refuse("mesh.ratio", grading, "one zone, or a ratio in every zone", "move ratio into the zones")
