@@ -107,7 +107,10 @@ def run(
         if facts:
             say.show(lambda: _zones_said(facts, target))
         errors = _errors(result)
-        say.show(lambda: _errors_said(errors, result))
+        if errors:
+            say.show(lambda: _errors_said(errors, result))
+        else:
+            text += "; error not estimated"
         facts |= {"errors": errors}
         say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
@@ -131,7 +134,8 @@ def static(
         facts = _equilibrium(result)
         errors = _errors(result)
         say.show(lambda: _equilibrium_table(facts))
-        say.show(lambda: _errors_said(errors, result))
+        if errors:
+            say.show(lambda: _errors_said(errors, result))
         facts |= {"errors": errors}
         say.events(result.events)
         say.done(f"equilibrium in {span(wall)} of wall time", target, picture, status=result.status, wall=wall, **facts)
@@ -316,8 +320,6 @@ def _errors(result: Result) -> dict[str, float]:
 
 def _errors_said(errors: dict[str, float], result: Result) -> str:
     """The same in words, with what was asked."""
-    if not errors:
-        return "error: not estimated; accuracy: 1%, or output.errors: true, asks for it"
     pulls = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in pulls), default=0.0)
     said = []

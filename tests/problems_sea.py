@@ -492,6 +492,7 @@ def sinker(what: str, steps: int, times: float) -> tuple[Scene, float, float, fl
             thin, *ends, fluid={"density": RHO}, model=model, cells=cells, attachments=attachments,
             initial={"kind": "straight", "direction": direction, "origin": ORIGIN},
             time={"duration": times * scale, "step": scale / steps}, output={"points": 3, "every": scale / 10},
+            dimension=3,  # in a plane it is seen that end-on is not stable
         ), U, w / m, scale,
     )  # fmt: skip
 

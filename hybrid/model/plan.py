@@ -118,7 +118,7 @@ def plan(scene: Scene) -> Plan:
     names = {"catenary": "corrected"} if model.corrected else {}
     zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     per_step = COST_STEP + (COST_MANAGER if model.layout is not None else 0.0)
-    outputs = len(output_times(scene)) if scene.time else 0
+    outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
     seconds = steps * (USUAL_ITERATIONS * each + per_step) + outputs * COST_OUTPUT
     seconds *= COST_ERRORS if wants_errors(scene) else 1.0
     return Plan(
