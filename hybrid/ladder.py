@@ -45,8 +45,10 @@ WARM_PART = 0.02
 FINENESS = ("kind", "tolerance", "rod_cell", "dwell")
 COMPARED = ("position", "reaction_start", "reaction_end")
 PULLS = COMPARED[1:]
-# What can change an answer, in the package: not how it is shown or ranked.
-SHOWS = ("__init__.py", "cli.py", "live.py", "ladder.py", "machine.py", "peers.py", "results")
+# Files of the package that change no answer, only how it is shown or ranked.
+SHOWS = frozenset(
+    ("__init__", "cli", "live", "ladder", "machine", "peers", "look", "views", "panels", "plot", "zoneplot")
+) | {"tradetable", "tradeplot"}
 
 
 @dataclass(frozen=True)
@@ -303,19 +305,19 @@ class _Desk:
         except (OSError, ValueError, TypeError):  # absent, or of another version: it is made again
             return None
 
-    def keep(self, row: Row, values: Mapping[str, np.ndarray]) -> None:
-        """Keep a run; its JSON comes last and at once, so that what is there is whole.
-
-        Six digits are enough for errors of a ten-thousandth, and half the room.
+    def keep(self, row: Row, values: Mapping[str, np.ndarray]) -> tuple[Row, dict[str, np.ndarray]]:
+        """Keep a run, and return it as a later call will find it.  Its JSON comes last and at once, so that what is
+        there is whole; seven digits are enough for errors of a ten-thousandth, and half the room.
         """
         runs = self.folder / "runs"
-        if values:
-            half = {name: np.asarray(x, dtype=np.float32) for name, x in values.items()}
+        half = {name: np.asarray(x, dtype=np.float32) for name, x in values.items()}
+        if half:
             with (runs / f"{row.key}.npz").open("wb") as file:
                 np.savez_compressed(file, **half)  # type: ignore[arg-type]
         draft = runs / f"{row.key}.part"
         draft.write_text(json.dumps(asdict(row), indent=1) + "\n", encoding="utf-8")
         draft.replace(runs / f"{row.key}.json")
+        return row, half
 
     def _made(self, row: Row, rung: _Rung, scene: Scene, must: bool) -> tuple[Row, dict[str, np.ndarray]]:
         spent, result = [], None
@@ -331,9 +333,7 @@ class _Desk:
             if must:
                 detail = f"this was the reference, {rung.name}, without which nothing can be compared; {error.detail}"
                 raise ComputationError(error.outcome, error.t, error.s, detail.rstrip("; ")) from None
-            row = replace(row, cause=str(error).splitlines()[0])
-            self.keep(row, {})
-            return row, {}
+            return self.keep(replace(row, cause=str(error).splitlines()[0]), {})
         except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
             if must:
                 raise
@@ -341,9 +341,8 @@ class _Desk:
         assert result is not None
         values = {name: np.array(result[name]) for name in COMPARED if name in result}
         row = replace(_told_by(result, row), cpu=median(spent))
-        self.keep(row, values)
         self.made += 1
-        return row, values
+        return self.keep(row, values)
 
     def _follow(self, what: str) -> Callable[[Progress], None]:
         def follow(progress: Progress) -> None:
@@ -374,7 +373,7 @@ def _key(scene: Scene, repeat: int) -> str:
     package = Path(__file__).parent
     for source in sorted(package.rglob("*.py")):
         place = source.relative_to(package)
-        if place.parts[0] not in SHOWS:
+        if place.stem not in SHOWS:
             digest.update(place.as_posix().encode() + source.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -435,13 +434,12 @@ def _of_guest(desk: _Desk, guest: others.Guest, repeat: int, scene: Scene, truth
         try:
             answers = [others.answer(guest, scene) for _ in range(repeat)]
         except others.Failed as error:
-            desk.keep(replace(row, cause=str(error)), {})
-            found = replace(row, cause=str(error)), {}
+            found = desk.keep(replace(row, cause=str(error)), {})
         else:
             values = answers[-1].values
             row = replace(row, status=DONE, cells=guest.elements, steps=answers[-1].steps)
-            found = replace(row, cpu=median(x.cpu for x in answers)), values
-            desk.keep(*found)
+            found = desk.keep(replace(row, cpu=median(x.cpu for x in answers)), values)
+            desk.made += 1
     desk.done += 1
     return against(found[0], found[1], truth, scene.length) if found[1] else found[0]
 
