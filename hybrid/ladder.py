@@ -132,7 +132,7 @@ def trade(
         found.sort(key=lambda row: _order(row, kinds))
         table = TradeTable(
             scene.title, asked_for, scene.length, largest, position, pull, tuple(found), tuple(notes),
-            (*desk.facts, *_measured(desk, repeat, command)), desk.total - len(rows),
+            (*desk.facts, *_measured(desk, repeat, command, guests)), desk.total - len(rows),
         )  # fmt: skip
         table.write(desk.folder, "trade.png")
         plot_trade(table, desk.folder / "trade.png")
@@ -363,9 +363,9 @@ class _Desk:
             run(validate_scene(data))
 
 
-def _key(scene: Scene, repeat: int) -> str:
+def _key(scene: Scene, repeat: int, also: str = "") -> str:
     """Of all that decides what a run finds: the scene, files it reads, the package, how often it is timed."""
-    digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}\n{scene_text(scene)}".encode())
+    digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
     for end in (scene.ends.start, scene.ends.end):
         file = getattr(getattr(end, "motion", None), "file", None)
         if file is not None:
@@ -424,7 +424,9 @@ def _largest_pull(truth: Mapping[str, np.ndarray]) -> float | None:
 
 def _of_guest(desk: _Desk, guest: others.Guest, repeat: int, scene: Scene, truth: Mapping[str, np.ndarray]) -> Row:
     """The row of another program, kept as ours are."""
-    row = Row(guest.code, guest.model, guest.told, FAILED, guest.cannot, key=_key(scene, repeat) + guest.tag)
+    row = Row(
+        guest.code, guest.model, guest.told, FAILED, guest.cannot, key=_key(scene, repeat, guest.driver) + guest.tag
+    )
     if guest.cannot:
         desk.done += 1
         return replace(row, status=others.CANNOT)
@@ -444,9 +446,10 @@ def _of_guest(desk: _Desk, guest: others.Guest, repeat: int, scene: Scene, truth
     return against(found[0], found[1], truth, scene.length) if found[1] else found[0]
 
 
-def _measured(desk: _Desk, repeat: int, command: str) -> list[tuple[str, str]]:
+def _measured(desk: _Desk, repeat: int, command: str, guests: Sequence[others.Guest]) -> list[tuple[str, str]]:
     """How costs were measured, for the heading."""
     count = "one run each" if repeat == 1 else f"median of {repeat} runs"
     made = "all made by this call" if desk.made == desk.done else f"{desk.made} of {desk.done} made by this call"
-    said = [("command", f"`{command}`")] if command else []
+    said = [("other programs", found)] if (found := others.versions(guests)) else []
+    said += [("command", f"`{command}`")] if command else []
     return [*said, ("CPU time", f"of the process, kernels loaded beforehand; {count}; {made}")]

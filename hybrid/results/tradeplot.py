@@ -25,6 +25,8 @@ _GUEST_MARKS = ("P", "X", "*", "p")
 _MET, STAR = "#009E73", "#F0E442"
 _BESIDE = 1.8  # of the smallest and largest value, times that which an axis leaves beside them
 _LEAST_DECADES = 1.0  # a vertical axis spans at least so many, or differences of a few per cent would look like much
+# Where the accuracy stands beside its point, in points of type, by model: lines that cross do not hide both.
+_BESIDE_A_POINT = ((7, 2), (-7, -6), (7, -8), (-7, 4))
 Figures = Callable[[Row], float | None]
 
 
@@ -90,7 +92,14 @@ def panel(ax: Axes, table: TradeTable, figure_of: Figures, named: bool = False) 
         for row in rows if named else ():
             here = (row.cpu or 0.0, figure_of(row) or 0.0)
             said = row.asked if ours else row.asked.split(",")[0]
-            ax.annotate(said, here, (6, 3), textcoords="offset points", fontsize=SMALL - 1.0, color=colour, zorder=6)
+            side, up = _BESIDE_A_POINT[list(groups).index((code, model)) % len(_BESIDE_A_POINT)]
+            look: dict[str, Any] = {
+                "fontsize": SMALL - 1.0,
+                "color": colour,
+                "zorder": 6,
+                "ha": "left" if side > 0 else "right",
+            }
+            ax.annotate(said, here, (side, up), textcoords="offset points", **look)
     hollow = {"linestyle": "", "markerfacecolor": "none", "markeredgecolor": INK, "markeredgewidth": 0.9}
     front = [row for row in table.front() if figure_of(row)]
     _points(ax, front, figure_of, marker="o", markersize=10, zorder=4, label="front", **hollow)
