@@ -51,7 +51,7 @@ second call makes those that are missing, after Ctrl-C for instance. In Python:
     table = hybrid.trade(hybrid.load_scene("scene.yaml"), "scene.trade")
     table.recommended, table.front(), table.rows
 
-Other programs run in processes of their own (`hybrid/peers.py` has an adapter for each): a uniform line between two
+Other programs run in processes of their own (`hybrid/peers/` has an adapter for each): a uniform line between two
 points that are held or moved, in still water, on a level seabed. Their CPU time holds their search for the rest, too.
 
 The sections below are the pages that the program has written for example scenes:

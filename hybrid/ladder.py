@@ -23,6 +23,7 @@ import hybrid.peers as others
 from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.machine import facts_of_machine
 from hybrid.model.effort import Asked, asked
+from hybrid.model.plan import output_times
 from hybrid.results.read import Result
 from hybrid.results.tradeplot import plot_trade
 from hybrid.results.tradetable import CHECK, DONE, FAILED, MISSED, OURS, REFERENCE, Row, TradeTable, judged
@@ -46,9 +47,10 @@ FINENESS = ("kind", "tolerance", "rod_cell", "dwell")
 COMPARED = ("position", "reaction_start", "reaction_end")
 PULLS = COMPARED[1:]
 # Files of the package that change no answer, only how it is shown or ranked.
-SHOWS = frozenset(
-    ("__init__", "cli", "live", "ladder", "machine", "peers", "look", "views", "panels", "plot", "zoneplot")
-) | {"tradetable", "tradeplot"}
+SHOWS = frozenset(("__init__", "cli", "live", "ladder", "machine", "look", "views", "panels", "plot", "zoneplot")) | {
+    "tradetable",
+    "tradeplot",
+}
 
 
 @dataclass(frozen=True)
@@ -373,7 +375,7 @@ def _key(scene: Scene, repeat: int, also: str = "") -> str:
     package = Path(__file__).parent
     for source in sorted(package.rglob("*.py")):
         place = source.relative_to(package)
-        if place.stem not in SHOWS:
+        if place.stem not in SHOWS and place.parts[0] != "peers":
             digest.update(place.as_posix().encode() + source.read_bytes())
     return digest.hexdigest()[:16]
 
@@ -399,7 +401,7 @@ def _compared(
 def against(row: Row, values: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], length: float) -> Row:
     """The row with its errors: outputs (nt, ...) of the run and of the reference, at the same times and places."""
     position = float(np.linalg.norm(values["position"] - truth["position"], axis=-1).max())
-    pulls = [_apart(values[x], truth[x]) for x in PULLS if x in values and x in truth]
+    pulls = [float(_apart(values[x], truth[x]).max()) for x in PULLS if x in values and x in truth]
     row = replace(row, position=position, position_part=position / length)
     largest = _largest_pull(truth)
     if not pulls or not largest:
@@ -407,11 +409,11 @@ def against(row: Row, values: Mapping[str, np.ndarray], truth: Mapping[str, np.n
     return replace(row, pull=max(pulls), pull_part=max(pulls) / largest)
 
 
-def _apart(force: np.ndarray, truth: np.ndarray) -> float:
-    """The largest difference of two forces (nt, 3), N; of their sizes, where only that is known (nt, 1)."""
+def _apart(force: np.ndarray, truth: np.ndarray) -> np.ndarray:
+    """Difference (nt,) of two forces (nt, 3), N; of their sizes, where only that is known (nt, 1)."""
     if force.shape[-1] == 1:
-        return float(np.abs(np.abs(force[:, 0]) - np.linalg.norm(truth, axis=-1)).max())
-    return float(np.linalg.norm(force - truth, axis=-1).max())
+        return np.asarray(np.abs(np.abs(force[:, 0]) - np.linalg.norm(truth, axis=-1)))
+    return np.asarray(np.linalg.norm(force - truth, axis=-1))
 
 
 def _largest_pull(truth: Mapping[str, np.ndarray]) -> float | None:
@@ -425,7 +427,12 @@ def _largest_pull(truth: Mapping[str, np.ndarray]) -> float | None:
 def _of_guest(desk: _Desk, guest: others.Guest, repeat: int, scene: Scene, truth: Mapping[str, np.ndarray]) -> Row:
     """The row of another program, kept as ours are."""
     row = Row(
-        guest.code, guest.model, guest.told, FAILED, guest.cannot, key=_key(scene, repeat, guest.driver) + guest.tag
+        guest.code,
+        guest.model,
+        guest.told,
+        FAILED,
+        guest.cannot,
+        key=_key(scene, repeat, others.driver(guest)) + guest.tag,
     )
     if guest.cannot:
         desk.done += 1
@@ -443,7 +450,13 @@ def _of_guest(desk: _Desk, guest: others.Guest, repeat: int, scene: Scene, truth
             found = desk.keep(replace(row, cpu=median(x.cpu for x in answers)), values)
             desk.made += 1
     desk.done += 1
-    return against(found[0], found[1], truth, scene.length) if found[1] else found[0]
+    if not found[1]:
+        return found[0]
+    pulls = np.max([_apart(found[1][x], truth[x]) for x in PULLS], axis=0)
+    # A jolt at the start, or one blow, is another matter than an error that lasts.
+    worst, usual = [0.0, *output_times(scene)][int(pulls.argmax())], float(np.median(pulls))
+    cause = f"its pull is furthest off at t = {worst:g} s, usually by {usual:.3g} N"
+    return against(replace(found[0], cause=cause), found[1], truth, scene.length)
 
 
 def _measured(desk: _Desk, repeat: int, command: str, guests: Sequence[others.Guest]) -> list[tuple[str, str]]:

@@ -77,7 +77,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
         "live",
     ),
     "arbitrate": ("errors", "scene", "model", "solve/shooting", "results"),
-    "peers": ("scene", "model", "results/probes"),
+    "peers": ("scene", "model", "results/probes", "peers"),
     "machine": (),
     "ladder": ("errors", "scene", "model", "results", "simulate", "peers", "machine"),
     "live": ("errors", "compiled", "results", "model", "simulate", ""),

@@ -400,7 +400,7 @@ def test_a_program_that_is_not_installed_has_no_row_and_one_that_cannot_has_one(
 
 @pytest.mark.parametrize("code", list(peers.PEERS))
 def test_another_program_agrees(code: str) -> None:
-    """With the rod at 0.3 %, to 3 % of the pull and 1 % of the length: what 50 elements can do."""
+    """With the rod at 0.3 %, to 1 % of the length, and in the middle of all outputs 1 % of the pull: what 50 elements can."""
     pytest.importorskip(peers.PEERS[code].package)
     guest = next(g for g in peers.ladder(scene()) if g.code == code and g.elements == 50)
     answer = peers.answer(guest, scene())
@@ -408,7 +408,8 @@ def test_another_program_agrees(code: str) -> None:
     truth = {name: np.array(result[name]) for name in ladder.COMPARED}
     found = ladder.against(row(), answer.values, truth, 12.0)
     assert found.position_part is not None and found.position_part < 0.01
-    assert found.pull_part is not None and found.pull_part < 0.03
+    usual = [np.median(ladder._apart(answer.values[x], truth[x])) for x in ladder.PULLS]
+    assert max(usual) < 0.01 * ladder._largest_pull(truth)
     assert answer.cpu > 0.0 and answer.steps > 10
 
 
