@@ -16,8 +16,9 @@ from pathlib import Path
 
 import hybrid
 from hybrid.errors import HybridError
-from hybrid.ladder import ACCURACIES, Doing
+from hybrid.ladder import ACCURACIES
 from hybrid.results.tradeplot import plot_trade
+from hybrid.rungs import Doing
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"

@@ -30,9 +30,9 @@ from hybrid.errors import ZONE_EVENTS, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
-    from hybrid.ladder import Doing
     from hybrid.model.mesh import Zone
     from hybrid.results.read import Event
+    from hybrid.rungs import Doing
     from hybrid.simulate import Progress
 
 # The speed shown is that of the last so many reports (about 5 s): the compilation of the

@@ -17,6 +17,7 @@ import pytest
 import hybrid
 import hybrid.ladder as ladder
 import hybrid.peers as peers
+import hybrid.rungs as rungs
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.results.tradeplot import plot_trade
 from hybrid.results.tradetable import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
@@ -148,16 +149,16 @@ def test_errors_are_the_largest_over_time_and_place_and_pulls_are_vectors() -> N
 
 
 def test_a_rung_keeps_the_scene_and_drops_how_finely_it_was_to_be_computed() -> None:
-    asked = hybrid.validate_scene(ladder.rung_data(scene(), "adaptive", "0.3%"))
+    asked = hybrid.validate_scene(rungs.rung_data(scene(), "adaptive", "0.3%"))
     assert asked.mesh is None and asked.time is not None and asked.time.step is None
     assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
     assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.always_rod == ((0.0, 1.0),)
     assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
-    assert ladder.rung_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
+    assert rungs.rung_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
 
 
 def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
-    assert {"rod", "catenary", "adaptive", "zones"} <= set(ladder.kinds_of_models())
+    assert {"rod", "catenary", "adaptive", "zones"} <= set(rungs.kinds_of_models())
     soft = scene()
     data = soft.model_dump(mode="json", exclude_none=True)
     del data["cable"]["sections"][0]["bending_stiffness"]
@@ -210,7 +211,7 @@ LADDER: dict[str, Any] = {"models": ["rod", "catenary"], "accuracies": ["10%", "
 def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Which runs are made, warming up left out."""
     made: list[str] = []
-    real = ladder.run
+    real = rungs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if more:
@@ -218,7 +219,7 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
             made.append(f"{scene.model.kind} {scene.accuracy.position}")
         return real(scene, *args, **more)
 
-    monkeypatch.setattr(ladder, "run", run)
+    monkeypatch.setattr(rungs, "run", run)
     yield made
 
 
@@ -272,7 +273,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
 def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
-    real = ladder.run
+    real = rungs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if scene.model.kind == "catenary":
@@ -280,7 +281,7 @@ def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
             raise ComputationError(Outcome.SLACK, 0.4, 3.0)
         return real(scene, *args, **more)
 
-    monkeypatch.setattr(ladder, "run", run)
+    monkeypatch.setattr(rungs, "run", run)
     found = hybrid.trade(scene(), tmp_path, **LADDER)
     failed = [r for r in found.rows if r.model == "catenary"]
     assert [r.status for r in failed] == [FAILED] * 2 and "tension of a catenary zone vanished" in failed[0].cause
@@ -294,7 +295,7 @@ def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch:
     def run(*_: Any, **__: Any) -> None:
         raise ComputationError(Outcome.NOT_CONVERGED, 0.4, 3.0)
 
-    monkeypatch.setattr(ladder, "run", run)
+    monkeypatch.setattr(rungs, "run", run)
     with pytest.raises(ComputationError, match="this was the reference, rod 1%"):
         hybrid.trade(scene(), tmp_path, **LADDER)
     assert not (tmp_path / "trade.md").exists()
@@ -303,7 +304,7 @@ def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch:
 def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
-    real = ladder.run
+    real = rungs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if more and len(counted) == 3:
@@ -311,7 +312,7 @@ def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
         return real(scene, *args, **more)
 
     with monkeypatch.context() as patch:
-        patch.setattr(ladder, "run", run)
+        patch.setattr(rungs, "run", run)
         with pytest.raises(KeyboardInterrupt):
             hybrid.trade(scene(), tmp_path, **LADDER)
     assert len(counted) == 3
@@ -404,8 +405,8 @@ def test_another_program_agrees(code: str) -> None:
     pytest.importorskip(peers.PEERS[code].package)
     guest = next(g for g in peers.ladder(scene()) if g.code == code and g.elements == 50)
     answer = peers.answer(guest, scene())
-    result = hybrid.run(hybrid.validate_scene(ladder.rung_data(scene(), "rod", "0.3%")))
-    truth = {name: np.array(result[name]) for name in ladder.COMPARED}
+    result = hybrid.run(hybrid.validate_scene(rungs.rung_data(scene(), "rod", "0.3%")))
+    truth = {name: np.array(result[name]) for name in rungs.COMPARED}
     found = ladder.against(row(), answer.values, truth, 12.0)
     assert found.position_part is not None and found.position_part < 0.01
     usual = [np.median(ladder._apart(answer.values[x], truth[x])) for x in ladder.PULLS]
@@ -423,6 +424,7 @@ def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
         return real(replace(guest, code="nobody"), scene)
 
     monkeypatch.setattr(peers, "answer", answer)
+    monkeypatch.setattr(peers, "versions", lambda guests: "moordyn 0")
     found = hybrid.trade(scene(), tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
     guests = [r for r in found.rows if r.code != "hybrid"]
     assert [r.status for r in guests] == [FAILED] * 3

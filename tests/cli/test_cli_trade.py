@@ -116,13 +116,13 @@ def test_a_scene_without_time_is_refused(call: Call) -> None:
 
 
 def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    import hybrid.ladder as ladder
+    import hybrid.rungs as rungs
     from hybrid.errors import ComputationError, Outcome
 
     def run(*_: object, **__: object) -> None:
         raise ComputationError(Outcome.NOT_CONVERGED, 0.4, 3.0)
 
-    monkeypatch.setattr(ladder, "run", run)
+    monkeypatch.setattr(rungs, "run", run)
     said = call("trade", "sag.yaml", *SHORT)
     assert said.code == 2 and "this was the reference, rod 3%" in " ".join(said.err.split())
 
