@@ -43,8 +43,10 @@ is. CPU time is that of the process from the scene to the result: coarser runs t
 cells belong, and the search for the equilibrium included; the kernels were loaded beforehand.
 
 On the front are runs than which no other is both cheaper and nearer to what is asked for, error of position or of pull,
-whichever is the larger part. Of those that are near enough the cheapest is recommended. Runs of a tenth of a second
-differ by a few per cent of CPU time from one call to the next: `--repeat 3` takes the median of three.
+whichever is the larger part. A run is "missed" if its error exceeds what it was asked for by more than the reference
+may be wrong, or if it says itself that it did not get there. Of those that are near enough the cheapest is recommended.
+Runs of a tenth of a second differ by a few per cent of CPU time from one call to the next: `--repeat 3` takes the
+median of three.
 
 A finished run is kept in the folder `runs`, under a hash of the scene, the model, the accuracy and the package: a
 second call makes those that are missing, after Ctrl-C for instance. In Python:

@@ -86,12 +86,12 @@ def trade(
             limits.append((None, None))
     finally:
         position, pull = _bounds(wanted, largest)
-        found = judged(rows, limits)
-        found.sort(key=lambda row: _order(row, kinds))
         table = TradeTable(
-            scene.title, asked_for, scene.length, largest, position, pull, tuple(found), tuple(notes),
+            scene.title, asked_for, scene.length, largest, position, pull, tuple(rows), tuple(notes),
             (*desk.facts, *_measured(desk, repeat, command, guests)), desk.total - len(rows),
         )  # fmt: skip
+        table = judged(table, limits)
+        table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
         table.write(desk.folder, "trade.png")
         plot_trade(table, desk.folder / "trade.png")
     return table
@@ -199,9 +199,11 @@ def against(row: Row, values: Mapping[str, np.ndarray], truth: Mapping[str, np.n
     pulls = [float(_apart(values[x], truth[x]).max()) for x in PULLS if x in values and x in truth]
     row = replace(row, position=position, position_part=position / length)
     largest = _largest_pull(truth)
-    if not pulls or not largest:
-        return row
-    return replace(row, pull=max(pulls), pull_part=max(pulls) / largest)
+    if pulls and largest:
+        row = replace(row, pull=max(pulls), pull_part=max(pulls) / largest)
+    if max(row.position_part or 0.0, row.pull_part or 0.0) > 1.0:
+        return replace(row, status=FAILED, cause="it blew up: it is wrong by more than there is")
+    return row
 
 
 def _apart(force: np.ndarray, truth: np.ndarray) -> np.ndarray:

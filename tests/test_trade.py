@@ -117,9 +117,18 @@ def test_failed_runs_references_and_other_programs_are_not_recommended() -> None
 
 def test_a_run_that_misses_what_it_was_asked_says_by_how_much() -> None:
     good, bad = row(error=0.5, estimate_pull=2.0), row(error=3.0, estimate_pull=2.0, pull=4.0)
-    first, second, third = judged([good, bad, bad], [(1.0, 10.0), (1.0, 10.0), (None, None)])
+    limits = [(None, None), (1.0, 10.0), (1.0, 10.0), (None, None)]
+    _, first, second, third = judged(table(good, bad, bad), limits).rows
     assert first.status == third.status == "done"
     assert second.status == MISSED and second.cause == "position 3 times what was asked"
+
+
+def test_a_run_is_not_blamed_for_the_error_of_the_reference() -> None:
+    """The reference is known to 0.2 m, half of what the check differs by: 1.1 m may be 0.9 m, 1.3 m may not be 1 m."""
+    check = replace(row(error=0.4), status=CHECK)
+    limits = [(None, None)] * 2 + [(1.0, None)] * 2
+    *_, near, far = judged(table(check, row(error=1.1), row(error=1.3)), limits).rows
+    assert (near.status, far.status) == ("done", MISSED)
 
 
 def test_errors_below_that_of_the_reference_are_marked() -> None:
@@ -141,6 +150,9 @@ def test_errors_are_the_largest_over_time_and_place_and_pulls_are_vectors() -> N
     found = ladder.against(row(), values, truth, 10.0)
     assert found.position == pytest.approx(0.5) and found.position_part == pytest.approx(0.05)
     assert found.pull == pytest.approx(2**0.5) and found.pull_part == pytest.approx(2**0.5 / 5)
+    assert found.status == "done"
+    wild = values | {"reaction_start": 3.0 * truth["reaction_start"]}
+    assert ladder.against(row(), wild, truth, 10.0).status == FAILED, "wrong by twice the largest pull"
     sizes = values | {"reaction_start": np.full((3, 1), 5.5)}  # a program that tells only how large a force is
     assert ladder.against(row(), sizes, truth, 10.0).pull == pytest.approx(0.5)
 

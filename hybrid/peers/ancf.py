@@ -216,7 +216,7 @@ class Exudyn:
             force_on_line = pull[:, :1] * e + pull[:, 1:] * (0.0, 0.0, 1.0)
             # less what moves the end node's share of the line: the others do not count that either
             values[name] = force_on_line - 0.5 * step * line.mass * np.array([line.end(k, t)[2] for t in times])
-        return Answer(values, cpu, march.numberOfSteps)
+        return Answer(values, cpu, per * (len(times) - 1))
 
 
 def _plane(line: Line, times: list[float]) -> tuple[np.ndarray, np.ndarray]:

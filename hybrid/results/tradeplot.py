@@ -21,11 +21,12 @@ if TYPE_CHECKING:
 # Colours that no kind of zone has, of the same family; other codes are grey, apart by their marks.
 COLOURS = {"adaptive": "#CC79A7", "zones": "#56B4E9"} | KIND_COLOURS
 MARKS = {"rod": "o", "catenary": "s", "adaptive": "D", "corrected": "^", "zones": "v"}
-_GUEST_MARKS = ("P", "X", "*", "p")
+_GUEST_MARKS = ("P", "X", "p", "d")
 _MET, STAR = "#009E73", "#F0E442"
 _BESIDE = 1.8  # of the smallest and largest value, times that which an axis leaves beside them
 _LEAST_DECADES = 1.0  # a vertical axis spans at least so many, or differences of a few per cent would look like much
-# Where the accuracy stands beside its point, in points of type, by model: lines that cross do not hide both.
+# Where the accuracy (of others: the number of elements) stands beside its point, in points of type: in turn on either
+# side, so that of points that are close both can be read.
 _BESIDE_A_POINT = ((7, 2), (-7, -6), (7, -8), (-7, 4))
 Figures = Callable[[Row], float | None]
 
@@ -89,10 +90,10 @@ def panel(ax: Axes, table: TradeTable, figure_of: Figures, named: bool = False) 
         symbol = MARKS.get(model, "h") if ours else _GUEST_MARKS[guests.index(code) % len(_GUEST_MARKS)]
         line = {"linestyle": "-" if ours else ":", "linewidth": 1.2, "markersize": 4.5, "zorder": 3}
         _points(ax, rows, figure_of, color=colour, marker=symbol, label=model if ours else code, **line)
-        for row in rows if named else ():
+        for k, row in enumerate(rows if named else ()):
             here = (row.cpu or 0.0, figure_of(row) or 0.0)
-            said = row.asked if ours else row.asked.split(",")[0]
-            side, up = _BESIDE_A_POINT[list(groups).index((code, model)) % len(_BESIDE_A_POINT)]
+            said = row.asked if ours else row.asked.split()[0]
+            side, up = _BESIDE_A_POINT[(list(groups).index((code, model)) + 2 * k) % len(_BESIDE_A_POINT)]
             look: dict[str, Any] = {
                 "fontsize": SMALL - 1.0,
                 "color": colour,

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -224,19 +224,22 @@ class TradeTable:
         return [table, page]
 
 
-def judged(rows: Iterable[Row], bounds: Sequence[tuple[float | None, float | None]]) -> list[Row]:
-    """Rows whose errors exceed what each was asked for, (m, N), become "missed", and say by how much."""
-    out = []
-    for row, (position, pull) in zip(rows, bounds, strict=True):
-        pairs = (("position", row.position, position), ("pull", row.pull, pull))
-        ratios = [(error / bound, name) for name, error, bound in pairs if error is not None and bound]
-        worst, name = max(ratios, default=(0.0, ""))
-        if row.status == DONE and worst > 1.0:
+def judged(table: TradeTable, bounds: Sequence[tuple[float | None, float | None]]) -> TradeTable:
+    """Runs whose errors exceed what each was asked for, (m, N), become "missed", and say by how much.
+
+    What the reference itself may be wrong by counts for them: a run is blamed only for what is its own.
+    """
+    rows = []
+    for row, (position, pull) in zip(table.rows, bounds, strict=True):
+        named = (("position", row.position, position), ("pull", row.pull, pull))
+        over = [(x / most, name) for name, x, most in named if x is not None and most and x - table.doubt(name) > most]
+        worst, name = max(over, default=(0.0, ""))
+        if row.status == DONE and over:
             estimate = getattr(row, f"estimate_{name}")
             knew = f", estimated {estimate:.2g}" if estimate is not None else ""
             row = replace(row, status=MISSED, cause=row.cause or f"{name} {worst:.2g} times what was asked{knew}")
-        out.append(row)
-    return out
+        rows.append(row)
+    return replace(table, rows=tuple(rows))
 
 
 def _plain(value: object) -> str:
