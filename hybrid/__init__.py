@@ -18,6 +18,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hybrid.adapt.manager import Look
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
+    from hybrid.ladder import trade
     from hybrid.model.plan import plan
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
@@ -45,6 +46,7 @@ _HOME = {
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
+    "trade": ("hybrid.ladder", "trade"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
 }
 
@@ -66,6 +68,7 @@ __all__ = [
     "run",
     "scene_text",
     "static",
+    "trade",
     "validate_scene",
 ]
 

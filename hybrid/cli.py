@@ -1,4 +1,4 @@
-"""The command line: hybrid run | static | plan | plot | schema.
+"""The command line: hybrid run | static | plan | plot | trade | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
 import signal
 import sys
 import threading
@@ -28,6 +29,7 @@ if TYPE_CHECKING:
     from hybrid.live import Voice
     from hybrid.model.plan import Plan
     from hybrid.results.read import Result
+    from hybrid.results.tradetable import Row, TradeTable
     from hybrid.scene.schema import Scene
 
 REFUSED, FAILED, INTERRUPTED = 1, 2, 130
@@ -47,6 +49,10 @@ def _numbers(text: str) -> list[float]:
         return [float(x) for x in text.split(",")]
     except ValueError:
         raise typer.BadParameter(f"'{text}' is no list of numbers such as 0,1.5,2") from None
+
+
+def _words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
 
 
 def _flag(*names: str, help: str) -> Any:
@@ -180,6 +186,48 @@ def plot(
 
 
 @app.command()
+def trade(
+    context: typer.Context, scene: SceneFile,
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Else SCENE.trade, beside it.")
+    ] = None,
+    models: Annotated[
+        Any, typer.Option(metavar="KIND,..", parser=_words, help="Else all that the scene admits.")
+    ] = None,
+    accuracies: Annotated[
+        Any, typer.Option(metavar="A,A,..", parser=_words, help="Else 10%,3%,1%,0.3%,0.1%.")
+    ] = None,
+    reference: Annotated[
+        str | None, typer.Option(metavar="A", help="Of the rod to compare with; else 0.03% or finer.")
+    ] = None,
+    asked_for: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
+    repeat: Annotated[int, typer.Option(metavar="N", help="Runs of which the median CPU time counts.")] = 1,
+    peers: Annotated[bool, _flag("--peers", help="Other programs as well, if installed.")] = False,
+    settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Compare models and accuracies on a scene: error against CPU time; say which to take."""
+    with _speaking(as_json, quiet) as say:
+        asked = _load(say, scene, settings)
+        folder = output or scene.with_suffix(".trade")
+        say.left = f"{folder} keeps the runs that are done; the same command makes the others"
+        say.compiling()
+        chosen = {"accuracies": accuracies} if accuracies else {}
+        with say.ladder() as told:
+            table = hybrid.trade(
+                asked, folder, models=models, **chosen, reference=reference, asked_for=asked_for, repeat=repeat,
+                peers=peers, told=told, command=shlex.join(["hybrid", *(context.obj or [])]),
+            )  # fmt: skip
+        for row in table.rows:
+            say.json("row", **(asdict(row) | _judged(table, row)))
+        say.show(lambda: _trade_table(table))
+        say.show(lambda: table.recommendation)
+        best = table.recommended
+        facts = {"recommended": best.name if best else None, "cpu": best.cpu if best else None, "runs": len(table.rows)}
+        files = [folder / name for name in ("trade.md", "trade.csv", "trade.png")]
+        say.done(f"{len(table.rows)} runs", *files, **facts)
+
+
+@app.command()
 def schema() -> None:
     """Print the JSON schema of a scene, for editors."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
@@ -190,7 +238,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a command and leave with its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
     try:
-        code = typer.main.get_command(app).main(arguments, prog_name="hybrid", standalone_mode=False)
+        code = typer.main.get_command(app).main(arguments, prog_name="hybrid", standalone_mode=False, obj=arguments)
         sys.stdout.flush()
     except UsageError as error:
         from hybrid.live import Voice
@@ -342,6 +390,34 @@ def _zones_said(facts: dict[str, Any], file: Path) -> str:
     times = f"{changes} change{'s' * (changes > 1)} of zones"
     part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on the mean"
     return f"{part}; {times}: hybrid plot --zones {file}"
+
+
+def _judged(table: TradeTable, row: Row) -> dict[str, Any]:
+    """What the table says of a row."""
+    score = table.score(row) if row.is_choice else None
+    return {"score": score, "front": row in table.front(), "recommended": row == table.recommended}
+
+
+def _trade_table(table: TradeTable) -> Any:
+    """The rows as a terminal has room for them."""
+    from rich.table import Table
+
+    def part(value: float | None) -> str:
+        return "" if value is None else f"{100 * value:.2g} %"
+
+    out = Table(box=None, pad_edge=False, header_style="bold")
+    out.add_column("run", no_wrap=True)
+    for name in ("position", "pull", "cells", "steps", "CPU"):
+        out.add_column(name, justify="right", no_wrap=True)
+    out.add_column("", overflow="fold")
+    front, best = table.front(), table.recommended
+    for row in table.rows:
+        said = "take this" if row == best else "front" if row in front else ""
+        said = ", ".join(x for x in (said, "" if row.status == "done" else row.status, row.cause) if x)
+        style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
+        figures = [part(row.position_part), part(row.pull_part), str(row.cells or ""), str(row.steps or "")]
+        out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", said, style=style)
+    return out
 
 
 def _plan_table(scene: Scene, plan: Plan) -> Any:

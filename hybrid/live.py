@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import time as clock
 from collections import deque
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -31,6 +32,7 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
     from hybrid.model.mesh import Zone
     from hybrid.results.read import Event
+    from hybrid.rungs import Doing
     from hybrid.simulate import Progress
 
 # The speed shown is that of the last so many reports (about 5 s): the compilation of the
@@ -39,6 +41,7 @@ REMEMBERED = 50
 BAR = (4, 36)  # columns, least and most: less shows nothing, more pushes the numbers apart
 MARGIN = 3  # columns left free: the terminal writes ^C there, and wraps what does not fit
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
+BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a ladder: below 1 % of what its runs cost
 KINDS_SHOWN = 3  # kinds of events named at the end of a run; more is a matter for a report
 
 
@@ -165,6 +168,7 @@ class Voice:
     def __init__(self, as_json: bool, quiet: bool) -> None:
         self.as_json, self.quiet = as_json, quiet
         self.source = ""  # the scene file, for complaints that do not know it
+        self.left = ""  # what Ctrl-C leaves, of commands that write more than a file
         self._file: Path | None = None
         self._before: tuple[int, int] | None = None
 
@@ -226,6 +230,46 @@ class Voice:
         finally:
             line.close()
 
+    @contextmanager
+    def ladder(self) -> Iterator[Callable[[Doing], None] | None]:
+        """What `hybrid.trade` is to call: a bar over all runs, JSON lines, or nothing."""
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+        if self.quiet or self.as_json:
+            yield None if self.quiet else self._json_ladder()
+            return
+        columns = (
+            BarColumn(24),
+            MofNCompleteColumn(),
+            TextColumn("{task.description}", markup=False),
+            TimeElapsedColumn(),
+        )
+        # No thread draws it: what is timed would pay for that.
+        with Progress(*columns, console=self._err, transient=True, auto_refresh=False) as bar:
+            task, last = bar.add_task(""), -BAR_EVERY
+
+            def tell(doing: Doing) -> None:
+                nonlocal last
+                now = clock.monotonic()
+                if now - last < BAR_EVERY and 0.0 < doing.part < 1.0:
+                    return
+                last = now
+                what = doing.what + (f", {doing.part:.0%}" if doing.part else "")
+                bar.update(task, total=doing.total, completed=doing.done, description=what, refresh=True)
+
+            yield tell
+
+    def _json_ladder(self) -> Callable[[Doing], None]:
+        last = ""
+
+        def tell(doing: Doing) -> None:
+            nonlocal last
+            if doing.what != last:
+                last = doing.what
+                self.json("progress", done=doing.done, total=doing.total, what=doing.what)
+
+        return tell
+
     def _json_progress(self) -> Callable[[Progress], None]:
         last = -JSON_EVERY
 
@@ -256,11 +300,11 @@ class Voice:
         names = [str(file) for file in files if file is not None]
         self.json("done", file=names[0], files=names, **facts)
         if not (self.quiet or self.as_json):
-            self._out.print(f"{text} -> {' and '.join(names)}", soft_wrap=True)
+            self._out.print(f"{text} -> {_listed(names)}", soft_wrap=True)
 
     def interrupted(self) -> None:
         """What the file holds after Ctrl-C."""
-        t, text = None, "nothing was written"
+        t, text = None, self.left or "nothing was written"
         if self.written:
             with hybrid.open(self.written) as result:
                 t = float(result.times[-1]) if len(result.times) else None
@@ -285,6 +329,10 @@ class Voice:
         self.json("error", kind=kind, message=text, **facts)
         for line in text.splitlines():
             self._err.print(line, style="" if line.startswith(" ") else "bold red", soft_wrap=not self._err.is_terminal)
+
+
+def _listed(names: list[str]) -> str:
+    return " and ".join(", ".join(names).rsplit(", ", 1))
 
 
 def _stamp(file: Path) -> tuple[int, int] | None:
