@@ -119,7 +119,7 @@ def run(
         return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    job = Job(scene, criterion)
+    job, begin = Job(scene, criterion), clock.process_time()
     target, effort = _target(output), first_effort(scene)
     with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
         job.told, job.interrupted = told, interrupted
@@ -131,7 +131,7 @@ def run(
             job.sketch, lambda effort: job.record(effort, target, overwrite),
         )  # fmt: skip
         final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
-        _amend(target, scene, final, errors, climb)
+        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
 
@@ -190,8 +190,11 @@ class Job:
         values = {name: notebook[name] for name in COMPARED if name in notebook}
         model_error = {name.removeprefix(MODEL): notebook[name] for name in notebook.names if name.startswith(MODEL)}
         spent = clock.process_time() - begin
+        bound = effort.zones * model.length if zoning is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(notebook.events) if kind == BEYOND}.values())
-        return Sketch(effort, values, cells_of(model), motion.steps, spent, effort.every, False, model_error, notes)
+        return Sketch(
+            effort, values, cells_of(model), motion.steps, spent, effort.every, False, model_error, bound, notes
+        )
 
     def survey(self, effort: Effort) -> Grading | None:
         """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
@@ -320,12 +323,14 @@ def cells_of(model: Model) -> int:
     return model.cells if model.layout is None else int(model.layout.rod.size)
 
 
-def _amend(target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb) -> None:
+def _amend(
+    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float
+) -> None:
     """Write how wrong a result may be, how finely it was computed, and what went into that, into its file."""
     effort = final.effort
     attributes: dict[str, str | float | int] = {
         "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
-        "effort_cpu": sum(run.cpu for run in climb.runs), "effort_step": effort.step,
+        "effort_cpu": cpu, "effort_step": effort.step,
     }  # fmt: skip
     if effort.local is not None:
         attributes["effort_step_error"] = effort.local
@@ -397,7 +402,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         from hybrid.arbitrate import static_shooting
 
         return static_shooting(scene, output, overwrite)
-    job, target, effort = Job(scene, None), _target(output), first_effort(scene)
+    job, target, effort, begin = Job(scene, None), _target(output), first_effort(scene), clock.process_time()
     if not wants_errors(scene):
         job.record_rest(effort, target, overwrite)
         return open_result(target)
@@ -406,7 +411,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         lambda effort: job.record_rest(effort, target, overwrite),
     )  # fmt: skip
     final, errors = climb.reach(effort)
-    _amend(target, scene, final, errors, climb)
+    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
 
