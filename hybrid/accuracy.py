@@ -33,7 +33,7 @@ AIM = 0.7
 # A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
 # little earlier or later, or friction that holds elsewhere, are what is left.
 STALLED = 0.8
-# Processor time, s, after which runs are not made finer for what they miss; a longer wait should be asked for.
+# Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
 # Times what zones may make of bending at which its estimated effect is not believed: what lies loose drifts without end.
 BELIEVED = 30.0

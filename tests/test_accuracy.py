@@ -109,7 +109,7 @@ def sketch(effort: Effort, steps: int, order: float, every: int = 1, noise: floa
     return Sketch(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
 
 
-@pytest.mark.parametrize("order", [1.0, 1.4, 2.0])
+@pytest.mark.parametrize("order", [1.25, 1.4, 2.0])
 def test_an_error_of_one_order_is_found_exactly(order):
     effort = Effort(1.0, 0.1, None, 1e-3)
     final = sketch(effort, 100, order)
@@ -130,13 +130,13 @@ def test_an_error_of_one_order_is_found_exactly(order):
 
 
 def test_orders_are_bounded():
-    """Runs that do not converge count as of order one: the figure is what the last refinement has changed."""
+    """Runs that do not converge count as of the least order: the figure is most of what the last refinement has changed."""
     effort = Effort(1.0, 0.1, None, 1e-3)
     runs = [sketch(effort, 100, 2.0, 1, 0.0), sketch(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
     runs += [sketch(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sketch(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
     estimate = Estimate(*runs)
     assert estimate.order["position"] == ORDERS[0]
-    assert estimate.errors.largest("total", "position") > 0.4
+    assert estimate.errors.largest("total", "position") > 0.3
 
 
 def test_without_the_rougher_runs_an_order_in_between_is_taken():
