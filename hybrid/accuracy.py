@@ -35,7 +35,7 @@ AIM = 0.7
 STALLED = 0.8
 # Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
-# Times what zones may make of bending at which its estimated effect is not believed: what lies loose drifts without end.
+# Times what zones may make of bending at which its estimated effect is not believed: what lies loose drifts for ever.
 BELIEVED = 30.0
 # Runs that may follow the first result; each is at most this much finer.
 MOST_RUNS, MOST_FINER = 3, 3.0

@@ -19,7 +19,7 @@ import pytest
 
 import hybrid
 from hybrid.model.effort import Effort
-from hybrid.simulate import Job
+from hybrid.job import Job
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from problems import whip

@@ -18,7 +18,7 @@ from ruamel.yaml import YAML
 import hybrid
 from hybrid.correction import corrector_for
 from hybrid.model.build import build
-from hybrid.simulate import _equilibrium
+from hybrid.rest import equilibrium_of
 from hybrid.solve.timestep import Stepper
 
 pytestmark = pytest.mark.bench
@@ -189,7 +189,7 @@ def test_model_error_cost():
     ):  # fmt: skip
         scene = example(name, model, mesh={"cells": cells})
         m, dt = build(scene), scene.require_time().step
-        rest = _equilibrium(scene, m, 0.0).state
+        rest = equilibrium_of(scene, m, 0.0).state
         medians = []
         for keep in (False, True):
             old, new = rest.copy(), rest.copy()
