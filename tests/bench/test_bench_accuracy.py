@@ -18,8 +18,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.effort import Effort
 from hybrid.job import Job
+from hybrid.model.effort import Effort
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from problems import whip
@@ -183,3 +183,38 @@ def test_accuracy_share_of_coarser_runs():
             f"{name}: {cost[0]:.2f} s without, {cost[1]:.2f} s with its error figure, {cost[1] / cost[0] - 1:.0%} more"
         )
         assert cost[1] < 3.0 * cost[0]
+
+
+def test_accuracy_of_zones_that_move_against_a_rod():
+    """At 1 %: CPU time of rods everywhere, in their plane and in space, over that of zones that move."""
+    from test_bench_adaptive import bight
+
+    def at(base, model, dimension):
+        own = {"model": model, "dimension": dimension, "accuracy": "1%", "mesh": None}
+        return hybrid.validate_scene(base | own | {"time": {"duration": base["time"]["duration"]}})
+
+    scenes = {"ROV tether, 1000 m, slack bight": bight()}
+    for name in ("s_tether", "touchdown"):
+        scenes[name] = fixed(name).model_dump(exclude_none=True)
+    for name, base in scenes.items():
+        cost = {}
+        for what, model, dimension in (
+            ("adaptive", "adaptive", None),
+            ("rod", "rod", None),
+            ("rod in space", "rod", 3),
+        ):
+            tries = []
+            for _ in range(3):
+                begin = process_time()
+                result = hybrid.run(at(base, model, dimension))
+                tries.append(process_time() - begin)
+            cost[what] = median(tries)
+            said, e = result.attributes, {x.kind for x in result.events}
+            print(
+                f"{name}, {what}: {cost[what]:.2f} s, {said['cells']} cells, {len(result['steps/t'])} steps, "
+                f"{said['effort_runs']} runs{', missed' if 'accuracy missed' in e else ''}"
+            )
+        print(
+            f"{name}: rod over adaptive {cost['rod'] / cost['adaptive']:.2f}, "
+            f"rod in space over adaptive {cost['rod in space'] / cost['adaptive']:.2f}"
+        )
