@@ -173,10 +173,10 @@ class Motion:
         shift = self.correction.shift(self.state) if self.correction is not None else None
         values = self.observer.values(ends, self.state, self.stepper.report, np.array(self.work), ratios, shift)
         self.recorder.save(self.t, values, self.observer.zone_rows)
+        if self.target is None:  # a run to compare with is not looked at twice
+            return
         self.watch.strain(self.t, self.state)
         self.watch.mesh(self.t, self.state)
-        if self.target is None:
-            return
         self.watch.rest(self.t, ends, values, self.state)
         if self.zoning is not None:
             manager = self.zoning.manager
@@ -221,7 +221,8 @@ class Motion:
             }
         )  # fmt: skip
         assert self.scene.time is not None
-        self.watch.step(end, dt, self.scene.time.rho_inf, self.spare, self.state)
+        if self.target is not None:
+            self.watch.step(end, dt, self.scene.time.rho_inf, self.spare, self.state)
         self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
         leaves = self.flat.left(taken, self.stepper, lambda node, kind, text: self.watch.note(end, node, kind, text))
         if self.model.slack == "warn":
