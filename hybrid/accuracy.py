@@ -30,6 +30,8 @@ LEAST_RATIO = 1.1
 COARSER = 2.0
 # Part of what is asked that the next run aims at.
 AIM = 0.7
+# Zones become stricter when the model makes more than the first of what is asked, so that it makes the second.
+MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
 # A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
 # little earlier or later, or friction that holds elsewhere, are what is left.
 STALLED = 0.8
@@ -112,10 +114,7 @@ class Estimate:
         self.run = final
         self.order = {name: _order(name, final, coarse, coarsest) for name in final.values if name in coarse.values}
         self.model = dict(final.model_error)
-        self.doubtful = _beyond(coarse, final)
-        for name, left in coarse.model_error.items() if not self.doubtful else ():  # hardly depends on cells and steps
-            if name not in self.model and len(left):
-                self.model[name] = _spread(left, len(next(iter(final.values.values()))), coarse.every)
+        self.take_model(coarse)
         self.late: dict[str, np.ndarray] = {}
         self.cells: dict[str, np.ndarray] = {}
         for name, p in self.order.items():
@@ -134,6 +133,14 @@ class Estimate:
         if name in self.late:
             change = change - self.late[name] * ((self.run.steps / before.steps) ** p - 1.0)
         return np.asarray(change / ((self.run.cells / before.cells) ** p - 1.0))
+
+    def take_model(self, coarse: Sketch) -> None:
+        """The model error is that of a coarser run: it hardly depends on cells and steps."""
+        self.doubtful = _beyond(coarse)
+        count = len(next(iter(self.run.values.values())))
+        for name, left in coarse.model_error.items() if not self.doubtful else ():
+            if name not in self.run.model_error and len(left):
+                self.model[name] = _spread(left, count, coarse.every)
 
     def follow(self, final: Sketch) -> None:
         """A finer run has become the result."""
@@ -162,7 +169,7 @@ class Estimate:
         return Errors({kind: fields for kind, fields in out.items() if fields})
 
 
-def _beyond(coarse: Sketch, final: Sketch) -> str:
+def _beyond(coarse: Sketch) -> str:
     """What to say where the model error of a line whose zones move is so large that it cannot be true; else empty."""
     left = coarse.model_error.get("position")
     if left is None or not coarse.bound or float(np.max(left, initial=0.0)) <= BELIEVED * coarse.bound:
@@ -226,6 +233,8 @@ def judge(asked: Asked, errors: Errors, run: Sketch) -> Verdict:
             bounds.append((name, "N", asked.tension))
         if asked.of_pull is not None:
             bounds.append((name, "N", asked.of_pull * run.pull))
+    if asked.of_curvature is not None and "curvature" in run.values:
+        bounds.append(("curvature", "1/m", asked.of_curvature * float(run.values["curvature"].max())))
     worst = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked")
     for name, unit, bound in bounds:
         if bound <= 0.0:
@@ -239,12 +248,20 @@ def judge(asked: Asked, errors: Errors, run: Sketch) -> Verdict:
     return worst
 
 
-def finer(effort: Effort, verdict: Verdict, mesh_is_free: bool, steps_are_free: bool) -> Effort | None:
+def finer(
+    effort: Effort, verdict: Verdict, mesh_is_free: bool, steps_are_free: bool, zones_are_free: bool = False
+) -> Effort | None:
     """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
 
     Errors of mesh and step add, and cost grows with fineness over step: half of what is asked is for each.
     """
-    goal = max(AIM - verdict.model, 0.25 * AIM)
+    zones, model = effort.zones, verdict.model
+    if zones_are_free and model > MOST_OF_MODEL:
+        zones *= max(OF_MODEL / model, 1.0 / MOST_FINER)
+        model = OF_MODEL
+    if model >= AIM:  # neither cells nor steps can mend what the model leaves out
+        return None
+    goal = AIM - model
     mesh = verdict.mesh if mesh_is_free else 0.0
     time = verdict.time if steps_are_free else 0.0
     goal_mesh = goal - (verdict.time if not steps_are_free else min(time, 0.5 * goal))
@@ -252,9 +269,6 @@ def finer(effort: Effort, verdict: Verdict, mesh_is_free: bool, steps_are_free: 
     least = 1.0 / MOST_FINER
     cells = min(max(sqrt(max(goal_mesh, 0.0) / mesh), least), 1.0) if mesh > 0.0 else 1.0
     steps = min(max(sqrt(max(goal_time, 0.0) / time), least), 1.0) if time > 0.0 else 1.0
-    zones = effort.zones
-    if verdict.model > 0.6:
-        zones *= max(0.3 / verdict.model, least)
     if min(cells, steps) > 0.95 and zones == effort.zones:
         if mesh == time == 0.0:
             return None
@@ -302,6 +316,7 @@ class Climb:
     asked: Asked | None
     mesh_is_free: bool
     steps_are_free: bool
+    zones_are_free: bool
     moves: bool  # whether there is a time
     sketch: Callable[[Effort], Sketch]
     result: Callable[[Effort], Sketch]
@@ -331,13 +346,16 @@ class Climb:
             before = verdict.ratio
             if verdict.ratio <= 1.0 and not (final.unresolved and self.mesh_is_free and not last):
                 return final, errors
-            better = (
-                None if last or self._spent() else finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free)
-            )
+            better = None
+            if not (last or self._spent()):
+                better = finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free, self.zones_are_free)
             if better is None:
-                return final, self._missed(verdict, errors, not last)
+                return final, self._missed(verdict, errors)
+            stricter = better.zones < final.effort.zones
             final = self._counted(self.result(better))
             estimate.follow(final)
+            if stricter:
+                self._model_anew(estimate, better)
         raise AssertionError("unreachable: the last of the loop returns")
 
     def _spent(self) -> bool:
@@ -364,15 +382,31 @@ class Climb:
                     self.notes.append(("no error figure", text))
                     return None
                 found.append(None)
+        if self.moves and found[1] is None:
+            text = "the share of the time step is not known: a run with longer steps failed; the error may be larger"
+            self.notes.append(("error uncertain", f"{text}; try a smaller time.step, or leave it out"))
         assert found[0] is not None
         return found[0], found[1], found[2]
 
-    def _missed(self, verdict: Verdict, errors: Errors, stuck: bool) -> Errors:
-        """Say that what was asked is not met."""
-        why = "the scene fixes its mesh and its step" if stuck else f"after {len(self.runs)} runs"
-        parts = ((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))
-        main = max(parts)[1]
-        self.notes.append(("accuracy missed", f"{verdict.text}, {why}; most of it is of the {main}"))
+    def _model_anew(self, estimate: Estimate, effort: Effort) -> None:
+        """Zones have become stricter: what they leave out now."""
+        longer = COARSER if self.moves else 1.0
+        try:
+            estimate.take_model(self._counted(self.sketch(replace(effort.coarser(COARSER, longer), follow=True))))
+        except ComputationError as error:
+            text = f"the effect of bending that is left out is that of a run before: {str(error).splitlines()[0]}"
+            self.notes.append(("error beyond estimate", text))
+
+    def _missed(self, verdict: Verdict, errors: Errors) -> Errors:
+        """Say that what was asked is not met, whose doing it is, and what to try."""
+        main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
+        free = {"mesh": self.mesh_is_free, "time step": self.steps_are_free, "model": self.zones_are_free}[main]
+        fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
+        try_ = f"leave {fixed} out" if not free else "ask for less, or compare with model: rod"
+        if main == "model" and not free:
+            try_ = "model: adaptive, or rod"
+        text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"
+        self.notes.append(("accuracy missed", text))
         return errors
 
 

@@ -114,7 +114,7 @@ def run(
             say.show(lambda: _zones_said(facts, target))
         errors = _errors(result)
         if errors:
-            say.show(lambda: _errors_said(errors, result))
+            say.show(lambda: _errors_table(errors, result))
         else:
             text += "; error not estimated"
         facts |= {"errors": errors}
@@ -141,7 +141,7 @@ def static(
         errors = _errors(result)
         say.show(lambda: _equilibrium_table(facts))
         if errors:
-            say.show(lambda: _errors_said(errors, result))
+            say.show(lambda: _errors_table(errors, result))
         facts |= {"errors": errors}
         say.events(result.events)
         say.done(f"equilibrium in {span(wall)} of wall time", target, picture, status=result.status, wall=wall, **facts)
@@ -361,25 +361,48 @@ def _zones_over_time(result: Result) -> dict[str, Any]:
     return {"rod": rod, "zone_changes": changes}
 
 
-def _errors(result: Result) -> dict[str, float]:
-    """The estimated errors: largest of position (m) and of the pulls at the ends (N), by kind."""
-    return {k.removeprefix("error_"): float(x) for k, x in result.attributes.items() if k.startswith("error_")}
+def _errors(result: Result) -> dict[str, Any]:
+    """The estimated errors: largest of position (m) and of the pulls at the ends (N), by kind; whether they are met."""
+    found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
+    if found and "accuracy_asked" in result.attributes:
+        found["met"] = not any(event.kind == "accuracy missed" for event in result.events)
+    return found
 
 
-def _errors_said(errors: dict[str, float], result: Result) -> str:
-    """The same in words, with what was asked."""
+def _errors_table(errors: dict[str, Any], result: Result) -> Any:
+    """The same for people: by cause, beside what was asked."""
+    from rich.table import Table
+
     pulls = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in pulls), default=0.0)
-    said = []
+    table = Table.grid(padding=(0, 2))
+    kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
+    table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
     for what, unit, whole in (("position", "m", float(result.s[-1])), ("pull", "N", most)):
         total = errors[f"total_{what}"]
-        parts = [(kind, errors[f"{kind}_{what}"]) for kind in ("mesh", "time", "model") if f"{kind}_{what}" in errors]
-        causes = ", ".join(f"{kind} {x:.2g}" for kind, x in parts)
-        share = f", {100 * total / whole:.2g} %" if whole > 0 else ""
-        name = "position" if what == "position" else "pull at the ends"
-        said.append(f"{name} {total:.2g} {unit}{share} ({causes})")
+        share = (
+            f"{100 * total / whole:.2g} % of {'the length' if what == 'position' else f'{_short(whole)} N'}"
+            if whole
+            else ""
+        )
+        sizes = (f"{_short(errors[f'{kind}_{what}'])} {unit}" for kind in kinds)
+        table.add_row("position" if what == "position" else "pull at ends", *sizes, share)
+    if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
+        names = [f"errors/{kind}/bending_moment" for kind in kinds]
+        sizes = (f"{_short(float(result[name].max()))} N m" if name in result else "" for name in names)
+        peak = float(result["bending_moment"].max()) if "bending_moment" in result else 0.0
+        table.add_row("moment", *sizes, f"of {_short(peak)} N m" if peak else "no rod, no moment: model: rod")
     asked = result.attributes.get("accuracy_asked")
-    return f"error: {'; '.join(said)}" + (f"; asked {asked}" if asked else "")
+    if not asked:
+        return table
+    from rich.console import Group
+
+    return Group(table, f"asked {asked}: {'met' if errors['met'] else 'MISSED'}")
+
+
+def _short(x: float) -> str:
+    """Two digits, without an exponent where that is as short."""
+    return f"{float(f'{x:.2g}'):.6g}" if 1e-4 <= abs(x) < 1e6 or x == 0.0 else f"{x:.1e}"
 
 
 def _zones_said(facts: dict[str, Any], file: Path) -> str:
@@ -441,11 +464,14 @@ def _plan_table(scene: Scene, plan: Plan) -> Any:
         kind, count = ("as it comes", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
         zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
     work = "no time in the scene, so statics only"
+    follows = scene.time is not None and scene.time.controlled
     most = "about" if plan.base_cells is None else "at most about"
     if scene.time is not None:
         asked = scene.time.step or plan.step
         shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
         work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, {most} {span(plan.seconds)} of computing"
+        if follows:
+            work = f"{plan.steps} steps or more, as the motion asks, in several runs: {span(plan.seconds)} or more"
     head = [scene.title, ""] if scene.title else []
     size = f"{sum(plan.cells)} cells, {plan.unknowns} unknowns"
     if moving:

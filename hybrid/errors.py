@@ -85,6 +85,9 @@ class Outcome(IntEnum):
 # Kinds of events that call an answer into question, the worst first; other kinds are news.
 EVENTS_BY_WEIGHT = (
     "gains energy",
+    "accuracy missed",
+    "no error figure",
+    "error uncertain",
     "slack",
     "unstable",
     "unresolved twist",

@@ -26,7 +26,7 @@ from hybrid.accuracy import (
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import SceneError
 from hybrid.job import Job
-from hybrid.model.effort import asked, first_effort, mesh_is_free, wants_errors
+from hybrid.model.effort import asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.model.mesh import Zone
 from hybrid.motion import Motion
 from hybrid.results.read import Result, open_result
@@ -88,7 +88,8 @@ def run(
             job.record(effort, target, overwrite)
             return open_result(target)
         climb = Climb(
-            asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None, True,
+            asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None,
+            zones_are_free(scene), True,
             job.sketch, lambda effort: job.record(effort, target, overwrite),
         )  # fmt: skip
         final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
@@ -108,7 +109,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         job.record_rest(effort, target, overwrite)
         return open_result(target)
     climb = Climb(
-        asked(scene), mesh_is_free(scene), False, False, job.sketch_rest,
+        asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest,
         lambda effort: job.record_rest(effort, target, overwrite),
     )  # fmt: skip
     final, errors = climb.reach(effort)

@@ -163,8 +163,10 @@ def test_judging_and_refining():
 
 
 def test_the_model_is_made_better_when_it_is_what_is_wrong():
-    better = finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True)
+    better = finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, True)
     assert better is not None and better.zones < 0.5e-3
+    assert better.fineness < 1.5  # cells and steps are not to blame
+    assert finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, False) is None
 
 
 # --- cells ---------------------------------------------------------------------------------------
@@ -238,7 +240,7 @@ def test_explicit_settings_win_and_what_they_miss_is_said():
     assert result.attributes["cells"] == 10
     assert np.allclose(result["steps/dt"], 0.05)
     (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
-    assert "fixes" in missed.text and "asked" in missed.text
+    assert "leave mesh" in missed.text and "asked" in missed.text
 
 
 def test_a_figure_beside_a_run_with_fixed_steps(truth):

@@ -38,6 +38,7 @@ class Asked:
     position: float | None
     tension: float | None
     of_pull: float | None
+    of_curvature: float | None = None  # a part of the largest
 
     @property
     def text(self) -> str:
@@ -47,6 +48,8 @@ class Asked:
             said.append(f"{self.tension:.3g} N of pull at the ends")
         if self.of_pull is not None:
             said.append(f"{100 * self.of_pull:.3g} % of the pull at the ends")
+        if self.of_curvature is not None:
+            said.append(f"{100 * self.of_curvature:.3g} % of the curvature")
         return ", ".join(said)
 
 
@@ -99,7 +102,8 @@ def asked(scene: Scene) -> Asked | None:
     if accuracy.tension is not None:
         what, size = amount(accuracy.tension)
         tension, of_pull = (None, size) if what == "part" else (size, None)
-    return Asked(position, tension, of_pull)
+    of_curvature = amount(accuracy.curvature)[1] if accuracy.curvature is not None else None
+    return Asked(position, tension, of_pull, of_curvature)
 
 
 def wants_errors(scene: Scene) -> bool:
@@ -115,6 +119,11 @@ def mesh_is_free(scene: Scene) -> bool:
     return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
 
 
+def zones_are_free(scene: Scene) -> bool:
+    """Whether the program chooses how much bending zones may leave out."""
+    return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
+
+
 def first_effort(scene: Scene) -> Effort:
     """What a scene's accuracy asks for, before anything is known of its errors."""
     want = asked(scene)
@@ -123,6 +132,7 @@ def first_effort(scene: Scene) -> Effort:
     if want is not None:
         tension, position = want.of_pull or ONE, (want.position or ONE * scene.length) / scene.length
         which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_pull or want.tension else []
+        which += [(want.of_curvature, FOR_TENSION, STEP_FOR_TENSION)] if want.of_curvature else []
         which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
         part = min(x for x, _, _ in which)
         local = min(step * (x / ONE) ** 1.5 for x, _, step in which) * scene.length

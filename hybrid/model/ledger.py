@@ -101,11 +101,13 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
     elif time is not None:
         yield Entry("steps that follow the motion", False, "time.step fixes them")
     graded = want is not None and mesh_is_free(scene) and time is not None
-    why = "the scene places the cells" if not mesh_is_free(scene) else "no accuracy is asked for"
+    why = (
+        "the scene places the cells" if not mesh_is_free(scene) else "no motion" if want else "no accuracy is asked for"
+    )
     yield Entry("cells graded by bends", graded, "accuracy; as a first, coarse run shows them" if graded else why)
     wants = wants_errors(scene)
     by = "output.errors" if scene.output.errors is not None else "accuracy"
-    why = f"{by}; about half as much computing again" if wants else "output.errors: true, or accuracy"
+    why = f"{by}; several coarser runs beside it" if wants else "output.errors: true, or accuracy"
     yield Entry("error figure, by coarser runs", wants, why)
 
 

@@ -47,6 +47,7 @@ from hybrid.results.views import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
+_DOUBT = "#D55E00"  # of estimated errors
 _RANGE, _WATER, _LEVEL = "#E8E8E8", "#EFF6FA", "#4A90C2"
 _POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 AXES = ("x", "y", "z")
@@ -140,7 +141,7 @@ def plot_profiles(
         ax.plot(result.s, values[output] * factor, zorder=3, label=title_of(name), **line)
         error = error_of(result, name)
         if error is not None:
-            _band(ax, result.s, values[output] * factor, error[output] * factor, INK)
+            _band(ax, result.s, values[output] * factor, error[output] * factor, name)
     short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
     style(ax, (short if drawn[1:] else title_of(names[0])) + _at(result, output), "s (m)", f"{up} ({unit})")
@@ -176,7 +177,7 @@ def plot_history(
         if error is None:
             break
         at = np.array([np.interp(point, result.s, row) for row in error])
-        _band(ax, result.times, values[:, k] * factor, at * factor, _POINT_COLOURS[k % len(_POINT_COLOURS)])
+        _band(ax, result.times, values[:, k] * factor, at * factor, name if component is None else "")
     changes = np.unique(result["zones/t"])[1:]
     for k, t in enumerate(changes if len(changes) <= MOST_CHANGES else ()):
         ax.axvline(t, color=GREY, lw=0.9, ls=":", zorder=1, label="_" * (k > 0) + "zones changed")  # one entry
@@ -209,10 +210,12 @@ def error_of(result: Result, name: str) -> np.ndarray | None:
     return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
 
 
-def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, colour: str) -> None:
-    """The range in which the truth is estimated to lie."""
+def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, name: str) -> None:
+    """The range in which the truth is estimated to lie; of sizes, not below zero."""
     low, high = values - error, values + error
-    ax.fill_between(x, low, high, color=colour, alpha=0.22, linewidth=0, zorder=2.8, label="_")
+    if name in ("curvature", "bending_moment"):
+        low = np.maximum(low, 0.0)
+    ax.fill_between(x, low, high, color=_DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
 
 
 def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:

@@ -26,7 +26,7 @@ def amount(text: str) -> tuple[str, float]:
     """What `text` measures ("part", "position" or "tension") and how much of it, SI."""
     found = _AMOUNT.fullmatch(text)
     if found is None or found[2] not in UNITS:
-        refuse([Finding((), _EXAMPLES, f"units are {', '.join(UNITS)}")])
+        refuse([Finding((), _EXAMPLES, _advice(text))])
         raise AssertionError
     what, unit = UNITS[found[2]]
     size = float(found[1]) * unit
@@ -35,6 +35,20 @@ def amount(text: str) -> tuple[str, float]:
     if what == "part" and not FINEST <= size <= ROUGHEST:
         refuse([Finding((), f"between {100 * FINEST:g}% and {100 * ROUGHEST:g}%", "1% is usual")])
     return what, size
+
+
+def _advice(text: str) -> str:
+    """What to write instead."""
+    if re.fullmatch(r"\s*[0-9]+,[0-9]+\s*\S+\s*", text):
+        return f"a decimal point: {text.replace(',', '.').replace(' ', '')}"
+    if " and " in text or "," in text:
+        return "for two outputs write {position: 3 cm, tension: 50 N}"
+    said = re.fullmatch(r"\s*([0-9.]+)\s*(percent|per cent|pct|ft|feet|in|inch|inches|lbf|kgf)\s*", text)
+    if said is not None:
+        known = {"ft": ("m", 0.3048), "feet": ("m", 0.3048), "lbf": ("N", 4.448), "kgf": ("N", 9.807)}
+        unit, size = known.get(said[2], ("m", 0.0254) if said[2].startswith("in") else ("%", 1.0))
+        return f"write {float(said[1]) * size:.3g}{'' if unit == '%' else ' '}{unit}"
+    return f"units are {', '.join(UNITS)}; 1% is usual"
 
 
 def _is_text(value: Any) -> Any:
@@ -65,15 +79,22 @@ class Accuracy(Table):
         description="of the pull at both ends at every output: a part of the largest, or N, kN",
     )
 
+    curvature: Amount | None = Field(
+        default=None, description="of every point at every output: a part of the largest curvature, such as 5%"
+    )
+
     @model_validator(mode="after")
     def _units_fit(self) -> Accuracy:
         found = []
         for name in ("position", "tension"):
             text = getattr(self, name)
             if text is not None and amount(text)[0] not in ("part", name):
-                found.append(Finding((name,), f"a part (%) or a size in {_units(name)}"))
-        if self.position is None and self.tension is None:
-            found.append(Finding((), "position, tension, or both", "accuracy: 1% stands for both"))
+                other = f"{amount(text)[0]}: {text}"
+                found.append(Finding((name,), f"a part (%) or a size in {_units(name)}", f"write {other}"))
+        if self.curvature is not None and amount(self.curvature)[0] != "part":
+            found.append(Finding(("curvature",), "a part (%) of the largest curvature", "5%"))
+        if self.position is None and self.tension is None and self.curvature is None:
+            found.append(Finding((), "position, tension or curvature", "accuracy: 1% stands for the first two"))
         refuse(found)
         return self
 
