@@ -334,6 +334,11 @@ class Climb:
             text = f"no error figure: {final.cells} cells are so few that there is nothing coarser to compare with"
             self.notes.append(("no error figure", text))
             return final, None
+        if self.moves and not estimate.late:
+            text = (
+                "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
+            )
+            self.notes.append(("error uncertain", f"{text}; the error may be larger; leave time.step out"))
         if estimate.doubtful:
             self.notes.append(("error beyond estimate", estimate.doubtful))
         before = np.inf
@@ -382,9 +387,6 @@ class Climb:
                     self.notes.append(("no error figure", text))
                     return None
                 found.append(None)
-        if self.moves and found[1] is None:
-            text = "the share of the time step is not known: a run with longer steps failed; the error may be larger"
-            self.notes.append(("error uncertain", f"{text}; try a smaller time.step, or leave it out"))
         assert found[0] is not None
         return found[0], found[1], found[2]
 
