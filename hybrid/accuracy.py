@@ -193,15 +193,17 @@ def _order(name: str, final: Sketch, coarse: Sketch, coarsest: Sketch | None) ->
 
 
 def _spread(error: np.ndarray, count: int, every: int) -> np.ndarray:
-    """Errors at some outputs at all of them, linear in between."""
+    """Errors at some outputs at all of them; in between the larger of the two beside it: peaks are not averaged out."""
     if every == 1:
         return error
     at = np.arange(count)
     known = _thin(count, every)
     right = np.clip(np.searchsorted(known, at), 1, known.size - 1)
-    x = (at - known[right - 1]) / (known[right] - known[right - 1])
-    x = x.reshape(-1, *([1] * (error.ndim - 1)))
-    return np.asarray(error[right - 1] * (1.0 - x) + error[right] * x)
+    before, after = error[right - 1], error[right]
+    between = np.where(np.abs(before) > np.abs(after), before, after)
+    exact = np.isin(at, known)
+    between[exact] = error
+    return np.asarray(between)
 
 
 def _size(error: np.ndarray, name: str) -> np.ndarray:
@@ -259,8 +261,8 @@ def finer(
     if zones_are_free and model > MOST_OF_MODEL:
         zones *= max(OF_MODEL / model, 1.0 / MOST_FINER)
         model = OF_MODEL
-    if model >= AIM:  # neither cells nor steps can mend what the model leaves out
-        return None
+    if model >= AIM or (verdict.mesh > 1.0 and not mesh_is_free) or (verdict.time > 1.0 and not steps_are_free):
+        return None  # what is fixed is wrong by more than is asked
     goal = AIM - model
     mesh = verdict.mesh if mesh_is_free else 0.0
     time = verdict.time if steps_are_free else 0.0
@@ -347,7 +349,8 @@ class Climb:
             if self.asked is None:
                 return final, errors
             verdict = judge(self.asked, errors, final)
-            last = k == MOST_RUNS or (k > 0 and verdict.ratio > STALLED * before)
+            falls = verdict.ratio / before  # 0 for the first
+            last = k == MOST_RUNS or falls > STALLED or verdict.ratio * falls ** (MOST_RUNS - k) > 1.0
             before = verdict.ratio
             if verdict.ratio <= 1.0 and not (final.unresolved and self.mesh_is_free and not last):
                 return final, errors
@@ -357,7 +360,13 @@ class Climb:
             if better is None:
                 return final, self._missed(verdict, errors)
             stricter = better.zones < final.effort.zones
-            final = self._counted(self.result(better))
+            try:
+                final = self._counted(self.result(better))
+            except ComputationError as error:
+                self.notes.append(
+                    ("accuracy missed", f"{verdict.text}; a finer run failed: {str(error).splitlines()[0]}")
+                )
+                return final, errors
             estimate.follow(final)
             if stricter:
                 self._model_anew(estimate, better)

@@ -7,6 +7,7 @@ static   find its equilibrium
 from __future__ import annotations
 
 import io
+import os
 import signal
 import threading
 import time as clock
@@ -26,11 +27,11 @@ from hybrid.accuracy import (
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import SceneError
 from hybrid.job import Job
-from hybrid.model.effort import asked, first_effort, mesh_is_free, wants_errors, zones_are_free
+from hybrid.model.effort import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.model.mesh import Zone
 from hybrid.motion import Motion
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, amend
+from hybrid.results.record import Field, amend, check_target
 from hybrid.scene.motion import check_motions
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 
@@ -80,6 +81,8 @@ def run(
         return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
+    if output is not None:
+        check_target(Path(output).expanduser().resolve(), overwrite)
     job, begin = Job(scene, criterion), clock.process_time()
     target, effort = _target(output), first_effort(scene)
     with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
@@ -90,7 +93,7 @@ def run(
         climb = Climb(
             asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None,
             zones_are_free(scene), True,
-            job.sketch, lambda effort: job.record(effort, target, overwrite),
+            job.sketch, _kept(target, job.record),
         )  # fmt: skip
         final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
         _amend(target, scene, final, errors, climb, clock.process_time() - begin)
@@ -110,11 +113,40 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         return open_result(target)
     climb = Climb(
         asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest,
-        lambda effort: job.record_rest(effort, target, overwrite),
+        _kept(target, job.record_rest),
     )  # fmt: skip
     final, errors = climb.reach(effort)
     _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
+
+
+def _kept(
+    target: Path | io.BytesIO, record: Callable[[Effort, Path | io.BytesIO, bool], Sketch]
+) -> Callable[[Effort], Sketch]:
+    """Record results one after the other: a finer one takes the place of that before it when it is complete."""
+    done = False
+
+    def compute(effort: Effort) -> Sketch:
+        nonlocal done
+        if not done:
+            found, done = record(effort, target, True), True
+            return found
+        if isinstance(target, io.BytesIO):
+            new = io.BytesIO()
+            found = record(effort, new, True)
+            target.seek(0)
+            target.truncate()
+            target.write(new.getvalue())
+            return found
+        beside = target.with_name(f".{target.name}.{os.getpid()}.finer")
+        try:
+            found = record(effort, beside, True)
+            os.replace(beside, target)
+        finally:
+            beside.unlink(missing_ok=True)
+        return found
+
+    return compute
 
 
 def _amend(

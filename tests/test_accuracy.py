@@ -157,7 +157,8 @@ def test_judging_and_refining():
     better = finer(effort, verdict, True, True)
     assert better is not None and better.fineness > 1.5 and better.local < 1e-3
     assert finer(effort, verdict, False, False) is None
-    only_steps = finer(effort, verdict, False, True)
+    assert finer(effort, verdict, False, True) is None  # the mesh alone is wrong by more than is asked
+    only_steps = finer(effort, Verdict(1.5, 0.4, 1.1, 0.0, ""), False, True)
     assert only_steps is not None and only_steps.fineness == 1.0 and only_steps.local < 1e-3
     assert judge(Asked(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
 

@@ -63,13 +63,11 @@ def grading(s: Floats, curvature: Floats, fade: Floats, disturbed: Sequence[floa
     """
     x = np.linspace(0.0, length, SAMPLES)
     density = np.interp(x, s, curvature) / TURN + FEWEST / length
-    lam = np.interp(x, s, fade)
     for place in disturbed:
         width = float(np.interp(place, s, fade))
         if width > 0.0:
             density += LAYER / width * np.exp(-np.abs(x - place) / (LAYER_WIDTH * width))
     cell = 1.0 / density
-    del lam
     step = x[1] - x[0]
     for i in range(1, SAMPLES):
         cell[i] = min(cell[i], cell[i - 1] + GROWTH * step)

@@ -400,8 +400,8 @@ MODEL_ERRORS = {
     "tension": ("N", "change of tension", _S),
     "curvature": ("1/m", "change of curvature", _S),
     "bending_moment": ("N m", "change of the bending moment", _S),
-    "pull_start": ("N", "change of the force that holds the start, along it", ()),
-    "pull_end": ("N", "change of the force that holds the end, along it", ()),
+    "pull_start": ("N", "change of the force that holds the start", ()),
+    "pull_end": ("N", "change of the force that holds the end", ()),
 }
 
 
@@ -414,8 +414,7 @@ def model_errors(plain: View, corrected: View) -> dict[str, object]:
         "bending_moment": np.abs(corrected.bending_moment() - plain.bending_moment()),
     }
     for k, name in enumerate(("pull_start", "pull_end")):
-        sizes = [float(np.linalg.norm(view.reaction(k))) for view in (plain, corrected)]
-        out[name] = abs(sizes[1] - sizes[0])
+        out[name] = float(np.linalg.norm(corrected.reaction(k) - plain.reaction(k)))
     return out
 
 

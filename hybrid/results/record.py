@@ -17,6 +17,7 @@ from __future__ import annotations
 import io
 import os
 import platform
+import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -285,8 +286,12 @@ def amend(
     fields: quantities over the output times, (nt, ...), with their values; events: kind and text, of all the cable.
     """
     where = target if isinstance(target, io.BytesIO) else target.expanduser().resolve()
+    new: Path | io.BytesIO = where
     try:
-        with h5py.File(where, "r+", libver=_LIBVER, locking="best-effort") as file:
+        if isinstance(where, Path):  # beside it, and then in its place: somebody may be reading
+            new = where.with_name(f".{where.name}.{os.getpid()}.new")
+            shutil.copyfile(where, new)
+        with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
             for name, value in attributes.items():
                 file.attrs[name] = value
             for field, values in fields:
@@ -300,16 +305,17 @@ def amend(
                 table.rows = [(0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan) for event in events]
                 table.write()
                 table.commit()
+        if isinstance(where, Path) and isinstance(new, Path):
+            os.replace(new, where)
     except OSError as error:
+        if isinstance(new, Path):
+            new.unlink(missing_ok=True)
         advice = "free some disk space; close programs that hold the file"
         raise ResultError(f"{where} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
 
 
-def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
-    """Make the file under another name, move it into place whole, and open it to readers.
-
-    So an older result survives a failed start, and a reader who has it open keeps what he sees.
-    """
+def check_target(path: Path, overwrite: bool) -> None:
+    """ResultError if a result cannot be written there."""
     if path.exists():
         if path.is_dir():
             raise ResultError(f"{path} is a folder\n    try:      name a file in it, such as {path / 'run.h5'}")
@@ -320,6 +326,14 @@ def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
             raise ResultError(f"{path} exists and {why}\n    try:      another name, or delete the file yourself")
     if not path.parent.is_dir():
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
+
+
+def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
+    """Make the file under another name, move it into place whole, and open it to readers.
+
+    So an older result survives a failed start, and a reader who has it open keeps what he sees.
+    """
+    check_target(path, overwrite)
     new = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
         with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from hybrid.scene import sea_checks, start_checks
+from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends
 from hybrid.scene.plane import TYPED, plane_of
@@ -152,7 +153,11 @@ def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
         yield Finding(("solver",), "elimination, because the arbiter corrects nothing (model)", "or leave solver out")
 
 
-def _arbiter_steps(time: Time | None, solver: str) -> Iterator[Finding]:
+def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) -> Iterator[Finding]:
+    if solver == "shooting" and accuracy is not None:
+        yield Finding(
+            ("accuracy",), "nothing, because shooting has no error figure", "leave it out, or leave solver out"
+        )
     if solver == "shooting" and time is not None and time.controlled:
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
@@ -166,6 +171,12 @@ def _in_a_plane(
         yield Finding(("dimension",), "3 or nothing, because shooting computes in space", "or leave solver out")
         return
     yield from plane_of(environment, cable, ends, initial, TYPED)[1]
+
+
+def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
+    if accuracy is not None and output.errors is False:
+        expected = "true or nothing, because accuracy is judged by the error figure"
+        yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
@@ -227,6 +238,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _stretches_on_cable,
     _zones_that_move,
     _arbiter_steps,
+    _accuracy_has_errors,
     _sections_that_come_and_go,
     _in_a_plane,
     _mesh_spans,

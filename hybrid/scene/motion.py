@@ -258,16 +258,33 @@ def _periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
     return periods
 
 
+# A step that misses no more than MISSED of a record is a part of what a period is to a harmonic; halvings of the whole
+# record after which it is as it is: a millionth.
+RECORD_STEPS, HALVINGS = 4.0, 20
+
+
 def shortest_period(ends: Ends, environment: Environment | None) -> float:
     """The shortest period, ramp or move of a scene, s; infinity if it names none."""
     ramps = [t for _, _, m in _motions(ends) for t in (m.ramp, m.travel.over if m.travel else None) if t]
-    return min([*_periods(ends, environment).values(), *ramps], default=math.inf)
+    records = [_shortest_in(read_record(m.file)) for _, _, m in _motions(ends) if m.file is not None]
+    return min([*_periods(ends, environment).values(), *ramps, *records], default=math.inf)
+
+
+def _shortest_in(record: Record) -> float:
+    """What is to a record as a period is to a harmonic, s: some times the longest step that misses nothing of it."""
+    step = float(record.times[-1])
+    for _ in range(HALVINGS):
+        if _missed_between(record, step) is None:
+            break
+        step *= 0.5
+    return RECORD_STEPS * step
 
 
 def ramp_ends(scene: Scene) -> list[float]:
     """Times, s, at which something stops growing or moving: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
-    times = [t for _, _, m in _motions(ends) for t in (m.ramp, m.travel.over if m.travel else None)]
+    moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]
+    times = [m.ramp for _, _, m in _motions(ends)] + [t for m in moves for t in (m.begin, m.begin + m.over)]
     times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
     for end in (ends.start, ends.end):
         for load in (getattr(end, "force", None), getattr(end, "moment", None)):
