@@ -96,6 +96,7 @@ EVENTS_BY_WEIGHT = (
     "deep in the seabed",
     "implausible",
     "loses energy",
+    "vibrations damped",
     "snap",
     "coarse step",
     "torque left out",

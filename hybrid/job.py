@@ -32,7 +32,7 @@ from hybrid.physics.loads import SEABED, SURFACE
 from hybrid.rest import equilibrium_of, zones_and_rest
 from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer, output_points
-from hybrid.results.read import open_result
+from hybrid.results.read import Result, open_result
 from hybrid.results.record import Field, Recorder
 from hybrid.scene.motion import ramp_ends
 from hybrid.scene.read import scene_text
@@ -103,8 +103,9 @@ class Job:
                 {k: np.array(x) for k, x in result["errors/model"].items()} if "errors/model" in result else {}
             )
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
+            notes = _damped(result) if effort.local is not None else ()
         spent = clock.process_time() - begin
-        return Sketch(effort, values, cells_of(model), motion.steps, spent, 1, unresolved, model_error)
+        return Sketch(effort, values, cells_of(model), motion.steps, spent, 1, unresolved, model_error, 0.0, notes)
 
     def sketch(self, effort: Effort, points: Floats | None = None) -> Sketch:
         """Compute for comparison only; points: places, m, instead of those of the result.
@@ -228,7 +229,30 @@ class Job:
         self.told(motion, finished=True)
 
 
+# Energy lost to the scheme that is worth a word, as a part of the largest kinetic energy, and of tension scale times
+# length: below, it is what Newton's tolerance leaves.
+NOTHING_LOST = 1e-6
+# The same as a part of all work done: what the books miss when steps are long.
+IN_BOOKS = 0.01
 MODEL, BEYOND = "errors/model/", "error beyond estimate"
+
+
+def _damped(result: Result) -> tuple[tuple[str, str], ...]:
+    """What to say where the scheme has taken more energy out of a motion than the cable ever stored by straining."""
+    names = [x for x in ("energy/stretch", "energy/bending", "energy/torsion") if x in result]
+    strained = sum(np.array(result[x]) for x in names)
+    lost = -float(np.min(result["work/scheme"]))
+    peak = float(np.ptp(strained)) if np.ndim(strained) else 0.0
+    books = IN_BOOKS * sum(float(np.abs(result.work[x]).max()) for x in result.work if x != "scheme")
+    least = NOTHING_LOST * float(result.attributes["tension_scale"]) * float(result.attributes["length"])
+    if not lost > max(peak, NOTHING_LOST * float(np.max(result.energy["kinetic"])), least, books):
+        return ()
+    text = (
+        f"steps follow the motion in metres: vibrations of less are damped out ({lost:.2g} J, where at most "
+        f"{peak:.2g} J are stored by strain), and with them their moments and reactions, which the error figure does not see; "
+        f"for those give a time.step that follows them"
+    )
+    return (("vibrations damped", text),)
 
 
 def _correction(model: Model, zoning: Zoning | None) -> Correction | None:

@@ -174,7 +174,7 @@ def _amend(
                 if kind == "model" and final.model_error:
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
-    amend(target, fields, attributes, climb.notes)
+    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()))
 
 
 UNITS_OF_ERRORS = {

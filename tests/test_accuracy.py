@@ -293,3 +293,95 @@ def test_the_model_error_is_that_of_a_coarser_run():
     assert 0.7 <= total / error <= 3.0
     assert result["errors/model/position"].shape == (61, 21)
     assert "errors/model" not in fine  # a rod leaves nothing out
+
+
+# --- what was found by attack ----------------------------------------------------------------------
+
+
+def test_steps_see_what_a_motion_file_does(tmp_path):
+    """A pulse of half a second in a record of 100 s bounds the step: without, all runs would step over it, and agree."""
+    t = np.arange(0.0, 100.01, 0.02)
+    rows = [f"{x:.2f},1.5,0,{0.3 * np.exp(-(((x - 48.0) / 0.3) ** 2)):.9f}" for x in t]
+    (tmp_path / "pulse.csv").write_text("t,x,y,z\n" + "\n".join(rows) + "\n")
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": {"file": str(tmp_path / "pulse.csv")}},
+    }
+    scene = swinging(ends=ends, time={"duration": 100.0}, output={"every": 10.0}, accuracy="1%")
+    assert first_effort(scene).step < 0.2
+    slow = swinging()
+    assert first_effort(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
+
+
+def test_a_finer_run_is_no_other_result(tmp_path):
+    """Several result runs go into one file, which need not be overwritten, and leave nothing beside it."""
+    target = tmp_path / "run.h5"
+    result = hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
+    assert result.status == "complete" and "errors" in result
+    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "fine.h5", overwrite=False)
+    assert result.attributes["effort_runs"] > 4
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["fine.h5", "run.h5"]
+    with pytest.raises(hybrid.ResultError, match="exists"):
+        hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
+
+
+def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
+    """The result before it stands, with its figure, and says what became of the other."""
+    from hybrid.errors import ComputationError, Outcome
+    from hybrid.job import Job
+
+    record, count = Job.record, []
+
+    def failing(self, effort, target, overwrite):
+        count.append(effort)
+        if len(count) > 1:
+            raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
+        return record(self, effort, target, overwrite)
+
+    monkeypatch.setattr(Job, "record", failing)
+    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
+    assert len(count) == 2 and len(result.times) == 61 and "errors" in result
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "failed" in missed.text
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_reader_does_not_lose_the_figure(tmp_path):
+    """Somebody reads the file when the figure is written."""
+    target = tmp_path / "run.h5"
+    readers = []
+
+    def look(progress):
+        if progress.stage == "result" and not readers and progress.t > 0.0:
+            readers.append(hybrid.open(target))
+
+    result = hybrid.run(swinging(accuracy="3%"), target, progress=look)
+    assert readers and "errors" in result
+    readers[0].close()
+
+
+def test_what_steps_damp_out_is_said():
+    """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
+    data = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 20.0}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+        "initial": {"kind": "straight", "direction": [np.sin(0.2), 0, -np.cos(0.2)]},
+        "model": "rod",
+        "time": {"duration": 3.2},
+        "output": {"every": 0.1, "points": 11},
+        "accuracy": "1%",
+    }
+    assert "vibrations damped" in {e.kind for e in hybrid.run(hybrid.validate_scene(data)).events}
+    assert "vibrations damped" not in {e.kind for e in hybrid.run(swinging()).events}
+
+
+def test_accuracy_needs_its_figure():
+    with pytest.raises(SceneError, match="error figure"):
+        swinging(accuracy="1%", output={"errors": False})
+
+
+def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
+    """A catenary of a stiff cable: cells and steps cannot mend what it leaves out."""
+    result = hybrid.run(swinging(model="catenary", accuracy="0.1%"))
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "model" in missed.text and result.attributes["effort_runs"] <= 5

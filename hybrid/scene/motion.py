@@ -258,11 +258,6 @@ def _periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
     return periods
 
 
-# A step that misses no more than MISSED of a record is a part of what a period is to a harmonic; halvings of the whole
-# record after which it is as it is: a millionth.
-RECORD_STEPS, HALVINGS = 4.0, 20
-
-
 def shortest_period(ends: Ends, environment: Environment | None) -> float:
     """The shortest period, ramp or move of a scene, s; infinity if it names none."""
     ramps = [t for _, _, m in _motions(ends) for t in (m.ramp, m.travel.over if m.travel else None) if t]
@@ -271,13 +266,22 @@ def shortest_period(ends: Ends, environment: Environment | None) -> float:
 
 
 def _shortest_in(record: Record) -> float:
-    """What is to a record as a period is to a harmonic, s: some times the longest step that misses nothing of it."""
-    step = float(record.times[-1])
-    for _ in range(HALVINGS):
-        if _missed_between(record, step) is None:
-            break
-        step *= 0.5
-    return RECORD_STEPS * step
+    """What is to a record as a period is to a harmonic, s.
+
+    Over a step of h a path with acceleration a leaves its chord by a h^2/8; MISSED of its range is too much, and of a
+    harmonic a quarter of its period is that long.
+    """
+    shortest = math.inf
+    for values in (record.shift, record.turn):
+        spline = _spline(record, values)
+        if spline is None:
+            continue
+        t = np.linspace(record.times[0], record.times[-1], min(200_000, 4 * record.times.size))
+        reach = float(np.ptp(spline(t), axis=0).max())
+        bend = float(np.abs(spline(t, 2)).max())
+        if reach > 0.0 and bend > 0.0:
+            shortest = min(shortest, 4.0 * math.sqrt(8.0 * MISSED * reach / bend))
+    return shortest
 
 
 def ramp_ends(scene: Scene) -> list[float]:
