@@ -249,8 +249,8 @@ def _damped(result: Result) -> tuple[tuple[str, str], ...]:
         return ()
     text = (
         f"steps follow the motion in metres: vibrations of less are damped out ({lost:.2g} J, where at most "
-        f"{peak:.2g} J are stored by strain), and with them their moments and reactions, which the error figure does not "
-        f"see; for those give a time.step that follows them"
+        f"{peak:.2g} J are stored by strain), and with them their moments and reactions, which the error figure "
+        f"does not see; for those give a time.step that follows them"
     )
     return (("vibrations damped", text),)
 
