@@ -90,6 +90,7 @@ EVENTS_BY_WEIGHT = (
     "error uncertain",
     "slack",
     "unstable",
+    "out of plane",
     "unresolved twist",
     "unresolved bend",
     "stretched",

@@ -395,7 +395,7 @@ def presses() -> Iterator[Case]:
                 tables = scene(
                     line, pinned(), end, model, 20, 0.0, initial=initial, **clock(300, 6 * beat / 300, 0.5, 6)
                 )
-                cause = "unstable" if model != "catenary" else "tension of a catenary zone vanished"
+                cause = "unstable|out of plane" if model != "catenary" else "tension of a catenary zone vanished"
                 must = "warned" if model != "catenary" else "refused"
                 name = told(L=L, EA=f"{stiff:g} EI/L²")
                 yield Case(
