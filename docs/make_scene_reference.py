@@ -211,8 +211,8 @@ next is cut into the fewest equal steps that are no longer than `time.step`.
 With `every: 0.5` and `step: 0.2` there are three steps of 0.1667 s between outputs; with `every: 0.01` and
 `step: 0.02` the step is 0.01 s, since outputs are always ends of steps.
 The last output is at `duration`, also when `every` does not divide it.
-Without `time.step` steps follow the motion, cells are placed where the cable bends, and both as finely as `accuracy` asks
-(1 % if it is not there): `accuracy: 1%`, `3 cm`, `50 N`, or a table such as
+Without `time.step` steps follow the motion, cells are placed where the cable bends, and both as finely as `accuracy`
+asks (1 % if it is not there): `accuracy: 1%`, `3 cm`, `50 N`, or a table such as
 `accuracy: {position: 3 cm, tension: 1%, curvature: 5%}`, from 0.0001% to 10%.  What the scene fixes (`time.step`,
 `mesh`, `model.tolerance`) stays; if it cannot meet what is asked, the event `accuracy missed` says so.
 [accuracy.md](accuracy.md) says where the figures of error come from and what they have been worth.
