@@ -97,7 +97,7 @@ def run(
         asked = _load(say, scene, settings)
         duration = asked.require_time().duration
         target = say.will_write(output or Path(f"{scene.stem}.h5"))
-        cold = say.compiling()
+        cold = say.compiling(_kernels(asked))
         from hybrid.live import span, speed
 
         begin = clock.perf_counter()
@@ -130,7 +130,7 @@ def static(
     with _speaking(as_json, quiet) as say:
         asked = _load(say, scene, settings)
         target = say.will_write(output or Path(f"{scene.stem}.static.h5"))
-        say.compiling()
+        say.compiling(["step.newton"])
         from hybrid.live import span
 
         begin = clock.perf_counter()
@@ -287,6 +287,18 @@ def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
             signal.signal(signal.SIGTERM, before)
     if code:
         raise typer.Exit(code)
+
+
+def _kernels(scene: Scene) -> list[str]:
+    """What a run of a scene needs compiled, by the last of each family: step, zones, model error."""
+    from hybrid.model.effort import wants_errors
+
+    needed = ["step.advance"]
+    if scene.model.kind == "adaptive":
+        needed.append("criteria.weigh")
+    if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
+        needed.append("correct.follow")
+    return needed
 
 
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:

@@ -13,7 +13,7 @@ import os
 import platform
 import shutil
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -50,10 +50,10 @@ def cache_folder() -> Path:
     return base / kernel_hash()
 
 
-def is_warm() -> bool:
-    """True when this version's kernels were compiled on this machine before."""
+def is_warm(kernels: Sequence[str] = ("step.advance",)) -> bool:
+    """True when these kernels of this version, as file.function, were compiled on this machine before."""
     folder = cache_folder()
-    return folder.is_dir() and any(folder.rglob("*.nbc"))
+    return folder.is_dir() and all(any(folder.rglob(f"{name}-*.nbc")) for name in kernels)
 
 
 def _prune(folder: Path) -> None:

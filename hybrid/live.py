@@ -12,7 +12,7 @@ import os
 import sys
 import time as clock
 from collections import deque
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
@@ -195,14 +195,14 @@ class Voice:
         if not (self.quiet or self.as_json):
             self._err.print(text, style="yellow", soft_wrap=not self._err.is_terminal)
 
-    def compiling(self) -> bool:
-        """Whether the first step is going to take long; if so, say it beforehand."""
+    def compiling(self, kernels: Sequence[str] = ("step.advance",)) -> bool:
+        """Whether kernels have to be compiled first, which takes long; if so, say it beforehand."""
         from hybrid.compiled import is_warm
 
-        if is_warm():
+        if is_warm(kernels):
             return False
         self.json("compiling")
-        self.note("compiling the kernels for this machine (first use only, 10 to 20 s) ...")
+        self.note("compiling the kernels for this machine (first use only, about half a minute) ...")
         return True
 
     def show(self, content: Callable[[], Any]) -> None:
