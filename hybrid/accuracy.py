@@ -85,7 +85,7 @@ class Sketch:
 
 @dataclass(frozen=True)
 class Errors:
-    """Estimated errors of a run: kind ("mesh", "time", "total") -> output -> size (nt, ...) of the error."""
+    """Estimated errors of a run: kind ("mesh", "time", "model", "total") -> output -> size (nt, ...) of the error."""
 
     fields: Mapping[str, Mapping[str, np.ndarray]]
 
@@ -113,7 +113,6 @@ class Estimate:
         """
         self.run = final
         self.order = {name: _order(name, final, coarse, coarsest) for name in final.values if name in coarse.values}
-        self.model = dict(final.model_error)
         self.take_model(coarse)
         self.late: dict[str, np.ndarray] = {}
         self.cells: dict[str, np.ndarray] = {}
@@ -136,11 +135,11 @@ class Estimate:
 
     def take_model(self, coarse: Sketch) -> None:
         """The model error is that of a coarser run: it hardly depends on cells and steps."""
-        self.doubtful = _beyond(coarse)
+        doubtful = _beyond(coarse)
+        self.notes = (*coarse.notes, *((("error beyond estimate", doubtful),) if doubtful else ()))
         count = len(next(iter(self.run.values.values())))
-        for name, left in coarse.model_error.items() if not self.doubtful else ():
-            if name not in self.run.model_error and len(left):
-                self.model[name] = _spread(left, count, coarse.every)
+        left = coarse.model_error if not doubtful else {}
+        self._model = {name: _spread(x, count, coarse.every) for name, x in left.items() if len(x)}
 
     def follow(self, final: Sketch) -> None:
         """A finer run has become the result."""
@@ -156,16 +155,21 @@ class Estimate:
                 self.late[name] = change / (shorter**p - 1.0)
 
     @property
+    def model(self) -> dict[str, np.ndarray]:
+        """Errors of leaving bending out: what a corrected run says of itself, else those of a coarser run."""
+        return self._model | dict(self.run.model_error)
+
+    @property
     def errors(self) -> Errors:
         """What it comes to.  Causes add up in size: that they cancel is seldom true at all times."""
-        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": dict(self.model), "total": {}}
+        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": self.model, "total": {}}
         for name, cells in self.cells.items():
             late, called = self.late.get(name), PULLS.get(name, name)
             out["mesh"][called] = total = _size(cells, name)
             if late is not None:
                 out["time"][called] = _size(late, name)
                 total = total + out["time"][called]
-            out["total"][called] = total + self.model.get(called, 0.0)
+            out["total"][called] = total + out["model"].get(called, 0.0)
         return Errors({kind: fields for kind, fields in out.items() if fields})
 
 
@@ -322,27 +326,41 @@ class Climb:
     moves: bool  # whether there is a time
     sketch: Callable[[Effort], Sketch]
     result: Callable[[Effort], Sketch]
-    notes: list[tuple[str, str]] = field(default_factory=list)  # events: kind, text
     runs: list[Sketch] = field(default_factory=list)
+    estimate: Estimate | None = None  # of the result as it is
+    _notes: list[tuple[str, str]] = field(default_factory=list)
+
+    @property
+    def notes(self) -> tuple[tuple[str, str], ...]:
+        """Events of the result, kind and text: of the climb, of the result itself, and of its model error."""
+        found = self.estimate
+        return (*self._notes, *((*found.run.notes, *found.notes) if found is not None else ()))
+
+    def stopped(self) -> tuple[Sketch, Errors]:
+        """The result before a finer run that was stopped from outside, and its errors."""
+        assert self.estimate is not None and self.asked is not None
+        found = self.estimate
+        verdict = judge(self.asked, found.errors, found.run)
+        self._notes.append(("accuracy missed", f"{verdict.text}; a finer run was stopped from outside"))
+        return found.run, found.errors
 
     def reach(self, effort: Effort) -> tuple[Sketch, Errors | None]:
         """From a first effort to the result and its errors, None where they cannot be told."""
         coarse = self._coarse(effort)
         final = self._counted(self.result(effort))
         if coarse is None:
+            self._notes += final.notes
             return final, None
-        estimate = Estimate(final, *coarse)
+        self.estimate = estimate = Estimate(final, *coarse)
         if not estimate.cells:
             text = f"no error figure: {final.cells} cells are so few that there is nothing coarser to compare with"
-            self.notes.append(("no error figure", text))
+            self._notes.append(("no error figure", text))
             return final, None
         if self.moves and not estimate.late:
             text = (
                 "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
             )
-            self.notes.append(("error uncertain", f"{text}; the error may be larger; leave time.step out"))
-        if estimate.doubtful:
-            self.notes.append(("error beyond estimate", estimate.doubtful))
+            self._notes.append(("error uncertain", f"{text}; the error may be larger; leave time.step out"))
         before = np.inf
         for k in range(MOST_RUNS + 1):
             errors = estimate.errors
@@ -352,20 +370,21 @@ class Climb:
             falls = verdict.ratio / before  # 0 for the first
             last = k == MOST_RUNS or falls > STALLED or verdict.ratio * falls ** (MOST_RUNS - k) > 1.0
             before = verdict.ratio
-            if verdict.ratio <= 1.0 and not (final.unresolved and self.mesh_is_free and not last):
+            met = verdict.ratio <= 1.0
+            if met and not (final.unresolved and self.mesh_is_free):
                 return final, errors
             better = None
             if not (last or self._spent()):
                 better = finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free, self.zones_are_free)
             if better is None:
-                return final, self._missed(verdict, errors)
+                return final, errors if met else self._missed(verdict, errors)
             stricter = better.zones < final.effort.zones
             try:
                 final = self._counted(self.result(better))
             except ComputationError as error:
-                self.notes.append(
-                    ("accuracy missed", f"{verdict.text}; a finer run failed: {str(error).splitlines()[0]}")
-                )
+                failed = f"a finer run failed: {str(error).splitlines()[0]}"
+                if not met:
+                    self._notes.append(("accuracy missed", f"{verdict.text}; {failed}"))
                 return final, errors
             estimate.follow(final)
             if stricter:
@@ -378,7 +397,6 @@ class Climb:
 
     def _counted(self, run: Sketch) -> Sketch:
         self.runs.append(run)
-        self.notes += run.notes
         return run
 
     def _coarse(self, effort: Effort) -> tuple[Sketch, Sketch | None, Sketch | None] | None:
@@ -393,7 +411,7 @@ class Climb:
             except ComputationError as error:
                 if not found:
                     text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
-                    self.notes.append(("no error figure", text))
+                    self._notes.append(("no error figure", text))
                     return None
                 found.append(None)
         assert found[0] is not None
@@ -406,7 +424,7 @@ class Climb:
             estimate.take_model(self._counted(self.sketch(replace(effort.coarser(COARSER, longer), follow=True))))
         except ComputationError as error:
             text = f"the effect of bending that is left out is that of a run before: {str(error).splitlines()[0]}"
-            self.notes.append(("error beyond estimate", text))
+            self._notes.append(("error uncertain", text))
 
     def _missed(self, verdict: Verdict, errors: Errors) -> Errors:
         """Say that what was asked is not met, whose doing it is, and what to try."""
@@ -417,7 +435,7 @@ class Climb:
         if main == "model" and not free:
             try_ = "model: adaptive, or rod"
         text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"
-        self.notes.append(("accuracy missed", text))
+        self._notes.append(("accuracy missed", text))
         return errors
 
 

@@ -378,7 +378,8 @@ def _errors(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
-        found["met"] = "accuracy missed" not in kinds and ("error uncertain" not in kinds or None)
+        known = not kinds & {"error uncertain", "error beyond estimate"}
+        found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 
 

@@ -78,16 +78,13 @@ class Job:
         self.told: Told
         self.interrupted: Callable[[], bool] = lambda: False
 
-    def record(self, effort: Effort, target: Path | io.BytesIO, overwrite: bool) -> Sketch:
+    def record(self, effort: Effort, target: Path | io.BytesIO) -> Sketch:
         """Compute the result into a file, or memory; what is to be compared of it."""
-        if isinstance(target, io.BytesIO):
-            target.seek(0)
-            target.truncate()
         begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
         model, equilibrium, zoning = self._model(effort)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
-        recorder = _recorder(self.scene, model, observer, target, overwrite, len(outputs), equilibrium)
+        recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium)
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones held", HELD)
         with recorder:
@@ -146,15 +143,12 @@ class Job:
         bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
         return survey_grading(model, s, seen.values, bend)
 
-    def record_rest(self, effort: Effort, target: Path | io.BytesIO, overwrite: bool) -> Sketch:
+    def record_rest(self, effort: Effort, target: Path | io.BytesIO) -> Sketch:
         """The same of the equilibrium."""
-        if isinstance(target, io.BytesIO):
-            target.seek(0)
-            target.truncate()
         begin = clock.process_time()
         model, found = self._rest(effort)
         observer = self._at_rest(model)
-        with _recorder(self.scene, model, observer, target, overwrite, 0, found) as recorder:
+        with _recorder(self.scene, model, observer, target, 0, found) as recorder:
             ends = model.ends.at(np.inf)
             watch = Watch(recorder, model)
             watch.equilibrium(found)
@@ -287,10 +281,10 @@ def _recorder(
     model: Model,
     observer: Observer,
     target: Path | io.BytesIO,
-    overwrite: bool,
     outputs: int,
     found: Equilibrium | None = None,
 ) -> Recorder:
+    """The file of a result; whether it may be replaced was asked before anything was computed."""
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
     }  # fmt: skip
@@ -304,7 +298,7 @@ def _recorder(
         )
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
-        attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=overwrite,
+        attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=True,
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "clamp left out", text)

@@ -52,7 +52,8 @@ class Motion:
         zoning: Zoning | None = None,
         correction: Correction | None = None,
     ) -> None:
-        """target: the file of the result, beside which a failure leaves a snapshot; None: it leaves none."""
+        """target: the file of the result, beside which a failure leaves a snapshot; None: a run to compare with, which
+        leaves none and is not watched."""
         assert scene.time is not None
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf

@@ -18,12 +18,7 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.accuracy import (
-    Climb,
-    Errors,
-    Sketch,
-    summary,
-)
+from hybrid.accuracy import Climb, Errors, Sketch, summary
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import SceneError
 from hybrid.job import Job
@@ -81,21 +76,25 @@ def run(
         return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    if output is not None:
-        check_target(Path(output).expanduser().resolve(), overwrite)
     job, begin = Job(scene, criterion), clock.process_time()
-    target, effort = _target(output), first_effort(scene)
+    target, effort = _target(output, overwrite), first_effort(scene)
     with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
         job.told, job.interrupted = told, interrupted
         if not wants_errors(scene):
-            job.record(effort, target, overwrite)
+            job.record(effort, target)
             return open_result(target)
         climb = Climb(
             asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None,
             zones_are_free(scene), True,
             job.sketch, _kept(target, job.record),
         )  # fmt: skip
-        final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
+        try:
+            final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
+        except KeyboardInterrupt:
+            if climb.estimate is not None:  # stopped in a finer run: the result before it stands, with its figure
+                stopped = climb.stopped()
+                _amend(target, scene, *stopped, climb, clock.process_time() - begin)
+            raise
         _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
@@ -107,9 +106,10 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
         from hybrid.arbitrate import static_shooting
 
         return static_shooting(scene, output, overwrite)
-    job, target, effort, begin = Job(scene, None), _target(output), first_effort(scene), clock.process_time()
+    job, begin = Job(scene, None), clock.process_time()
+    target, effort = _target(output, overwrite), first_effort(scene)
     if not wants_errors(scene):
-        job.record_rest(effort, target, overwrite)
+        job.record_rest(effort, target)
         return open_result(target)
     climb = Climb(
         asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest,
@@ -121,7 +121,7 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
 
 
 def _kept(
-    target: Path | io.BytesIO, record: Callable[[Effort, Path | io.BytesIO, bool], Sketch]
+    target: Path | io.BytesIO, record: Callable[[Effort, Path | io.BytesIO], Sketch]
 ) -> Callable[[Effort], Sketch]:
     """Record results one after the other: a finer one takes the place of that before it when it is complete."""
     done = False
@@ -129,21 +129,22 @@ def _kept(
     def compute(effort: Effort) -> Sketch:
         nonlocal done
         if not done:
-            found, done = record(effort, target, True), True
+            found, done = record(effort, target), True
             return found
         if isinstance(target, io.BytesIO):
             new = io.BytesIO()
-            found = record(effort, new, True)
+            found = record(effort, new)
             target.seek(0)
             target.truncate()
             target.write(new.getvalue())
             return found
         beside = target.with_name(f".{target.name}.{os.getpid()}.finer")
         try:
-            found = record(effort, beside, True)
+            found = record(effort, beside)
             os.replace(beside, target)
         finally:
-            beside.unlink(missing_ok=True)
+            for left in (beside, beside.with_suffix(".snapshot.npz")):
+                left.unlink(missing_ok=True)
         return found
 
     return compute
@@ -221,8 +222,12 @@ class _Told:
             self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
 
 
-def _target(output: str | Path | None) -> Path | io.BytesIO:
-    return Path(output) if output is not None else io.BytesIO()
+def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:
+    """Where the result goes; ResultError, before anything is computed, if it cannot go there."""
+    if output is None:
+        return io.BytesIO()
+    check_target(Path(output).expanduser().resolve(), overwrite)
+    return Path(output)
 
 
 @contextmanager

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.accuracy import ORDERS, Errors, Estimate, Sketch, Verdict, finer, judge
+from hybrid.accuracy import ORDERS, Climb, Errors, Estimate, Sketch, Verdict, finer, judge
 from hybrid.errors import SceneError
 from hybrid.model.effort import Asked, Effort, first_effort, wants_errors
 from hybrid.model.grade import GROWTH, grading
@@ -332,11 +332,12 @@ def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
 
     record, count = Job.record, []
 
-    def failing(self, effort, target, overwrite):
+    def failing(self, effort, target):
         count.append(effort)
         if len(count) > 1:
+            target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
             raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
-        return record(self, effort, target, overwrite)
+        return record(self, effort, target)
 
     monkeypatch.setattr(Job, "record", failing)
     result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
@@ -385,3 +386,66 @@ def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
     result = hybrid.run(swinging(model="catenary", accuracy="0.1%"))
     (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
     assert "model" in missed.text and result.attributes["effort_runs"] <= 5
+
+
+def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
+    """Ctrl-C in the second run: the first stays, with its figure, and says that it is not what was asked."""
+    from hybrid.job import Job
+
+    record, count = Job.record, []
+
+    def stopping(self, effort, target):
+        count.append(effort)
+        if len(count) > 1:
+            raise KeyboardInterrupt
+        return record(self, effort, target)
+
+    monkeypatch.setattr(Job, "record", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.attributes["error_total_pull"] > 0.01
+        (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+        assert "stopped" in missed.text
+
+
+def test_an_equilibrium_does_not_replace_a_file_unasked(tmp_path):
+    scene, target = swinging(time=None, accuracy="1%"), tmp_path / "rest.h5"
+    hybrid.static(scene, target, overwrite=False)
+    before = target.read_bytes()
+    with pytest.raises(hybrid.ResultError, match="exists"):
+        hybrid.static(scene, target, overwrite=False)
+    assert target.read_bytes() == before
+    hybrid.static(scene, target)
+
+
+def made_up(notes=(), model=(), bound=0.0, fineness=1.0, steps=100):
+    """A run that says something of itself, whose position is off by 1/fineness."""
+    position = np.full((9, 4, 3), 0.01 / fineness**2)
+    model_error = {"position": np.full((9, 4), model)} if model else {}
+    effort = Effort(fineness, 0.1, 1e-6, 1e-3)
+    return Sketch(
+        effort, {"position": position}, round(100 * fineness), steps, 0.0, 1, False, model_error, bound, tuple(notes)
+    )
+
+
+def test_notes_and_model_error_are_of_the_runs_that_count():
+    """What a result said that was replaced by a finer one, or a model error of zones before, is not told."""
+    said = iter([made_up([("vibrations damped", "first")]), made_up(fineness=9.0, steps=900)])
+    before = made_up([("error beyond estimate", "before")], 0.004, 0.1, 0.5, 50)
+    after = made_up((), 0.0005, 0.1, 4.5, 450)
+    comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
+    climb = Climb(Asked(0.005, None, None), True, True, True, True, lambda _: next(comparisons), lambda _: next(said))
+    final, errors = climb.reach(Effort(1.0, 0.1, 1e-6, 1e-3))
+    assert final.cells == 900 and len(climb.runs) == 6
+    assert errors.largest("model", "position") == 0.0005
+    assert climb.notes == ()
+
+
+def test_a_model_error_that_cannot_be_true_is_not_counted():
+    estimate = Estimate(made_up(), made_up((), 0.4, 0.1, 0.5, 50), None, None)
+    assert estimate.errors.largest("model", "position") == 0.4
+    estimate.take_model(made_up((), 40.0, 0.1, 0.5, 50))
+    assert estimate.errors.largest("model", "position") == 0.0
+    assert [kind for kind, _ in estimate.notes] == ["error beyond estimate"]

@@ -16,10 +16,10 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 USUAL = "1%"  # of a scene that asks for nothing and leaves its steps open
 # Parts of what is asked that zones may make of it; mesh and time step share the rest as they come.
 OF_ZONES = 0.1
-ONE = 0.01
+ONE = 0.01  # what the guesses below are for
 ZONES = 1e-3  # of a scene that asks for nothing: part of the length
 # Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
-# Medians of what the examples needed (docs/accuracy.md), as are those below; what is asked decides, not they.
+# First guesses after runs of the examples, as are those of the step below: the error figure decides, not they.
 FOR_TENSION, FOR_POSITION = 1.5, 0.4
 # Fewer cells show no shape; more are not needed before the first error figure has said so.
 COARSEST, FINEST = 0.5, 20.0

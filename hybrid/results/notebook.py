@@ -16,7 +16,6 @@ class Notebook:
     def __init__(self) -> None:
         self.times: list[float] = []
         self.events: list[tuple[str, str]] = []  # kind, text
-        self.steps = 0
         self._kept: dict[str, list[Any]] = {}
 
     @property
@@ -34,8 +33,7 @@ class Notebook:
             self._kept.setdefault(name, []).append(array)
 
     def log(self, values: Mapping[str, float | int]) -> None:
-        """Count a step."""
-        self.steps += 1
+        """Steps are not kept."""
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
         """Note that something happened at time t (s) from s_a to s_b (m)."""
