@@ -58,8 +58,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "results/export": ("errors", "results/read"),
     "results/record": ("errors", "results/read"),
     "results/notebook": ("errors",),
+    "results/grid": ("model",),
     "results/touchdown": ("model",),
-    "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/touchdown"),
+    "results/probes": ("errors", "physics", "model", "solve", "results/record", "results/grid", "results/touchdown"),
     "watch": ("errors", "physics", "model", "solve", "results"),
     "flat": ("errors", "scene", "model", "solve"),
     "motion": (
@@ -99,7 +100,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "rungs": ("errors", "scene", "results", "simulate", "machine"),
     "ladder": ("errors", "scene", "model", "results", "peers", "rungs"),
     "live": ("errors", "compiled", "results", "model", "simulate", ""),
-    "cli": ("errors", "scene", "model", "results", "simulate", "ladder", "live", "compiled", ""),
+    "said": ("errors", "scene", "model", "results", "live"),
+    "cli": ("errors", "scene", "model", "results", "simulate", "ladder", "live", "said", "compiled", ""),
     "__init__": ("errors", "scene", "model", "results", "simulate", "ladder"),
 }
 
@@ -142,7 +144,7 @@ ONLY = {
     "pydantic": ("scene",),
     "ruamel": ("scene",),
     "typer": ("cli",),
-    "rich": ("cli", "live"),
+    "rich": ("said", "live"),
 }
 
 

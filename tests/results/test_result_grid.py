@@ -9,7 +9,7 @@ import pytest
 from scipy.interpolate import CubicHermiteSpline
 
 from hybrid.model.mesh import Zone
-from hybrid.results.probes import Grid
+from hybrid.results.grid import Grid
 
 Floats = np.ndarray
 
