@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     from hybrid.results.zoneplot import plot_zones
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.simulate import run, static
+    from hybrid.simulate import resume, run, static
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -43,6 +43,7 @@ _HOME = {
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
     "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
+    "resume": ("hybrid.simulate", "resume"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
@@ -65,6 +66,7 @@ __all__ = [
     "plan",
     "plot",
     "plot_zones",
+    "resume",
     "run",
     "scene_text",
     "static",

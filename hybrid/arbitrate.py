@@ -14,9 +14,10 @@ import numpy as np
 
 from hybrid.model.plan import output_times
 from hybrid.model.state import Floats
+from hybrid.results.format import Field
 from hybrid.results.probes import PROBES, output_points
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.solve.shooting import ShootingState, simulate, static

@@ -154,7 +154,7 @@ class LiveLine:
         self._drawn = True
 
     def _show(self, text: str) -> None:
-        from IPython.display import display  # type: ignore[import-not-found]  # a notebook has it
+        from IPython.display import display  # a notebook has it
 
         if self._display is None:
             self._display = display({"text/plain": text}, raw=True, display_id=True)

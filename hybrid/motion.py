@@ -16,6 +16,7 @@ from hybrid.adapt.manager import Change
 from hybrid.correction import Correction
 from hybrid.errors import ComputationError, Outcome
 from hybrid.flat import Flat
+from hybrid.freeze import freeze, program, thaw
 from hybrid.model.build import Model
 from hybrid.model.effort import Effort
 from hybrid.model.plan import step_ends
@@ -34,6 +35,7 @@ from hybrid.zoning import Zoning
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 MOST_RESCUES = 20  # of one step, by more rod
 CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
+OUTSIDE = ("scene", "observer", "recorder", "target")  # of a motion: what a checkpoint does not hold
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 
 
@@ -92,6 +94,36 @@ class Motion:
         if scene.time.rho_inf == 1.0 and not model.line.ck.all():
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             recorder.event(0.0, 0.0, model.length, "undamped", text)
+
+    def __getstate__(self) -> dict[str, Any]:
+        """What `rejoin` does not give it."""
+        return {name: x for name, x in vars(self).items() if name not in OUTSIDE} | {
+            "cpu": clock.process_time() - self.cpu, "first_energy": self.observer.first_energy,
+        }  # fmt: skip
+
+    def rejoin(self, scene: Scene, observer: Observer, recorder: Recorder | Notebook, target: Path) -> None:
+        """Go on after a checkpoint, with what was not in it."""
+        self.scene, self.observer, self.recorder, self.target = scene, observer, recorder, target
+        self.cpu = clock.process_time() - self.cpu
+        observer.first_energy = self.__dict__.pop("first_energy")
+        self.watch.recorder = recorder
+
+    def keep(self, at_once: bool = False) -> None:
+        """Bring the file up to date, with a checkpoint at the output just written, if it is time to (or `at_once`)."""
+        recorder = self.recorder
+        if not isinstance(recorder, Recorder) or not (at_once or recorder.due):
+            return
+        if isinstance(self.target, Path):
+            recorder.flush(program(), lambda: (freeze(thaw(freeze(self.effort))), freeze(self, self.outside)))
+        else:
+            recorder.flush()
+
+    @property
+    def outside(self) -> dict[str, object]:
+        """What a checkpoint names but does not hold: it is made anew from the scene."""
+        manager = self.zoning.manager if self.zoning is not None else None
+        motions = {f"motion {k}": motion for k, motion in self.model.ends.motions.items()}
+        return {"recorder": self.recorder, "criterion": manager and manager.user, **motions}
 
     def _on(self, model: Model) -> None:
         """Go on with another line on the same nodes: in a plane, or in space."""

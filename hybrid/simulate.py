@@ -20,16 +20,21 @@ import numpy as np
 
 from hybrid.accuracy import Climb, Errors, Sketch, summary
 from hybrid.adapt.manager import UserCriterion
-from hybrid.errors import SceneError
+from hybrid.errors import ResultError, SceneError
+from hybrid.freeze import freeze, thaw
 from hybrid.job import Job
 from hybrid.model.effort import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.model.mesh import Zone
 from hybrid.motion import Motion
-from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, amend, check_target
+from hybrid.results.checkpoint import claimed, climb_of
+from hybrid.results.format import Field
+from hybrid.results.read import Result, open_result, opened
+from hybrid.results.record import amend, check_target
 from hybrid.scene.motion import check_motions
+from hybrid.scene.read import parse_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 
+Record = Callable[[Effort, Path | io.BytesIO], Sketch]
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
 
@@ -76,27 +81,98 @@ def run(
         return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    job, begin = Job(scene, criterion), clock.process_time()
-    target, effort = _target(output, overwrite), first_effort(scene)
-    with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
-        job.told, job.interrupted = told, interrupted
-        if not wants_errors(scene):
-            job.record(effort, target)
-            return open_result(target)
-        climb = Climb(
-            asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None,
-            zones_are_free(scene), True,
-            job.sketch, _kept(target, job.record),
-        )  # fmt: skip
-        try:
-            final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
-        except KeyboardInterrupt:
-            if climb.estimate is not None:  # stopped in a finer run: the result before it stands, with its figure
-                stopped = climb.stopped()
-                _amend(target, scene, *stopped, climb, clock.process_time() - begin)
-            raise
-        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    job, target = Job(scene, criterion), _target(output, overwrite)
+    with _working(job, target, progress):
+        _run(job, target, None, None)
     return open_result(target)
+
+
+def resume(
+    source: str | Path,
+    output: str | Path | None = None,
+    *,
+    progress: bool | Callable[[Progress], None] = False,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Go on with a run that was cut off, from the last checkpoint in its file.
+
+    What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
+    times).  output: another file; None: the same.  criterion: the one that `run` was given, if it was.
+
+    Raises ResultError when there is nothing to go on with or the file is another program's, and else as `run`.
+    """
+    path = Path(source).expanduser().resolve()
+    scene, climb = _left(path)
+    target = path if output is None else Path(output).expanduser().resolve()
+    if target != path:
+        check_target(target, True)
+    job = Job(scene, criterion)
+    with _working(job, target, progress):
+        _run(job, target, path, climb)
+    return open_result(target)
+
+
+def _left(path: Path) -> tuple[Scene, Climb | None]:
+    """What a file leaves to be done: its scene, and the climb that it is part of.  ResultError: nothing."""
+    with opened(path) as file:
+        climb = climb_of(file)
+        with open_result(path) as result:
+            if result.status == "complete" and not climb:
+                raise ResultError(f"{path} is complete\n    try:      to go on beyond its end, say until when")
+            scene = parse_scene(result.scene_text)
+    return scene, thaw(climb) if climb else None
+
+
+def _run(job: Job, target: Path | io.BytesIO, source: Path | None, climb: Climb | None) -> None:
+    """Compute a result, and its errors if they are wanted; source, climb: what to go on with."""
+    scene, begin = job.scene, clock.process_time()
+    assert scene.time is not None
+    effort = first_effort(scene)
+    if not wants_errors(scene):
+        if source is not None and isinstance(target, Path):
+            job.go_on(source, target)
+        else:
+            job.record(effort, target)
+        return
+
+    def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if source is not None and isinstance(to, Path):
+            return job.go_on(source, to)
+        return job.record(effort, to, freeze(climb))
+
+    def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
+            return job.go_on(to, to)
+        return job.record(effort, to, freeze(climb))
+
+    fresh, compute = climb is None, _kept(target, first, later)
+    if climb is None:
+        steps_are_free = scene.time.controlled and scene.time.tolerance is None
+        climb = Climb(
+            asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
+        )
+    else:
+        climb.sketch, climb.result = job.sketch, compute
+    try:
+        if fresh:
+            final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
+        else:
+            final, errors = climb.go_on()
+    except KeyboardInterrupt:
+        if climb.estimate is not None:  # stopped in a finer run: the result before it stands, with its figure
+            _amend(target, scene, *climb.stopped(), climb, clock.process_time() - begin, done=False)
+        raise
+    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+
+
+@contextmanager
+def _working(job: Job, target: Path | io.BytesIO, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
+    """Hold the target, hear of interrupts, and tell of the progress, until a run is done."""
+    assert job.scene.time is not None
+    held = claimed(target if isinstance(target, Path) else None)
+    with held, _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
+        job.told, job.interrupted = told, interrupted
+        yield
 
 
 def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
@@ -111,36 +187,32 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     if not wants_errors(scene):
         job.record_rest(effort, target)
         return open_result(target)
-    climb = Climb(
-        asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest,
-        _kept(target, job.record_rest),
-    )  # fmt: skip
+    compute = _kept(target, job.record_rest, job.record_rest)
+    climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
     final, errors = climb.reach(effort)
     _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
 
-def _kept(
-    target: Path | io.BytesIO, record: Callable[[Effort, Path | io.BytesIO], Sketch]
-) -> Callable[[Effort], Sketch]:
+def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], Sketch]:
     """Record results one after the other: a finer one takes the place of that before it when it is complete."""
     done = False
 
     def compute(effort: Effort) -> Sketch:
         nonlocal done
         if not done:
-            found, done = record(effort, target), True
+            found, done = first(effort, target), True
             return found
         if isinstance(target, io.BytesIO):
             new = io.BytesIO()
-            found = record(effort, new)
+            found = later(effort, new)
             target.seek(0)
             target.truncate()
             target.write(new.getvalue())
             return found
-        beside = target.with_name(f".{target.name}.{os.getpid()}.finer")
+        beside = target.with_name(f".{target.name}.finer")
         try:
-            found = record(effort, beside)
+            found = later(effort, beside)
             os.replace(beside, target)
         finally:
             for left in (beside, beside.with_suffix(".snapshot.npz")):
@@ -151,9 +223,13 @@ def _kept(
 
 
 def _amend(
-    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float
-) -> None:
-    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file."""
+    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float,
+    done: bool = True,
+) -> None:  # fmt: skip
+    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file.
+
+    done: nothing is left to go on with; else the file keeps what a finer result goes on from.
+    """
     effort = final.effort
     attributes: dict[str, str | float | int] = {
         "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
@@ -175,7 +251,7 @@ def _amend(
                 if kind == "model" and final.model_error:
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
-    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()))
+    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()), done)
 
 
 UNITS_OF_ERRORS = {

@@ -69,7 +69,7 @@ class EndConditions:
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
         self.breaks = sorted({x.until for x in loads if np.isfinite(x.until)})
-        self._loads, self._motions = tuple(loads), motions
+        self._loads, self.motions = tuple(loads), motions
         self._given = (frame.copy(), np.zeros((2, 3)))  # frames and their spins without motion
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
@@ -96,7 +96,7 @@ class EndConditions:
 
         t = infinity asks for what is given when everything has grown and turned in (motions stand at 0).
         """
-        for k, motion in self._motions.items():
+        for k, motion in self.motions.items():
             position, velocity, frame, spin = motion.at(t if np.isfinite(t) else 0.0)
             self.values.position[k] = position
             self.velocity[k] = velocity
@@ -119,7 +119,7 @@ class EndConditions:
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""
-        if not self._motions:
+        if not self.motions:
             return np.zeros((2, 3))
         self.at(t + 0.5 * dt)
         after = self.velocity.copy()
@@ -157,7 +157,7 @@ class EndConditions:
     def _turn(self, t: float) -> None:
         part, rate = rise(t, self._bring_in)
         for k, (axis, angle) in self._turns.items():
-            if k not in self._motions:
+            if k not in self.motions:
                 self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
             if part < 1.0:
                 back = _rotation(axis, -angle * (1.0 - part))

@@ -14,6 +14,7 @@ Layout, format 1 (`record` writes it)::
     /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
     /events/{criterion,value,threshold,energy}
     /scene                          the scene, as YAML text
+    /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
 
 A table grows by whole rows and its dimension scale grows last, so the length of the
 scale says how many rows are complete; a reader beside a running writer, or after a
@@ -28,7 +29,7 @@ import io
 import time
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -39,6 +40,7 @@ from hybrid.errors import ResultError
 
 FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
+HIDDEN = ("checkpoint",)  # what is for the program alone
 ALIASES = {"times": "t", "moment": "bending_moment"}
 
 # The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
@@ -168,6 +170,8 @@ class Result:
         groups: set[str] = set()
 
         def visit(name: str, item: Any) -> None:
+            if name.split("/")[0] in HIDDEN:
+                return
             if isinstance(item, h5py.Dataset) and name != "scene":
                 self._dims[name] = tuple(d.label for d in item.dims)
                 self.units[name] = _text(item.attrs.get("units", ""))
@@ -342,6 +346,14 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     """
     source = io.BytesIO(source) if isinstance(source, bytes) else source
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
+
+
+@contextmanager
+def opened(source: Path) -> Iterator[h5py.File]:
+    """The HDF5 file of a result, for what is not in a `Result`.  ResultError as of `open_result`."""
+    with _open_file(source) as file:
+        _check_format(file, source)
+        yield file
 
 
 def is_result(path: Path) -> bool:

@@ -19,8 +19,9 @@ from matplotlib.figure import Figure
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.results import look, panels, plot, views, zoneplot
+from hybrid.results.format import Field
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.record import Recorder
 
 MIXED = [("catenary", 0.0, 75.0), ("rod", 75.0, 100.0)]
 
