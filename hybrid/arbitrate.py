@@ -78,7 +78,7 @@ def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: t
     ]
     return Recorder(
         target, grid_s=s, fields=fields, step_fields=steps, attributes={"title": scene.title, "solver": "shooting"},
-        scene_text=scene_text(scene), overwrite=overwrite,
+        texts={"scene": scene_text(scene)}, overwrite=overwrite,
     )  # fmt: skip
 
 

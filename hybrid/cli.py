@@ -1,4 +1,4 @@
-"""The command line: hybrid run | static | plan | plot | trade | schema.
+"""The command line: hybrid run | resume | static | plan | plot | trade | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -106,27 +106,38 @@ def run(
         duration = asked.require_time().duration
         target = say.will_write(output or Path(f"{scene.stem}.h5"))
         cold = say.compiling(_kernels(asked))
-        from hybrid.live import span, speed
-
         begin = clock.perf_counter()
         with say.progress() as tell:
             result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
-        wall = clock.perf_counter() - begin
-        picture = _draw(result, target.with_suffix(".png")) if plot else None
-        steps = len(result["steps/t"]) if "steps/t" in result else 0
-        pace = "compilation included" if cold else f"{speed(duration / wall)} x real time"
-        text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
-        say.events(result.events)
-        facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
-        if facts:
-            say.show(lambda: zones_said(facts, target))
-        errors = errors_facts(result)
-        if errors:
-            say.show(lambda: errors_table(errors, result))
-        else:
-            text += "; error not estimated"
-        facts |= {"errors": errors}
-        say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
+        _ended(say, asked, result, target, clock.perf_counter() - begin, duration, cold, plot)
+
+
+@app.command()
+def resume(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to go on with.", show_default=False)],
+    output: Annotated[Path | None, _output("Another file; else the same.")] = None,
+    until: Annotated[float | None, typer.Option(metavar="T", help="Go on until then (s).")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Other currents, waves, motions, loads ..")
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="T", help=".. from then on (s); else from where it is.")
+    ] = None,
+    plot: Drawn = False, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Go on with a run that was stopped, beyond its end, or with other loads."""
+    with _speaking(as_json, quiet) as say:
+        from hybrid.remainder import remainder
+
+        say.source = str(result)
+        target, changed = say.will_write(output or result), settings or []
+        left = remainder(result.resolve(), until, changed, start)
+        cold = say.compiling(_kernels(left.scene))
+        begin = clock.perf_counter()
+        with say.progress() as tell:
+            more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=tell)
+        computed = left.scene.require_time().duration - left.reached
+        _ended(say, left.scene, more, target, clock.perf_counter() - begin, computed, cold, plot)
 
 
 @app.command()
@@ -307,6 +318,32 @@ def _kernels(scene: Scene) -> list[str]:
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
         needed.append("correct.follow")
     return needed
+
+
+def _ended(
+    say: Voice, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool, plot: bool
+) -> None:
+    """What there is to say of a run that has come to its end; computed: s of it, just now."""
+    from hybrid.live import span, speed
+
+    picture = _draw(result, target.with_suffix(".png")) if plot else None
+    steps = len(result["steps/t"]) if "steps/t" in result else 0
+    pace = "compilation included" if cold else f"{speed(computed / wall)} x real time"
+    duration = asked.require_time().duration
+    text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
+    if computed < duration:
+        text = f"{duration:.6g} s in {steps} steps, the last {computed:.6g} s in {span(wall)} of wall time ({pace})"
+    say.events(result.events)
+    facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
+    if facts:
+        say.show(lambda: zones_said(facts, target))
+    errors = errors_facts(result)
+    if errors:
+        say.show(lambda: errors_table(errors, result))
+    else:
+        text += "; error not estimated"
+    facts |= {"errors": errors}
+    say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
 
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:

@@ -30,6 +30,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.state import Floats
 from hybrid.motion import Motion
 from hybrid.physics.loads import SEABED, SURFACE
+from hybrid.remainder import Phase, changes_text
 from hybrid.rest import equilibrium_of, zones_and_rest
 from hybrid.results.checkpoint import Checkpoint, read_checkpoint
 from hybrid.results.format import Field
@@ -76,8 +77,9 @@ class Told(Protocol):
 class Job:
     """One scene, computed as often and as finely as it takes."""
 
-    def __init__(self, scene: Scene, criterion: UserCriterion | None) -> None:
-        self.scene, self.criterion = scene, criterion
+    def __init__(self, scene: Scene, criterion: UserCriterion | None, changes: Sequence[Phase] = ()) -> None:
+        """changes: scenes that hold from some time on; what they may differ in, `remainder` has looked at."""
+        self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
         self.told: Told
         self.interrupted: Callable[[], bool] = lambda: False
 
@@ -88,7 +90,7 @@ class Job:
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
         keeps = climb if isinstance(target, Path) else None
-        recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps)
+        recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps, self._texts)
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones held", HELD)
         with recorder:
@@ -108,11 +110,17 @@ class Job:
             motion = self._thawed(point, source)
             s = output_points(self.scene.output.points, motion.model.length)
             observer = self._observer(motion.model, motion.zoning, s)
-            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point)
-        motion.rejoin(self.scene, observer, recorder, target)
+            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts)
+        now = self.changes[motion.changes - 1].scene if motion.changes else self.scene
+        motion.rejoin(now, observer, recorder, target)
         with recorder:
             self._finish(motion, output_times(self.scene))
         return self._seen(motion, target, clock.process_time() - begin)
+
+    @property
+    def _texts(self) -> dict[str, str]:
+        """What the file says of the scene, and of what changes."""
+        return {"scene": scene_text(self.scene), "changes": changes_text(self.changes)}
 
     def goes_on(self, source: Path, effort: Effort) -> bool:
         """Whether a file holds a run with this effort that was cut off."""
@@ -123,14 +131,14 @@ class Job:
         return point is not None and point.program == program() and point.effort == freeze(thaw(freeze(effort)))
 
     def _thawed(self, point: Checkpoint, source: Path) -> Motion:
-        """The motion of a checkpoint.  ResultError if another program has written it, or what moves the ends went."""
-        if point.program != program():
-            wrote, this = (x.split()[0] for x in (point.program, program()))
-            said = f"{source} was computed by hybrid-cable {wrote}" + " in another state" * (wrote == this)
-            why = f"this is {this}, whose numbers may differ: a run goes on with the program that began it"
-            raise ResultError(f"{said}\n    detail:   {why}\n    try:      that version, or run its scene again")
-        motions = build(self.scene, thaw(point.effort)).ends.motions
-        outside = {"recorder": None, "criterion": self.criterion, **{f"motion {k}": x for k, x in motions.items()}}
+        """The motion of a checkpoint.  ResultError: its criterion is missing, or the ends move otherwise."""
+        if point.asks and self.criterion is None:
+            advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
+            raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
+        effort = thaw(point.effort)
+        outside: dict[str, object] = {"recorder": None, "criterion": self.criterion}
+        for n, scene in enumerate((self.scene, *(x.scene for x in self.changes))):
+            outside |= {f"motion {n} {k}": x for k, x in build(scene, effort).ends.motions.items()}
         motion: Motion = thaw(point.state, outside)
         was = motion.model.ends.values.position.copy()
         motion.model.ends.at(motion.t)
@@ -262,11 +270,19 @@ class Job:
         )  # fmt: skip
 
     def _move(self, motion: Motion, outputs: Sequence[float]) -> None:
+        """From where a motion is to the last output, with what changes on the way."""
+        for t, scene in [(x.t, x.scene) for x in self.changes[motion.changes :]]:
+            self._until(motion, [*(x for x in outputs if x < t), t], set(outputs))
+            motion.change(scene)
+            motion.keep()
+        self._until(motion, outputs, set(outputs))
+
+    def _until(self, motion: Motion, stops_at: Sequence[float], outputs: set[float]) -> None:
         """The loop over time."""
-        breaks = motion.model.ends.breaks
-        stops = {*outputs, *(t for t in breaks if t < outputs[-1])}
+        end, breaks = stops_at[-1], motion.model.ends.breaks
+        stops = {*stops_at, *(t for t in breaks if t < end)}
         if motion.control is not None:
-            stops |= {t for t in ramp_ends(self.scene) if t < outputs[-1]}
+            stops |= {t for t in ramp_ends(motion.scene) if t < end}
         for stop in sorted(t for t in stops if t > motion.t):
             for until in motion.ends_of_steps(stop):
                 motion.advance(until)
@@ -343,6 +359,7 @@ def _recorder(
     outputs: int,
     found: Equilibrium | None = None,
     climb: bytes | None = None,
+    texts: Mapping[str, str] | None = None,
 ) -> Recorder:
     """The file of a result; whether it may be replaced was asked before anything was computed."""
     attributes: dict[str, str | float | int] = {
@@ -358,8 +375,8 @@ def _recorder(
         )
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
-        attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=True,
-        climb=climb,
+        attributes=attributes, texts=texts or {"scene": scene_text(scene)}, fixed=fixed,
+        outputs=outputs + 1, overwrite=True, climb=climb,
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "clamp left out", text)

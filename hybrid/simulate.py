@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -21,17 +21,17 @@ import numpy as np
 from hybrid.accuracy import Climb, Errors, Sketch, summary
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError, SceneError
-from hybrid.freeze import freeze, thaw
+from hybrid.freeze import freeze
 from hybrid.job import Job
 from hybrid.model.effort import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.model.mesh import Zone
 from hybrid.motion import Motion
-from hybrid.results.checkpoint import claimed, climb_of
+from hybrid.remainder import Remainder, remainder
+from hybrid.results.checkpoint import claimed
 from hybrid.results.format import Field
-from hybrid.results.read import Result, open_result, opened
+from hybrid.results.read import Result, open_result
 from hybrid.results.record import amend, check_target
 from hybrid.scene.motion import check_motions
-from hybrid.scene.read import parse_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 
 Record = Callable[[Effort, Path | io.BytesIO], Sketch]
@@ -82,8 +82,8 @@ def run(
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     job, target = Job(scene, criterion), _target(output, overwrite)
-    with _working(job, target, progress):
-        _run(job, target, None, None)
+    with claimed(target if isinstance(target, Path) else None), _working(job, progress):
+        _run(job, target)
     return open_result(target)
 
 
@@ -91,86 +91,87 @@ def resume(
     source: str | Path,
     output: str | Path | None = None,
     *,
+    until: float | None = None,
+    settings: Sequence[str] = (),
+    start: float | None = None,
     progress: bool | Callable[[Progress], None] = False,
     criterion: UserCriterion | None = None,
 ) -> Result:
-    """Go on with a run that was cut off, from the last checkpoint in its file.
+    """Go on with a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
 
     What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
-    times).  output: another file; None: the same.  criterion: the one that `run` was given, if it was.
+    times).  output: another file; None: the same.  until: s, a later end.  settings: changes such as
+    ``environment.fluid.current=[0.5, 0, 0]`` (currents, waves, and what moves and loads the ends) from `start` (s) on;
+    None: from the checkpoint; before it the run is computed anew, into another file.  criterion: as `run` was given.
 
     Raises ResultError when there is nothing to go on with or the file is another program's, and else as `run`.
     """
     path = Path(source).expanduser().resolve()
-    scene, climb = _left(path)
     target = path if output is None else Path(output).expanduser().resolve()
     if target != path:
         check_target(target, True)
-    job = Job(scene, criterion)
-    with _working(job, target, progress):
-        _run(job, target, path, climb)
+    with claimed(target):
+        left = remainder(path, until, settings, start)
+        if left.anew and target == path:
+            why = "a change before the checkpoint computes the run anew"
+            raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
+        job = Job(left.scene, criterion, left.changes)
+        with _working(job, progress):
+            _run(job, target, path, left)
     return open_result(target)
 
 
-def _left(path: Path) -> tuple[Scene, Climb | None]:
-    """What a file leaves to be done: its scene, and the climb that it is part of.  ResultError: nothing."""
-    with opened(path) as file:
-        climb = climb_of(file)
-        with open_result(path) as result:
-            if result.status == "complete" and not climb:
-                raise ResultError(f"{path} is complete\n    try:      to go on beyond its end, say until when")
-            scene = parse_scene(result.scene_text)
-    return scene, thaw(climb) if climb else None
-
-
-def _run(job: Job, target: Path | io.BytesIO, source: Path | None, climb: Climb | None) -> None:
-    """Compute a result, and its errors if they are wanted; source, climb: what to go on with."""
+def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: Remainder | None = None) -> None:
+    """Compute a result, and its errors if they are wanted; source, left: what to go on with."""
     scene, begin = job.scene, clock.process_time()
     assert scene.time is not None
-    effort = first_effort(scene)
-    if not wants_errors(scene):
-        if source is not None and isinstance(target, Path):
-            job.go_on(source, target)
-        else:
-            job.record(effort, target)
-        return
+    anew = left is None or left.anew
+    climb = left.climb if left is not None else None
 
     def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
-        if source is not None and isinstance(to, Path):
-            return job.go_on(source, to)
-        return job.record(effort, to, freeze(climb))
+        if anew or source is None or isinstance(to, io.BytesIO):
+            return job.record(effort, to, kept())
+        return job.go_on(source, to)
 
     def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
         if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
             return job.go_on(to, to)
-        return job.record(effort, to, freeze(climb))
+        return job.record(effort, to, kept())
 
-    fresh, compute = climb is None, _kept(target, first, later)
-    if climb is None:
-        steps_are_free = scene.time.controlled and scene.time.tolerance is None
-        climb = Climb(
-            asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
-        )
-    else:
-        climb.sketch, climb.result = job.sketch, compute
+    def kept() -> bytes:
+        return freeze(climb) if climb is not None else b""
+
+    effort = first_effort(scene) if left is None else left.effort
+    if not wants_errors(scene):
+        first(effort, target)
+        return
+    compute = _kept(target, first, later)
     try:
-        if fresh:
-            final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
-        else:
+        if climb is not None:
+            climb.sketch, climb.result = job.sketch, compute
             final, errors = climb.go_on()
+        else:
+            steps_are_free = scene.time.controlled and scene.time.tolerance is None
+            climb = Climb(
+                asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
+            )
+            if left is None and asked(scene):
+                effort = replace(effort, grading=job.survey(effort))
+            final, errors = climb.reach(effort)
     except KeyboardInterrupt:
-        if climb.estimate is not None:  # stopped in a finer run: the result before it stands, with its figure
-            _amend(target, scene, *climb.stopped(), climb, clock.process_time() - begin, done=False)
+        if climb is not None and climb.estimate is not None:
+            # stopped in a finer run: the result before it stands, with its figure
+            final, errors = climb.stopped()
+            _amend(target, scene, final, errors, climb, clock.process_time() - begin, done=False)
         raise
     _amend(target, scene, final, errors, climb, clock.process_time() - begin)
 
 
 @contextmanager
-def _working(job: Job, target: Path | io.BytesIO, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
-    """Hold the target, hear of interrupts, and tell of the progress, until a run is done."""
+def _working(job: Job, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
+    """Hear of interrupts, and tell of the progress, until a run is done."""
     assert job.scene.time is not None
-    held = claimed(target if isinstance(target, Path) else None)
-    with held, _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
+    with _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
         job.told, job.interrupted = told, interrupted
         yield
 

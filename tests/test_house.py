@@ -66,6 +66,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "watch": ("errors", "physics", "model", "solve", "results"),
     "flat": ("errors", "scene", "model", "solve"),
     "freeze": ("errors", "compiled", ""),
+    "remainder": ("errors", "freeze", "accuracy", "scene", "model", "results"),
     "motion": (
         "errors",
         "freeze",
@@ -85,6 +86,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "job": (
         "errors",
         "freeze",
+        "remainder",
         "accuracy",
         "correction",
         "rest",
@@ -101,6 +103,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "simulate": (
         "errors",
         "freeze",
+        "remainder",
         "accuracy",
         "job",
         "motion",
@@ -118,7 +121,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "ladder": ("errors", "scene", "model", "results", "peers", "rungs"),
     "live": ("errors", "compiled", "results", "model", "simulate", ""),
     "said": ("errors", "scene", "model", "results", "live"),
-    "cli": ("errors", "scene", "model", "results", "simulate", "ladder", "live", "said", "compiled", ""),
+    "cli": ("errors", "scene", "model", "results", "remainder", "simulate", "ladder", "live", "said", "compiled", ""),
     "__init__": ("errors", "scene", "model", "results", "simulate", "ladder"),
 }
 
@@ -142,6 +145,7 @@ ONLY = {
         "simulate",
         "ladder",
         "rungs",
+        "remainder",
         "peers",
         "arbitrate",
         "scene/motion",

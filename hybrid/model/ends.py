@@ -91,6 +91,16 @@ class EndConditions:
         self._growing_until = max((x.ramp or 0.0 for x in self._acting), default=0.0)
         self._grown = False
 
+    def go_on_from(self, old: EndConditions, t: float) -> None:
+        """Take the place of other conditions at t (s): tangents that are being turned in go on."""
+        self._turns, self._bring_in = dict(old._turns), old._bring_in
+        ramped = {(x.what, x.end): x.ramp for x in old._loads}
+        self._loads = tuple(
+            x._replace(ramp=ramped.get((x.what, x.end), x.ramp)) if x.ramp is None else x for x in self._loads
+        )
+        self.set_loads(t)
+        self.at(t)
+
     def at(self, t: float) -> Ends:
         """Positions, frames and loads at t; the arrays returned are overwritten by the next call.
 

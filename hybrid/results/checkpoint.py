@@ -34,13 +34,15 @@ _BLOCK = 1 << 22  # bytes that are copied at a time
 class Checkpoint(NamedTuple):
     """What a run goes on from.
 
-    number: it counts up; t: s; program: which wrote it; rows: of every table of the file that belong to it;
-    zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it is computed and where it is.
+    number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; rows: of every
+    table of the file that belong to it; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it
+    is computed and where it is.
     """
 
     number: int
     t: float
     program: str
+    asks: bool
     rows: dict[str, int]
     zones: list[tuple[str, float, float]]
     effort: bytes

@@ -23,7 +23,7 @@ _CHUNK_BYTES = 16384
 BLOCK = 512
 # Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
 _KIND, _TEXT = "S32", "S512"
-_RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "checkpoint"}
+_RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "changes", "checkpoint"}
 
 
 @dataclass(frozen=True)
@@ -87,6 +87,15 @@ def write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int
         if name in file.attrs:
             raise ResultError(f"the attribute '{name}' is written by the recorder itself")
         file.attrs[name] = value
+
+
+def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
+    """Texts as datasets of their own, instead of older ones; empty ones are left out."""
+    for name, text in texts.items():
+        if name in file:
+            del file[name]
+        if text:
+            file.create_dataset(name, data=text, dtype=h5py.string_dtype())
 
 
 def create_scales(

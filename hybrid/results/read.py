@@ -14,6 +14,7 @@ Layout, format 1 (`record` writes it)::
     /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
     /events/{criterion,value,threshold,energy}
     /scene                          the scene, as YAML text
+    /changes                        scenes that held from some time on, as JSON; only where there are any
     /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
 
 A table grows by whole rows and its dimension scale grows last, so the length of the
@@ -40,6 +41,7 @@ from hybrid.errors import ResultError
 
 FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
+TEXTS = ("scene", "changes")
 HIDDEN = ("checkpoint",)  # what is for the program alone
 ALIASES = {"times": "t", "moment": "bending_moment"}
 
@@ -172,7 +174,7 @@ class Result:
         def visit(name: str, item: Any) -> None:
             if name.split("/")[0] in HIDDEN:
                 return
-            if isinstance(item, h5py.Dataset) and name != "scene":
+            if isinstance(item, h5py.Dataset) and name not in TEXTS:
                 self._dims[name] = tuple(d.label for d in item.dims)
                 self.units[name] = _text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
@@ -302,6 +304,11 @@ class Result:
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
         return _text(self._file["scene"][()])
+
+    @property
+    def changes_text(self) -> str:
+        """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
+        return _text(self._file["changes"][()]) if "changes" in self._file else ""
 
     @property
     def title(self) -> str:

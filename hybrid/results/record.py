@@ -42,6 +42,7 @@ from hybrid.results.format import (
     set_status,
     tables_of,
     write_attributes,
+    write_texts,
 )
 from hybrid.results.read import is_result
 
@@ -50,6 +51,7 @@ from hybrid.results.read import is_result
 _PAUSE, _PART = 0.2, 50.0
 # The v110 file format is the oldest that has SWMR, so the most other programs can read it.
 _LIBVER = ("v110", "v110")
+AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 _STATUS = ("running", "complete", "interrupted", "failed")
 
 
@@ -95,7 +97,7 @@ class Recorder:
 
     target: path, or a BytesIO for a result in memory.  grid_s: (ns,) output arc lengths, m,
     unstretched.  fields: what `save` brings.  step_fields: what `log` brings, time first.
-    attributes: more root attributes, `title` among them.  scene_text: the scene as YAML.
+    attributes: more root attributes, `title` among them.  texts: "scene" as YAML, and others.
     fixed: quantities that do not depend on time, with their values; one whose only dimension
     is its own name becomes a dimension scale (the arc lengths of some probes, say).
     outputs: the number of outputs if it is known; it only makes small files smaller.
@@ -111,7 +113,7 @@ class Recorder:
         fields: Sequence[Field],
         step_fields: Sequence[Field],
         attributes: Mapping[str, str | float | int],
-        scene_text: str,
+        texts: Mapping[str, str],
         fixed: Sequence[tuple[Field, np.ndarray]] = (),
         outputs: int | None = None,
         overwrite: bool = False,
@@ -122,7 +124,7 @@ class Recorder:
 
         def fill(file: h5py.File) -> None:
             write_attributes(file, attributes)
-            file.create_dataset("scene", data=scene_text, dtype=h5py.string_dtype())
+            write_texts(file, texts)
             create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
             for group, columns in tables.items():
                 create_table(file, group, columns, outputs if group in ("/", "zones") else None)
@@ -141,8 +143,9 @@ class Recorder:
 
     @classmethod
     def again(
-        cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint
-    ) -> Recorder:
+        cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
+        texts: Mapping[str, str],
+    ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
         ResultError if the file holds other fields, or cannot be written.
@@ -159,6 +162,9 @@ class Recorder:
             copied(source, new, _LIBVER, at.rows, later)
             with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
                 set_status(file, "running", "")
+                write_texts(file, texts)
+                for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
+                    del file.attrs[name]
 
         self._write_to(_created(path.expanduser().resolve(), None, fill), path, tables)
         for table, count in zip(self._all, at.rows.values(), strict=True):
@@ -233,13 +239,16 @@ class Recorder:
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
         self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
 
-    def flush(self, program: str = "", frozen: Callable[[], tuple[bytes, bytes]] | None = None) -> None:
-        """Write what is held back, for readers to see; frozen: makes effort and state from which `program` goes on."""
+    def flush(
+        self, program: str = "", asks: bool = False, frozen: Callable[[], tuple[bytes, bytes]] | None = None
+    ) -> None:
+        """Write what is held back, for readers to see; frozen: makes effort and state from which `program`
+        goes on, with a criterion of the user's if it `asks`."""
         begin = monotonic()
         point = None
         if frozen is not None:
             rows = {table.scale: table.count + len(table.rows) for table in self._all}
-            point = Checkpoint(self._number, self.last, program, rows, self._zones or [], *frozen())
+            point = Checkpoint(self._number, self.last, program, asks, rows, self._zones or [], *frozen())
         self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
         self._number += point is not None
         self._flushed = monotonic()

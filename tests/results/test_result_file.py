@@ -45,7 +45,7 @@ def recorder(target: object, **more: object) -> Recorder:
         "fields": FIELDS,
         "step_fields": STEPS,
         "attributes": {"title": "Tëst", "seed": 7},
-        "scene_text": "title: Tëst\n",
+        "texts": {"scene": "title: Tëst\n"},
     }
     return Recorder(target, **(given | more))  # type: ignore[arg-type]
 

@@ -64,7 +64,7 @@ def made(
         fields.append(Field("touchdown_position", "m", "d", (2, 3), ("edge", "xyz"), "inertial", nan_ok=True))
     memory = io.BytesIO()
     recorder = Recorder(
-        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, scene_text="",
+        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, texts={},
         fixed=fixed, outputs=nt,
     )  # fmt: skip
     for t in np.linspace(0.0, 10.0, nt):
