@@ -45,6 +45,7 @@ from hybrid.results.format import (
     write_texts,
 )
 from hybrid.results.read import is_result
+from hybrid.results.room import ask_for_room
 
 # Outputs are held back at most this long (s), and so many times as long as writing takes: a reader hardly notices, a
 # kill loses no more, and a run that saves a thousand times a second spends 2 % of its time here instead of half.
@@ -53,6 +54,10 @@ _PAUSE, _PART = 0.2, 50.0
 _LIBVER = ("v110", "v110")
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 _STATUS = ("running", "complete", "interrupted", "failed")
+
+
+# Files that HDF5 could not write: it cannot close them either, and letting go of one ends the process.
+ABANDONED: list[Any] = []
 
 
 class _Table:
@@ -67,6 +72,14 @@ class _Table:
         """Write the waiting rows to all datasets but the scale."""
         for k in range(1, len(self.fields)):
             self._write_column(k)
+
+    @property
+    def room(self) -> int:
+        """Bytes that writing the waiting rows may take: of every dataset, its last chunk and those that follow."""
+        rows = len(self.rows)
+        return sum(
+            x.dtype.itemsize * int(np.prod(x.shape[1:], dtype=int)) * (rows + x.chunks[0]) for x in self.datasets
+        )
 
     @property
     def scale(self) -> str:
@@ -159,6 +172,7 @@ class Recorder:
         later = {x for x in names_in(source, "errors") if x not in ours}  # known only when all is done
 
         def fill(new: Path) -> None:
+            ask_for_room(new, Path(source.filename).stat().st_size, "")
             copied(source, new, _LIBVER, at.rows, later)
             with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
                 set_status(file, "running", "")
@@ -184,7 +198,7 @@ class Recorder:
         self.last = -np.inf  # time of the last output, s
         self._number = 0  # of the next checkpoint
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
-        self.closed = False
+        self.closed = self._broken = False
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then.
@@ -256,6 +270,9 @@ class Recorder:
 
     def _write(self, tables: Sequence[_Table], point: Checkpoint | None = None) -> None:
         waiting = [table for table in tables if table.rows]
+        if self.path is not None:
+            need = sum(table.room for table in waiting) + (len(point.state) if point is not None else 0)
+            ask_for_room(self.path, need, f", then `hybrid resume {self.path}`" if point is not None else "")
         try:
             for table in waiting:
                 table.write()
@@ -272,7 +289,8 @@ class Recorder:
             if self._outputs in waiting:
                 self._outputs.commit()
                 self._file.flush()
-        except OSError as error:
+        except (OSError, RuntimeError) as error:  # HDF5 raises either
+            self._broken = True
             advice = f"    detail:   {error}\n    try:      free some disk space"
             raise ResultError(f"{self.path} cannot be written\n{advice}") from error
 
@@ -283,11 +301,20 @@ class Recorder:
         if status not in _STATUS:
             raise ValueError(f"status {status!r} is none of {', '.join(_STATUS)}")
         self.closed = True
+        if self._broken:
+            ABANDONED.append((self._file, self._all))
+            return
         try:
             self.flush()
-            set_status(self._file, status, message)
+        except ResultError as error:
+            status, message = "failed", str(error)
+            raise
         finally:
-            self._file.close()
+            if self._broken:
+                ABANDONED.append((self._file, self._all))
+            else:
+                set_status(self._file, status, message)
+                self._file.close()
 
     def __enter__(self) -> Recorder:
         return self
@@ -318,6 +345,7 @@ def amend(
     try:
         if isinstance(where, Path):  # beside it, and then in its place: somebody may be reading
             new = where.with_name(f".{where.name}.{os.getpid()}.new")
+            ask_for_room(where, where.stat().st_size, "")
             with h5py.File(where, "r", locking="best-effort") as old:
                 copied(old, new, _LIBVER, None, without={CLIMB} if done else ())
         with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
