@@ -11,6 +11,7 @@ Exports read files and nothing else.  A file appears when it is whole, and not a
 from __future__ import annotations
 
 import csv
+import io
 from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
@@ -19,21 +20,22 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.results.fatigue import count
-from hybrid.results.labelled import write as write_netcdf
+from hybrid.results.labelled import image as netcdf
 from hybrid.results.part import (
     MARK,
     Numbers,
     Part,
     Window,
+    check_place,
     error_name,
     head_lines,
     part_of,
     scene_lines,
     shortfalls,
-    written,
+    write_whole,
 )
 from hybrid.results.read import Result
-from hybrid.results.vtk import write as write_vtkhdf
+from hybrid.results.vtk import image as vtkhdf
 
 SUFFIXES = {"nc": ".nc", "csv": ".csv", "vtkhdf": ".vtkhdf", "fatigue": ".cycles.csv"}
 # Decimals of an arc length in the name of a column: micrometres of a kilometre.
@@ -71,7 +73,7 @@ def export(
     file = Path(path).expanduser() if path is not None else beside(result.file or Path(), kind)
     files = [file]
     if kind == "csv":
-        names, at = names or ["tension"], _usual_places(result) if at is None else at
+        names, at = ["tension"] if names is None else names, _usual_places(result) if at is None else at
     part = part_of(result, names, times, at)
     notes = shortfalls(part)
     if kind == "fatigue":
@@ -80,18 +82,23 @@ def export(
         found = count(part_of(result, None, times), [] if at is None else part.s.tolist())
         notes += found.notes
         files.append(file.with_name(file.name.removesuffix(".csv").removesuffix(".cycles") + ".histories.csv"))
-    with written(files, overwrite) as new:
-        if kind == "nc":
-            write_netcdf(part, new[0])
-        elif kind == "vtkhdf":
-            write_vtkhdf(part, new[0])
-        elif kind == "fatigue":
-            _write_table(new[0], "cycles", found.head + scene_lines(part), found.cycle_names, found.cycles)
-            _write_table(new[1], "histories", found.head + scene_lines(part), found.history_names, found.histories)
-        else:
-            columns = histories(part)
-            head = head_lines(part) + _errors_of(part) + scene_lines(part)
-            _write_table(new[0], "histories", head, list(columns), list(columns.values()))
+    for place in files:
+        check_place(place, overwrite)  # before the work
+    if kind == "nc":
+        images = [netcdf(part)]
+    elif kind == "vtkhdf":
+        images = [vtkhdf(part)]
+    elif kind == "fatigue":
+        head = found.head + scene_lines(part)
+        images = [
+            _table("cycles", head, found.cycle_names, found.cycles),
+            _table("histories", head, found.history_names, found.histories),
+        ]
+    else:
+        columns = histories(part)
+        head = head_lines(part) + _errors_of(part) + scene_lines(part)
+        images = [_table("histories", head, list(columns), list(columns.values()))]
+    write_whole(dict(zip(files, images, strict=True)), overwrite)
     t = part.times
     text = f"{len(t)} output{'s' * (len(t) != 1)}, t = {t[0]:.6g}" + (f" to {t[-1]:.6g} s" if len(t) > 1 else " s")
     if kind == "fatigue":
@@ -168,15 +175,14 @@ def _errors_of(part: Part) -> list[str]:
     return ["errors:", *lines] if lines else ["errors: not estimated (output: {errors: true} in the scene asks for it)"]
 
 
-def _write_table(
-    file: Path, what: str, head: Sequence[str], names: Sequence[str], columns: Sequence[np.ndarray]
-) -> None:
+def _table(what: str, head: Sequence[str], names: Sequence[str], columns: Sequence[np.ndarray]) -> bytes:
     """A table with a head of comments.  Numbers as Python writes them: 17 digits if need be, a point, no grouping."""
-    with file.open("w", encoding="utf-8", newline="") as out:
-        out.writelines(f"# {line}\n" for line in (f"{MARK}: {what}", *head))
-        table = csv.writer(out, lineterminator="\n")
-        table.writerow(names)
-        table.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    out = io.StringIO(newline="")
+    out.writelines(f"# {line}\n" for line in (f"{MARK}: {what}", *head))
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(names)
+    table.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    return out.getvalue().encode()
 
 
 def _format(path: str | Path | None, format: str | None) -> str:

@@ -8,7 +8,6 @@ be a tree of xarray: their ``t`` would have to be that of the outputs.)
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,10 +38,10 @@ def dataset(part: Part) -> xarray.Dataset:
     return xr.Dataset(variables, coordinates, facts(part))
 
 
-def write(part: Part, file: Path) -> None:
-    """The same as netCDF 4."""
+def image(part: Part) -> bytes:
+    """The same as a netCDF 4 file."""
     needed("h5netcdf", "netCDF")
-    dataset(part).to_netcdf(file, engine="h5netcdf")
+    return bytes(dataset(part).to_netcdf(engine="h5netcdf"))
 
 
 def _name(name: str) -> str:

@@ -7,8 +7,8 @@ start from one, so that `--names`, `--times` and `--at` mean the same in each.
 from __future__ import annotations
 
 import os
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from importlib.metadata import PackageNotFoundError, version
@@ -20,6 +20,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.results.read import ALIASES
 
 if TYPE_CHECKING:
     from hybrid.results.read import Result
@@ -30,7 +31,7 @@ Window = tuple[float | None, float | None]
 # The first words of everything that is written here, so that a file of somebody else is never replaced.  Not the
 # format of a result: what is exported cannot be opened, plotted or resumed as one.
 MARK = "hybrid-cable export"
-# Kinds of numpy types that other formats have as well: numbers and text.
+# Kinds of numpy types that other formats have as well: numbers and text.  What lies over named dimensions is either.
 _KINDS = "fiuU"
 
 
@@ -130,24 +131,21 @@ def part_of(
     known = _exportable(result)
     chosen: list[str] = []
     for name in known if names is None else names:
-        value = result[name]  # refuses what is not there, and says what is near
-        inside = [f"{name}/{key}" for key in value] if isinstance(value, Mapping) else [_plain_name(result, name)]
-        chosen += [n for n in inside if n in known and n not in chosen]
+        value = None if name in known else result[name]  # refuses what is not there, and says what is near
+        inside = [f"{name}/{key}" for key in value] if isinstance(value, Mapping) else [ALIASES.get(name, name)]
+        if not set(inside) <= set(known):
+            raise ResultError(f"'{name}' is no array of numbers or text over named dimensions: it stays where it is")
+        chosen += [n for n in inside if n not in chosen]
+    if not chosen:
+        raise ResultError("no field was chosen\n    try:      names=['tension']")
     return Part(result, tuple(chosen), slice(int(rows[0]), int(rows[-1]) + 1), places)
 
 
 def _exportable(result: Result) -> list[str]:
-    """Names of all arrays of numbers or text whose dimensions have names."""
+    """Names of all arrays whose dimensions have names, and of single numbers and texts."""
     scales = {name for name in result.names if result.dims(name) == (name,)}
     named = (name for name in result.names if set(result.dims(name)) <= scales)
-    return [name for name in named if np.asarray(result[name]).dtype.kind in _KINDS]
-
-
-def _plain_name(result: Result, name: str) -> str:
-    """The name in the file of what may be called by an alias."""
-    from hybrid.results.read import ALIASES
-
-    return ALIASES.get(name, name)
+    return [name for name in named if result.dims(name) or np.asarray(result[name]).dtype.kind in _KINDS]
 
 
 # ---- what every file says of itself ---------------------------------------------------------------
@@ -214,28 +212,31 @@ def _version() -> str:
 # ---- whole or not at all --------------------------------------------------------------------------
 
 
-@contextmanager
-def written(paths: Sequence[Path], overwrite: bool) -> Iterator[list[Path]]:
-    """Names to write to, which take the place of `paths` together, at the end; nothing stays if something fails."""
-    for path in paths:
-        _check(path, overwrite)
-    new = [path.with_name(f".{path.name}.{os.getpid()}.new") for path in paths]
+def write_whole(files: Mapping[Path, bytes], overwrite: bool) -> None:
+    """Write all files or none, each beside its place first.  ResultError when that cannot be done.
+
+    The files are made in memory: where a disk is full, HDF5 cannot close what it writes, and takes the interpreter
+    down with it.
+    """
+    for path in files:
+        check_place(path, overwrite)
+    new = {path: path.with_name(f".{path.name}.{os.getpid()}.new") for path in files}
     try:
-        yield new
-        for made, path in zip(new, paths, strict=True):
-            os.replace(made, path)
-    # h5py speaks of a full disk in a RuntimeError when it closes a file
-    except (OSError, RuntimeError) as error:
+        for path, content in files.items():
+            new[path].write_bytes(content)
+        for path in files:
+            os.replace(new[path], path)
+    except OSError as error:
         advice = "a folder you may write to, with free space; close programs that hold the file"
-        names = " and ".join(map(str, paths))
+        names = " and ".join(map(str, files))
         raise ResultError(f"{names} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
     finally:
-        for made in new:
+        for path in new.values():
             with suppress(OSError):
-                made.unlink(missing_ok=True)
+                path.unlink(missing_ok=True)
 
 
-def _check(path: Path, overwrite: bool) -> None:
+def check_place(path: Path, overwrite: bool) -> None:
     """ResultError if nothing can or may be written there."""
     why, advice = "", "another name, or delete the file yourself"
     if path.is_dir():

@@ -10,7 +10,7 @@ begins.  An output is one part, with lines of its own, since zones may have move
 
 from __future__ import annotations
 
-from pathlib import Path
+import io
 from typing import Any
 
 import h5py
@@ -24,15 +24,16 @@ _CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 _LINES = _CELLS.index("Lines")
 
 
-def write(part: Part, file: Path) -> None:
-    """Write the cable over time.  ResultError when the result has no positions."""
+def image(part: Part) -> bytes:
+    """The cable over time, as a file.  ResultError when the result has no positions."""
     if "position" not in part.result:
         raise ResultError("a cable without 'position' cannot be drawn\n    try:      a run that records it")
     points, s = part.array("position"), part.s
     if len(s) < 2:
         raise ResultError("a line needs two points\n    try:      two places or more in at")
     nt, ns = points.shape[:2]
-    with h5py.File(file, "w") as out:
+    memory = io.BytesIO()
+    with h5py.File(memory, "w") as out:
         for name, value in facts(part).items():
             out.attrs[name] = value
         out["scene"] = part.result.scene_text
@@ -52,6 +53,7 @@ def write(part: Part, file: Path) -> None:
         data.attrs["meanings"] = meanings
         steps.create_group("CellDataOffsets")["zone_kind"] = np.cumsum(counts) - counts
         _write_field_data(root, part, meanings)
+    return memory.getvalue()
 
 
 def _write_lines(root: Any, part: Part) -> tuple[np.ndarray, np.ndarray, list[str]]:
@@ -107,9 +109,9 @@ def _write_field_data(root: Any, part: Part, meanings: list[str]) -> None:
         data[name].attrs["units"] = unit
         offsets[name], sizes[name] = first, np.tile([rows.shape[1], 1], (nt, 1))
 
-    for name in part.names:
+    for name in dict.fromkeys(["t", *part.names]):  # t too: VTK knows no time of a file with a single output
         dims = result.dims(name)
-        if dims[:1] == ("t",) and "s" not in dims and name != "t":
+        if dims[:1] == ("t",) and "s" not in dims:
             put(name, part.array(name).reshape(nt, -1), np.arange(nt), result.units[name])
     if "seabed" in result:
         put("seabed", part.array("seabed").reshape(1, -1), np.zeros(nt, int), "")
