@@ -28,6 +28,8 @@ _NOISE = 1e-6
 _SLOPE = 3
 # A bend is counted about one axis; if less than this part of its square lies about it, the head of the file warns.
 _PLANAR = 0.95
+# Histories of one interval that show less than this part of the range of a pull are said to lose some of it.
+_KEPT = 0.99
 # A touchdown so near to an end of the cable (part of its length) is that end.
 _AT_END = 0.005
 
@@ -202,8 +204,9 @@ def _base(part: Part, series: Sequence[Series]) -> tuple[np.ndarray, list[str]]:
     begin = outputs[0] + interval * np.ceil((first - outputs[0]) / interval - 1e-6)
     base = begin + interval * np.arange(int((last - begin) / interval + 1e-6) + 1)
     for x in logs:
-        kept = np.ptp(np.interp(base, x.t, x.values)) / max(np.ptp(x.values), 1e-300)
-        if kept < 0.99:
+        whole = np.ptp(x.values)
+        kept = np.ptp(np.interp(base, x.t, x.values)) / whole if whole > _NOISE * np.abs(x.values).max() else 1.0
+        if kept < _KEPT:
             notes.append(
                 f"the histories of the pull at s = {x.s:.6g} m show {100 * kept:.1f} % of its range, since steps are "
                 f"shorter than {interval:.4g} s at times; the cycles are counted at every step"

@@ -532,6 +532,33 @@ def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
     assert folder_of(tmp_path) == {"run.h5"}
 
 
+def test_a_killed_run_is_exported_as_far_as_it_came(tmp_path: Path) -> None:
+    """xarray cannot open such a file, which has no end; `hybrid` can."""
+    xarray = pytest.importorskip("xarray", reason="the extra `export` is not installed")
+    code = f"""
+import os, sys
+sys.path.insert(0, {str(Path(__file__).parent)!r})
+from test_result_export import SCENE, S, Field, Recorder, np
+step = [Field("t", "s", "end of the step")]
+fields = [Field("tension", "N", "d", (21,), ("s",))]
+recorder = Recorder("run.h5", grid_s=S, fields=fields, step_fields=step, attributes={{"title": ""}}, scene_text=SCENE)
+for i in range(5):
+    recorder.save(float(i), {{"tension": i + S}}, [("rod", 0.0, 10.0)])
+recorder.flush()
+os._exit(9)
+"""
+    root = {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}
+    assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path, env=root).returncode == 9
+    with pytest.raises(OSError, match="already open for write"):
+        xarray.open_dataset(tmp_path / "run.h5", engine="h5netcdf")
+    with open_result(tmp_path / "run.h5") as result:
+        made = export(result, format="nc")
+    note = "the run is not complete (interrupted or still running): t ends at 4 s"
+    assert made.notes == (note,)
+    with xarray.open_dataset(made.files[0]) as opened:
+        assert opened.attrs["left_out"] == note and opened.tension[-1, -1] == 14.0
+
+
 def test_what_reads_exports_is_loaded_only_then(tmp_path: Path) -> None:
     made(tmp_path / "run.h5").close()
     code = (
