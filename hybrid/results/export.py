@@ -71,41 +71,56 @@ def export(
     if path is None and result.file is None:
         raise ResultError(f"a result in memory has no name of its own\n    try:      path='run{SUFFIXES[kind]}'")
     file = Path(path).expanduser() if path is not None else beside(result.file or Path(), kind)
-    files = [file]
     if kind == "csv":
         names, at = ["tension"] if names is None else names, _usual_places(result) if at is None else at
+    if kind == "fatigue" and names is not None:
+        raise ResultError("fatigue counts tension and curvature; other names cannot be chosen")
     part = part_of(result, names, times, at)
-    notes = shortfalls(part)
+    files = [file]
     if kind == "fatigue":
-        if names is not None:
-            raise ResultError("fatigue counts tension and curvature; other names cannot be chosen")
-        found = count(part_of(result, None, times), [] if at is None else part.s.tolist())
-        notes += found.notes
         files.append(file.with_name(file.name.removesuffix(".csv").removesuffix(".cycles") + ".histories.csv"))
     for place in files:
         check_place(place, overwrite)  # before the work
-    if kind == "nc":
-        images = [netcdf(part)]
-    elif kind == "vtkhdf":
-        images = [vtkhdf(part)]
-    elif kind == "fatigue":
-        head = found.head + scene_lines(part)
-        images = [
-            _table("cycles", head, found.cycle_names, found.cycles),
-            _table("histories", head, found.history_names, found.histories),
-        ]
-    else:
-        columns = histories(part)
-        head = head_lines(part) + _errors_of(part) + scene_lines(part)
-        images = [_table("histories", head, list(columns), list(columns.values()))]
-    write_whole(dict(zip(files, images, strict=True)), overwrite)
+    made = _MADE[kind](part)
+    write_whole(dict(zip(files, made.files, strict=True)), overwrite)
+    return Exported(tuple(files), made.text + _span(part), (*shortfalls(part), *made.notes))
+
+
+class _Made(NamedTuple):
+    """The content of the files of an export, what to say of it, and what to warn of."""
+
+    files: tuple[bytes | memoryview, ...]
+    text: str = ""
+    notes: Sequence[str] = ()
+
+
+def _csv(part: Part) -> _Made:
+    columns = histories(part)
+    head = head_lines(part) + _errors_of(part) + scene_lines(part)
+    rows = len(next(iter(columns.values())))
+    text = f"{rows} row{'s' * (rows != 1)}, {len(columns)} columns; "
+    return _Made((_table("histories", head, list(columns), list(columns.values())),), text)
+
+
+def _fatigue(part: Part) -> _Made:
+    found = count(part)
+    head = found.head + scene_lines(part)
+    cycles = _table("cycles", head, found.cycle_names, found.cycles)
+    text = f"{len(found.cycles[0])} cycles at {found.places} places; "
+    return _Made((cycles, _table("histories", head, found.history_names, found.histories)), text, found.notes)
+
+
+_MADE = {
+    "nc": lambda part: _Made((netcdf(part),)),
+    "csv": _csv,
+    "vtkhdf": lambda part: _Made((vtkhdf(part),)),
+    "fatigue": _fatigue,
+}
+
+
+def _span(part: Part) -> str:
     t = part.times
-    text = f"{len(t)} output{'s' * (len(t) != 1)}, t = {t[0]:.6g}" + (f" to {t[-1]:.6g} s" if len(t) > 1 else " s")
-    if kind == "fatigue":
-        text = f"{len(found.cycles[0])} cycles at {found.places} places, " + text.partition(", ")[2]
-    elif kind == "csv":
-        text = f"{len(next(iter(columns.values())))} rows, {len(columns)} columns; " + text
-    return Exported(tuple(files), text, tuple(notes))
+    return f"{len(t)} output{'s' * (len(t) != 1)}, t = {t[0]:.6g}" + (f" to {t[-1]:.6g} s" if len(t) > 1 else " s")
 
 
 def beside(source: Path, format: str | None = None) -> Path:
@@ -161,17 +176,16 @@ def _usual_places(result: Result) -> np.ndarray:
 
 
 def _errors_of(part: Part) -> list[str]:
-    """The largest estimated error of every column over s or t, by its name."""
+    """The largest estimated error of every field at every place."""
     lines = []
     for name in part.names:
         error, said = error_name(part, name)
-        if not error:
-            continue
-        array, dims, unit = part.array(error), part.result.dims(error), part.result.units[error]
-        at = enumerate(part.s) if dims[1:] == ("s",) else [((), None)]
-        for k, s in at:
-            place = "" if s is None else f" at s = {s:{_PLACE}} m"
-            lines.append(f"  {name}{place}: at most {array[:, k].max():.3g} {unit}, {said}")
+        if error and part.result.dims(error) == ("t", "s"):
+            most, unit = part.array(error).max(axis=0), part.result.units[error]
+            lines += [
+                f"  {name} at s = {s:{_PLACE}} m: at most {x:.3g} {unit}, {said}"
+                for s, x in zip(part.s, most, strict=True)
+            ]
     return ["errors:", *lines] if lines else ["errors: not estimated (output: {errors: true} in the scene asks for it)"]
 
 
@@ -188,14 +202,18 @@ def _table(what: str, head: Sequence[str], names: Sequence[str], columns: Sequen
 def _format(path: str | Path | None, format: str | None) -> str:
     """The format that was asked for, or that the name says."""
     expected = f"    expected: {', '.join(SUFFIXES)}"
-    if format is not None:
-        if format not in SUFFIXES:
-            raise ResultError(f"there is no format '{format}'\n{expected}")
-        return format
-    if path is None:
+    suffix = Path(path or "").suffix.lower().removeprefix(".")
+    if format is None and path is None:
         return "nc"
-    suffix = Path(path).suffix.lower().removeprefix(".")
-    if suffix not in SUFFIXES:
-        said = f"the name '{Path(path).name}' says no format"
+    if format is None and suffix not in SUFFIXES:
+        said = f"the name '{Path(path or '').name}' says no format"
         raise ResultError(f"{said}\n{expected}\n    try:      a name such as run.nc, or say the format")
-    return suffix
+    if format is None:
+        return suffix
+    if format not in SUFFIXES:
+        raise ResultError(f"there is no format '{format}'\n{expected}")
+    if suffix in SUFFIXES and "." + suffix != Path("run" + SUFFIXES[format]).suffix:
+        raise ResultError(
+            f"the format is {format}, but the name ends with .{suffix}\n    try:      leave one of them out"
+        )
+    return format

@@ -11,6 +11,7 @@ Not done: stress (it needs the section), S-N curves, damage and life.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -59,12 +60,13 @@ class Counted(NamedTuple):
     places: int
 
 
-def count(part: Part, asked: Sequence[float]) -> Counted:
-    """Cycles in the outputs and steps of `part`, at the places that matter and at `asked` (m).
+def count(chosen: Part) -> Counted:
+    """Cycles in the outputs and steps that were chosen, at the places that matter and those that were asked for.
 
     ResultError when there are no two outputs, or rainflow is not installed.
     """
     needed("rainflow", "counting cycles")
+    part, asked = replace(chosen, at=None), [] if chosen.at is None else chosen.at.tolist()
     if len(part.times) < 3:
         raise ResultError(
             f"{len(part.times)} output{'s have' if len(part.times) > 1 else ' has'} no cycles\n"

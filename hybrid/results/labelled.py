@@ -38,10 +38,10 @@ def dataset(part: Part) -> xarray.Dataset:
     return xr.Dataset(variables, coordinates, facts(part))
 
 
-def image(part: Part) -> bytes:
+def image(part: Part) -> memoryview:
     """The same as a netCDF 4 file."""
     needed("h5netcdf", "netCDF")
-    return bytes(dataset(part).to_netcdf(engine="h5netcdf"))
+    return memoryview(dataset(part).to_netcdf(engine="h5netcdf"))
 
 
 def _name(name: str) -> str:

@@ -19,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 import h5py
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
 from hybrid.results.read import ALIASES
 
 if TYPE_CHECKING:
@@ -156,7 +156,14 @@ def facts(part: Part) -> dict[str, Any]:
     result = part.result
     own = {k: v for k, v in result.attributes.items() if k not in ("format", "format_version")}
     made = {"format": MARK, "exported_from": result.file.name if result.file else "a result in memory"}
-    return made | own | {"exported_by": f"hybrid-cable {_version()}", "left_out": "; ".join(shortfalls(part))}
+    said = {"noted": ", ".join(noted(part)), "left_out": "; ".join(shortfalls(part))}
+    return made | own | {"exported_by": f"hybrid-cable {_version()}"} | said
+
+
+def noted(part: Part) -> list[str]:
+    """Kinds of events of the run that call its answer into question, the worst first."""
+    kinds = {event.kind for event in part.result.events}
+    return [kind for kind in EVENTS_BY_WEIGHT if kind in kinds]
 
 
 def shortfalls(part: Part) -> list[str]:
@@ -174,6 +181,7 @@ def head_lines(part: Part) -> list[str]:
     result, own = part.result, facts(part)
     lines = [f"title: {result.title}", f"result: {own['exported_from']}, {result.status_text}"]
     lines += [f"note: {text}" for text in shortfalls(part)]
+    lines += [f"the run noted: {', '.join(noted(part))}; see its events"] if noted(part) else []
     lines.append("computed by: " + ", ".join(f"{k} {v}" for k, v in result.versions.items()))
     lines.append(f"computed: {own['created']}; exported by: {own['exported_by']}")
     return lines
@@ -212,7 +220,7 @@ def _version() -> str:
 # ---- whole or not at all --------------------------------------------------------------------------
 
 
-def write_whole(files: Mapping[Path, bytes], overwrite: bool) -> None:
+def write_whole(files: Mapping[Path, bytes | memoryview], overwrite: bool) -> None:
     """Write all files or none, each beside its place first.  ResultError when that cannot be done.
 
     The files are made in memory: where a disk is full, HDF5 cannot close what it writes, and takes the interpreter

@@ -24,7 +24,7 @@ _CELLS = ("Vertices", "Lines", "Polygons", "Strips")
 _LINES = _CELLS.index("Lines")
 
 
-def image(part: Part) -> bytes:
+def image(part: Part) -> memoryview:
     """The cable over time, as a file.  ResultError when the result has no positions."""
     if "position" not in part.result:
         raise ResultError("a cable without 'position' cannot be drawn\n    try:      a run that records it")
@@ -53,7 +53,7 @@ def image(part: Part) -> bytes:
         data.attrs["meanings"] = meanings
         steps.create_group("CellDataOffsets")["zone_kind"] = np.cumsum(counts) - counts
         _write_field_data(root, part, meanings)
-    return memory.getvalue()
+    return memory.getbuffer()
 
 
 def _write_lines(root: Any, part: Part) -> tuple[np.ndarray, np.ndarray, list[str]]:

@@ -86,6 +86,7 @@ def made(
         middle = 6.0 if t < duration / 2 else 3.0
         recorder.save(t, values, [("catenary", 0.0, middle), ("rod", middle, LENGTH)])
     recorder.event(duration / 2, 3.0, 6.0, "grow", 'bend 1.05 > 1, in "the" middle', criterion="bend", value=1.05)
+    recorder.event(0.0, 0.0, LENGTH, "coarse step", "made up")
     recorder.close(*close)
     return open_result(target or memory)
 
@@ -120,8 +121,7 @@ def test_a_result_opens_directly_in_xarray(result: Result, tmp_path: Path, engin
     groups = xarray.open_groups(tmp_path / "run.h5", engine=engine)
     assert {"/", "/energy", "/errors/total", "/steps", "/zones", "/events"} <= set(groups)
     assert groups["/energy"].kinetic.dims == ("t",) and groups["/errors/total"].tension.dims == ("t", "s")
-    text = groups["/events"].text.astype(str).item()
-    assert text == result.events[0].text
+    assert groups["/events"].text.astype(str).values.tolist() == [event.text for event in result.events]
     for group in groups.values():
         group.close()
 
@@ -147,7 +147,8 @@ def test_netcdf_has_everything(result: Result, tmp_path: Path, engine: Any) -> N
             assert kind == [z.kind for z in result.zones[i] if z.s_a <= s][-1]
         assert opened.scene.item() == SCENE
         assert opened.attrs["version_h5py"] == h5py.__version__ and opened.attrs["status"] == "complete"
-        assert opened.events_text.item() == result.events[0].text
+        assert opened.events_text.values.tolist() == [event.text for event in result.events]
+        assert opened.attrs["noted"] == "coarse step", "what calls the answer into question; a zone that grows does not"
         assert opened.tension.sel(t=4.0, s=5.0, method="nearest") == result.tension[40, 10]
     with pytest.raises(ResultError, match="not a result of hybrid"):
         hybrid.open(tmp_path / "run.nc")
@@ -187,6 +188,7 @@ def test_csv_keeps_every_digit(result: Result, tmp_path: Path) -> None:
     head = [line for line in lines if line.startswith("#")]
     assert head[0] == "# hybrid-cable export: histories" and "# title: Schwingt, 5 µm" in head
     assert any(line.startswith("# computed by: ") and f"h5py {h5py.__version__}" in line for line in head)
+    assert "# the run noted: coarse step; see its events" in head
     assert "#   tension at s = 2.5 m: at most 0.5 N, estimated" in head
     assert [line[4:] for line in head[-2:]] == SCENE.splitlines()
     names = "t (s),tension (N) at s = 0 m,tension (N) at s = 2.5 m,tension (N) at s = 10 m"
@@ -209,7 +211,7 @@ def test_csv_of_places_components_and_tables_opens_in_pandas(result: Result, tmp
     log = pandas.read_csv(export(result, tmp_path / "b.csv", names=["steps"]).files[0], comment="#")
     np.testing.assert_allclose(log["steps/pull_end (N)"], result.steps["pull_end"], rtol=1e-15)
     events = pandas.read_csv(export(result, tmp_path / "c.csv", names=["events"]).files[0], comment="#")
-    assert events["events/text"].tolist() == [result.events[0].text], "commas and quotes are kept"
+    assert events["events/text"].tolist() == [event.text for event in result.events], "commas and quotes are kept"
 
 
 def test_csv_knows_no_locale(result: Result, tmp_path: Path) -> None:
@@ -420,6 +422,8 @@ def test_the_command_in_json_and_quietly(result: Result, tmp_path: Path, capsys:
     ("more", "message"),
     [
         ({"path": "run.h5"}, "the name 'run.h5' says no format\n    expected: nc, csv, vtkhdf, fatigue"),
+        ({"path": "x.nc", "format": "csv"}, "the format is csv, but the name ends with .nc"),
+        ({"path": "x.nc", "format": "fatigue"}, "the format is fatigue, but the name ends with .nc"),
         ({"format": "xlsx"}, "there is no format 'xlsx'"),
         ({"names": ["tensoin"]}, "no 'tensoin'; did you mean tension"),
         ({"names": []}, "no field was chosen"),
@@ -524,7 +528,7 @@ def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
     )
     for kind in FORMATS:
         with pytest.raises(ResultError, match=r"holds no output yet.*failed: why"):
-            export(open_result(memory), tmp_path / "x.csv", format=kind)
+            export(open_result(memory), tmp_path / f"x{SUFFIXES[kind]}", format=kind)
     closed = made(tmp_path / "run.h5")
     closed.close()
     with pytest.raises(ResultError, match="closed"):
