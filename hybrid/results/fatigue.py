@@ -23,7 +23,7 @@ from hybrid.results.part import Part, error_name, head_lines, needed
 _SAMPLES = 10
 # Cycles of less than this part of the largest range say nothing about how quick the load is.
 _MAJOR = 0.1
-# Below this part of the largest value a cycle is the tolerance of Newton's method, not a load.
+# Below this part of the largest value at any of the places a cycle is the tolerance of Newton's method, not a load.
 _NOISE = 1e-6
 # The power of the range by which what is lost is weighed: the slope of S-N curves of chain and of welded steel is 3.
 _SLOPE = 3
@@ -63,7 +63,7 @@ class Counted(NamedTuple):
 def count(chosen: Part) -> Counted:
     """Cycles in the outputs and steps that were chosen, at the places that matter and those that were asked for.
 
-    ResultError when there are no two outputs, or rainflow is not installed.
+    ResultError when there are fewer than three outputs, or rainflow is not installed.
     """
     needed("rainflow", "counting cycles")
     part, asked = replace(chosen, at=None), [] if chosen.at is None else chosen.at.tolist()
@@ -75,10 +75,11 @@ def count(chosen: Part) -> Counted:
     bends = _bends(part)
     places = _places(part, bends, asked)
     series = [x for s, name in places.items() for x in _series_at(part, bends, s, name)]
+    largest = {q: max((np.abs(x.values).max() for x in series if x.quantity == q), default=0.0) for q in _UNITS}
     noise, rows = 0, []
     for x in series:
         for size, mean, number, a, b in _cycles(x.values):
-            if size <= _NOISE * np.abs(x.values).max():
+            if size <= _NOISE * largest[x.quantity]:
                 noise += 1
                 continue
             rows.append((x.place, x.s, x.quantity, _UNITS[x.quantity], size, mean, number, x.t[a], x.t[b]))
@@ -91,7 +92,7 @@ def count(chosen: Part) -> Counted:
     notes += [note for x in series if x.quantity == "pull" for note in _too_slow(part, x)]
     head = [*head_lines(part), *(f"note: {note}" for note in notes)]
     head += ["cycles: rainflow (ASTM E1049), of every value that was recorded; a count of 0.5 is half a cycle"]
-    head += [f"left out: {noise} cycles below {_NOISE:g} of the largest value, the tolerance of the solver"]
+    head += [f"left out: {noise} cycles below {_NOISE:g} of the largest of all places, the solver's tolerance"]
     head += ["not done: stress from tension and curvature, which needs the section; S-N curves; damage"]
     head += [f"{x.quantity} at s = {x.s:.9g} m ({x.place}): {x.said}" for x in series]
     return Counted(
