@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.ladder import trade
     from hybrid.model.plan import plan
+    from hybrid.results.export import export
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
@@ -37,6 +38,7 @@ _HOME = {
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
+    "export": ("hybrid.results.export", "export"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -60,6 +62,7 @@ __all__ = [
     "ResultError",
     "Scene",
     "SceneError",
+    "export",
     "load_scene",
     "open",
     "parse_scene",

@@ -1,4 +1,4 @@
-"""The command line: hybrid run | resume | static | plan | plot | trade | schema.
+"""The command line: hybrid run | resume | static | plan | plot | export | trade | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -61,6 +61,17 @@ def _numbers(text: str) -> list[float]:
 
 def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _window(text: str) -> tuple[float | None, float | None]:
+    first, colon, last = text.partition(":")
+    try:
+        window = (float(first) if first.strip() else None, float(last) if last.strip() else None)
+    except ValueError:
+        colon = ""
+    if not colon:
+        raise typer.BadParameter(f"'{text}' is no window of time such as 20:60, 20: or :60")
+    return window
 
 
 def _flag(*names: str, help: str) -> Any:
@@ -202,6 +213,32 @@ def plot(
         n = len(opened.times)
         over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
         say.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)
+
+
+@app.command()
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to export.", show_default=False)],
+    output: Annotated[Path | None, _output("FILE.nc, .csv or .vtkhdf; else RUN.nc ..")] = None,
+    format: Annotated[
+        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else what FILE says.")
+    ] = None,
+    at: Annotated[Any, typer.Option(metavar="S,S,..", parser=_numbers, help="Only at these arc lengths (m).")] = None,
+    names: Annotated[Any, typer.Option(metavar="NAME,..", parser=_words, help="Only these fields or groups.")] = None,
+    times: Annotated[Any, typer.Option(metavar="A:B", parser=_window, help="Only from A to B (s).")] = None,
+    keep: Annotated[bool, _flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue."""
+    from hybrid.results.export import beside
+
+    with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
+        target = output or beside(result, format)
+        made = hybrid.export(opened, target, format=format, names=names, times=times, at=at, overwrite=not keep)
+        for text in made.notes:
+            say.json("note", text=text)
+            say.note(f"note: {text}")
+        status = "" if opened.status == "complete" else f"; {opened.status_text}"
+        say.done(made.text + status, *made.files, status=opened.status, notes=list(made.notes))
 
 
 @app.command()

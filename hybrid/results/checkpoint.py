@@ -24,7 +24,7 @@ from filelock import FileLock, Timeout
 
 from hybrid.errors import ResultError
 
-GROUP, SLOTS, CLIMB = "checkpoint", "checkpoint/slots", "checkpoint/climb"
+SLOTS, CLIMB = ("checkpoint/slot_0", "checkpoint/slot_1"), "checkpoint/climb"
 _MAGIC = b"hybrid checkpoint 1\n"
 _DIGEST = 16  # bytes; it guards against a torn write, not against people
 _CHUNK = 65536  # bytes: few chunks for the 200 kB of a line of 100 cells
@@ -51,9 +51,12 @@ class Checkpoint(NamedTuple):
 
 def create_slots(file: h5py.File, climb: bytes) -> None:
     """Make room for checkpoints in a new file; climb: what was found before the run, b"" if nothing."""
-    file.create_dataset(SLOTS, (2, 0), "u1", maxshape=(2, None), chunks=(1, _CHUNK))
+    for name in SLOTS:
+        file.create_dataset(name, (0,), "u1", maxshape=(None,), chunks=(_CHUNK,))
     if climb:
         file.create_dataset(CLIMB, data=np.frombuffer(climb, "u1"))
+    for name in (*SLOTS, CLIMB) if climb else SLOTS:
+        file[name].make_scale(name)  # of itself: programs that look for dimensions find one
 
 
 def write_checkpoint(file: h5py.File, point: Checkpoint) -> None:
@@ -62,20 +65,22 @@ def write_checkpoint(file: h5py.File, point: Checkpoint) -> None:
     parts = (head, point.effort, point.state)
     body = b"".join([*(len(x).to_bytes(8, "little") for x in parts), *parts])
     data = _MAGIC + hashlib.blake2b(body, digest_size=_DIGEST).digest() + body
-    slots = file[SLOTS]
-    if slots.shape[1] < len(data):
-        slots.resize(len(data), axis=1)
-    slots[point.number % 2, : len(data)] = np.frombuffer(data, "u1")
+    slot = file[SLOTS[point.number % 2]]
+    if slot.shape[0] < len(data):
+        slot.resize(len(data), axis=0)
+    slot[: len(data)] = np.frombuffer(data, "u1")
 
 
 def read_checkpoint(file: h5py.File) -> Checkpoint | None:
     """The newest checkpoint that is whole and whose rows are all there; None if there is none."""
-    if SLOTS not in file:
-        return None
-    slots = file[SLOTS]
-    if file.swmr_mode:
-        slots.refresh()
-    points = [point for k in (0, 1) if (point := _parsed(slots[k].tobytes())) is not None and _has_rows(file, point)]
+    points = []
+    for name in SLOTS:
+        if name in file:
+            if file.swmr_mode:
+                file[name].refresh()
+            point = _parsed(file[name][()].tobytes())
+            if point is not None and _has_rows(file, point):
+                points.append(point)
     return max(points, key=lambda point: point.number, default=None)
 
 
@@ -112,19 +117,17 @@ def copied(
     old: h5py.File, path: Path, libver: tuple[str, str], rows: Mapping[str, int] | None, without: Iterable[str] = ()
 ) -> None:
     """Copy a result to a new file; rows: of every table that are taken, by its scale (None: all that are complete)."""
-    scales = [name for name, data in _datasets(old) if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
-    kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
     left = set(without)
+    whole = [(name, data) for name, data in _datasets(old) if name not in left]
+    scales = [name for name, data in whole if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
+    kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
     with h5py.File(path, "w", libver=libver, locking="best-effort") as new:
         _annotations(old, new)
-        for name, data in _datasets(old):
-            if name not in left:
-                _copied_dataset(data, new, name, kept)
+        for name, data in whole:
+            _copied_dataset(data, new, name, kept)
         for name in scales:
             new[name].make_scale(_word(old[name].attrs.get("NAME", name)))
-        for name, data in _datasets(old):
-            if name in left:
-                continue
+        for name, data in whole:
             for k, dim in enumerate(data.dims):
                 new[name].dims[k].label = dim.label
                 if dim.label in kept and dim.label != name:

@@ -157,7 +157,8 @@ def attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Datase
 
 
 def annotate(data: h5py.Dataset, unit: str, description: str, frame: str = "") -> None:
-    data.attrs["units"], data.attrs["description"] = unit, description  # "units": what netCDF programs look for
+    data.attrs["units"], data.attrs["description"] = unit, description
+    data.attrs["long_name"] = description  # this and "units" are what netCDF programs look for
     if frame:
         data.attrs["frame"] = frame
 

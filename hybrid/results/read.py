@@ -32,12 +32,15 @@ import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+
+if TYPE_CHECKING:
+    import xarray
 
 FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
@@ -262,6 +265,13 @@ class Result:
         """Names of the dimensions of an array, such as ("t", "s", "xyz")."""
         return self._dims[self._known(name)]
 
+    def label(self, name: str) -> dict[str, str]:
+        """`units`, `description` and `frame` of an array, as the file has them; empty where it has none."""
+        if not self._file:
+            raise ResultError("the result is closed; open the file again")
+        attrs = self._file[self._known(name)].attrs
+        return {key: _text(attrs.get(key, "")) for key in ("units", "description", "frame")}
+
     def describe(self, name: str) -> str:
         """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
         if name in self._groups:
@@ -270,10 +280,9 @@ class Result:
                 units.setdefault(self.units[f"{name}/{key}"], []).append(key)
             return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
         name = self._known(name)
-        attrs = self._file[name].attrs
-        unit, frame = _text(attrs.get("units", "")), _text(attrs.get("frame", ""))
+        unit, description, frame = self.label(name).values()
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
-        return f"{head}: {_text(attrs.get('description', ''))}" + (f" ({frame} frame)" if frame else "")
+        return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
     def at(self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None) -> dict[str, Any]:
         """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
@@ -291,7 +300,28 @@ class Result:
             answer[name] = array
         return answer
 
+    def to_xarray(
+        self,
+        *,
+        names: Sequence[str] | None = None,
+        times: tuple[float | None, float | None] | None = None,
+        at: Any = None,
+    ) -> xarray.Dataset:
+        """Everything as one Dataset of xarray: over t and s, with units; a slash in a name becomes an underscore.
+
+        names: fields or groups, None for all; times: from and to, s; at: arc lengths, m, in place of the output grid.
+        """
+        from hybrid.results.labelled import dataset
+        from hybrid.results.part import part_of
+
+        return dataset(part_of(self, names, times, at))
+
     # ---- what else was written ----------------------------------------------------------------
+
+    @property
+    def file(self) -> Path | None:
+        """The file it was read from; None for a result in memory."""
+        return self._source if isinstance(self._source, Path) else None
 
     @property
     def events(self) -> list[Event]:

@@ -400,6 +400,7 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
         "hybrid.results.format",
         "hybrid.results.read",
         "hybrid.results.record",
+        "hybrid.results.room",
     }
 
 
