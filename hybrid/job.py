@@ -97,6 +97,7 @@ class Job:
             correction = _correction(model, zoning)
             motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning, correction)
             motion.save()
+            motion.keep()
             self._finish(motion, outputs)
         return self._seen(motion, target, clock.process_time() - begin)
 

@@ -132,7 +132,7 @@ class Motion:
 
     def _on(self, model: Model) -> None:
         """Go on with another line on the same nodes: in a plane, or in space."""
-        self.model = model
+        self.model = self.flat.model = model
         if self.zoning is not None:
             self.zoning.model = model
         self.watch.follow(model)

@@ -17,6 +17,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite, nan
 from pathlib import Path
 from time import monotonic
@@ -323,7 +324,8 @@ class Recorder:
         if kind is None:
             self.close()
         elif issubclass(kind, Exception):
-            self.close("failed", str(error) or kind.__name__)
+            with suppress(ResultError):  # what cannot be written now, either, is not the news
+                self.close("failed", str(error) or kind.__name__)
         else:  # Ctrl-C, or a SystemExit made of a signal
             self.close("interrupted", "stopped from outside")
 

@@ -148,7 +148,7 @@ class Stepper:
         e1 = np.diff(state.v, axis=0)
         across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
         gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
-        self.u[:] = 0.0
+        self.u[:], self.X[:] = 0.0, 0.0  # steps in a plane leave in X what the march in space takes for nought
         self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
         held = ends._replace(position=state.r[[0, -1]])
         if self.line.bits & WAVES:

@@ -19,8 +19,8 @@ import hybrid
 from hybrid.cli import main
 from hybrid.errors import ResultError
 from hybrid.results.export import SUFFIXES, export
-from hybrid.results.read import Result, open_result
 from hybrid.results.format import Field
+from hybrid.results.read import Result, open_result
 from hybrid.results.record import Recorder
 
 NS, LENGTH, PERIOD, PULL = 21, 10.0, 2.0, 20.0
@@ -535,9 +535,7 @@ def test_a_missing_package_is_named_with_its_command(
 
 def test_a_result_without_outputs_and_a_closed_one(tmp_path: Path) -> None:
     memory = io.BytesIO()
-    Recorder(memory, grid_s=S, fields=[], step_fields=[], attributes={"title": ""}, texts={}).close(
-        "failed", "why"
-    )
+    Recorder(memory, grid_s=S, fields=[], step_fields=[], attributes={"title": ""}, texts={}).close("failed", "why")
     for kind in FORMATS:
         with pytest.raises(ResultError, match=r"holds no output yet.*failed: why"):
             export(open_result(memory), tmp_path / f"x{SUFFIXES[kind]}", format=kind)
