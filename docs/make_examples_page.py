@@ -20,7 +20,7 @@ HEAD = """\
 
 Every scene here is a file of `examples/`, commented line by line; copy the one that is nearest to your cable and
 change it.
-What to look at, figures included, is what its test asserts (tests/test_examples.py).
+The tests run all of them (tests/test_examples.py).
 Run times are of one core of a 2024 server, without the compilation of the first run.
 
 This page is made from the headers of these files by `python docs/make_examples_page.py`.
