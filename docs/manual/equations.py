@@ -96,7 +96,8 @@ class _Row:
             kind, text = token
             if kind == "space":
                 self._take()
-                out, run, bare = [*out, *run, THIN] if run else out, [], ""
+                thin = [THIN] if run and not self._operator(self._peek()[1]) else []
+                out, run, bare = [*out, *run, *thin], [], ""
             elif text == "/" and run:
                 self._take()
                 below = self._side()
