@@ -121,7 +121,6 @@ def test_prose_keeps_what_is_no_equation() -> None:
 
 @pytest.mark.slow
 def test_the_site_is_built_strictly_and_asks_no_other_host(tmp_path: Path) -> None:
-    pytest.importorskip("mkdocs")
     command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(tmp_path / "site")]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

@@ -21,14 +21,14 @@ NUMBERED = re.compile(r"^\(((?:T|C)\d+[a-z]?)\)  (.+)$", re.MULTILINE)
 CITED = re.compile(r"(?<!\[)\(((?:T|C)\d+[a-z]?)\)")
 # In prose: a symbol of one or two letters with a subscript of one or two, a braced one, or the name of a work.
 INLINE = re.compile(
-    r"(?<![\w`/.\]])([^\W\d_]{1,2}[\u0300-\u036f′]*|\|[a-z])_(\{[^}\n]+\}|scheme\b|[A-Za-z0-9⊥∞]{1,2}(?![\w(]))"
+    r"(?<![\w`.])(?<!\w\w/)([^\W\d_]{1,2}[\u0300-\u036f′]*|\])_(\{[^}\n]+\}|(?:scheme|rod)\b|[A-Za-z0-9⊥∞]{1,2}(?!\w))"
 )
 FENCE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
-POWER = re.compile(r"\^(-?[A-Za-z0-9.]+)(?<!\.)")
+POWER = re.compile(r"\^(?:\(([^()\n]+)\)|(-?[A-Za-z0-9.]+)(?<!\.))")
 CODE = re.compile(r"`[^`\n]*`|\]\([^)\n]*\)")  # and where links lead
 
 FUNCTIONS = {"cos", "sin", "cot", "cosh", "sinh", "tanh", "sqrt", "exp", "max", "min", "diag"}
-SYMBOLS = {"EI", "EA", "GJ", "kb", "kd", "dp", "ds"}  # of two letters
+SYMBOLS = {"EI", "EA", "GJ", "kb", "kd", "vp", "dp", "ds"}  # of two letters
 RAISED = dict(zip("⁰¹²³⁴⁵⁶⁷⁸⁹⁺⁻ᵀ", "0123456789+−T", strict=True))
 LOWERED = dict(zip("₀₁₂₃₄₅₆₇₈₉", "0123456789", strict=True))
 DOTS = {"\u0307": "˙", "\u0308": "¨"}
@@ -64,7 +64,7 @@ def page(text: str, home: str) -> str:
     text = CODE.sub(lambda m: keep(m[0]), text)
     text = CITED.sub(lambda m: f"[({m[1]})]({home}#{m[1]})", text)
     text = INLINE.sub(lambda m: f"{m[1]}<sub>{m[2].strip('{}')}</sub>", text)
-    text = POWER.sub(r"<sup>\1</sup>", text)
+    text = POWER.sub(lambda m: f"<sup>{m[1] or m[2]}</sup>", text)
     return re.sub("\x02(\\d+)\x03", lambda m: kept[int(m[1])], text)
 
 
@@ -144,7 +144,7 @@ class _Row:
         while True:
             kind, text = self._peek()
             if kind == "sub":
-                down += math(text[1:].strip("{}"))
+                down += math(text[1:].strip("{}")).replace("&nbsp;", "")
             elif text in LOWERED:
                 down += f"<mn>{LOWERED[text]}</mn>"
             elif text in RAISED:
