@@ -22,7 +22,7 @@ import pytest
 import typer
 from test_docs import PAGES, ROOT
 
-from hybrid.cli import UsageError, app
+from hybrid.cli import UsageError, app, main
 
 MARK = re.compile(r"^<!-- not run in CI: *(.*?) *-->\n\Z", re.MULTILINE)
 # Pinned, so that nobody marks a block in passing: page, blocks that are not run.
@@ -58,12 +58,30 @@ def shape(line: str) -> str:
     return " ".join(re.sub(r"[-+]?\d[\d.]*(e[-+]?\d+)?", "#", line).split())
 
 
-@pytest.mark.slow  # a minute for all: each command is a process of its own
-@pytest.mark.parametrize("page", [p for p in PAGES if runs(p)], ids=lambda p: p.name)
-def test_every_block_runs(page: Path, tmp_path: Path) -> None:
-    shutil.copytree(ROOT / "examples", tmp_path / "examples")
-    here = os.environ | {"PYTHONPATH": str(ROOT), "MPLBACKEND": "agg", "COLUMNS": "200"}
+def in_shell(command: list[str]) -> str:
+    """Run it in this folder as a user would; what it says."""
+    here = os.environ | {"PYTHONPATH": str(ROOT)}
     here["PATH"] = os.pathsep.join([str(Path(sys.executable).parent), os.environ["PATH"]])
+    done = subprocess.run(command, env=here, capture_output=True, text=True)
+    assert done.returncode == 0, f"{command[-1]}\n{done.stdout}{done.stderr}"
+    return done.stdout + done.stderr
+
+
+def commands(text: str) -> list[list[str]] | None:
+    """Arguments of the commands of a block that has nothing but `hybrid ...`; None: it needs a shell."""
+    lines = [shlex.split(line, comments=True) for line in text.splitlines()]
+    plain = all(words[:1] == ["hybrid"] and not set(words) & {"&&", "|", ">", ";"} for words in lines)
+    return [words[1:] for words in lines] if plain else None
+
+
+@pytest.mark.slow  # half a minute for all
+@pytest.mark.parametrize("page", [p for p in PAGES if runs(p)], ids=lambda p: p.name)
+def test_every_block_runs(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("COLUMNS", "200")
     said, together = "", ""
     for block in blocks(page):
         name = re.match(r"# (\w+\.yaml)\n", block.text)
@@ -73,16 +91,20 @@ def test_every_block_runs(page: Path, tmp_path: Path) -> None:
             flat = " ".join(map(shape, said.splitlines()))
             for line in block.text.splitlines():
                 assert shape(line) in flat, f"{page.name} shows what the program does not say: {line}"
-        if block.unrun != "" or block.language not in ("bash", "python"):
+        if block.unrun != "":
             continue
-        if block.language == "bash":
-            command = ["bash", "-euo", "pipefail", "-c", block.text]
-        else:
+        if block.language == "python":
             together += block.text  # blocks of one page follow one another
-            command = [sys.executable, "-W", "error", "-c", together]
-        done = subprocess.run(command, cwd=tmp_path, env=here, capture_output=True, text=True)
-        assert done.returncode == 0, f"{page.name}:\n{block.text}\n{done.stdout}{done.stderr}"
-        said = done.stdout + done.stderr
+            in_shell([sys.executable, "-W", "error", "-c", together])
+        elif block.language == "bash" and (ours := commands(block.text)) is not None:
+            for words in ours:  # as the shell would, without a second to start each
+                with pytest.raises(SystemExit) as left:
+                    main(words)
+                told = capsys.readouterr()
+                assert not left.value.code, f"{page.name}: hybrid {shlex.join(words)}\n{told.out}{told.err}"
+                said = told.out + told.err
+        elif block.language == "bash":
+            said = in_shell(["bash", "-euo", "pipefail", "-c", block.text])
 
 
 def test_blocks_that_are_not_run_say_why() -> None:

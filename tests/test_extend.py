@@ -13,6 +13,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 PAGE = ROOT / "docs" / "extend.md"
+UNCHANGED = 1  # proofs before the first change
 
 
 def blocks(language: str) -> list[str]:
@@ -63,18 +64,28 @@ def test_a_change_that_no_longer_fits_is_noticed(copy: Path) -> None:
         change(blocks("diff")[0], copy)
 
 
-@pytest.mark.slow  # a minute or more: the kernels of the copy are compiled
-def test_every_proof_holds(copy: Path) -> None:
-    script = copy / "proofs.py"
-    script.write_text("\n".join(blocks("python")), encoding="utf-8")
-    here = os.environ | {"PYTHONPATH": str(copy), "HYBRID_CACHE_DIR": str(copy / "cache")}
-    here["NUMBA_OPT"] = "1"  # compiled once, run for a moment
-    done = subprocess.run([sys.executable, "-W", "error", script], cwd=copy, env=here, capture_output=True, text=True)
+def prove(proofs: list[str], package: Path, folder: Path, **more: str) -> None:
+    """Run proofs in a process of their own, with the package in `package`."""
+    here = os.environ | {"PYTHONPATH": str(package)} | more
+    command = [sys.executable, "-W", "error", "-c", "\n".join(proofs)]
+    done = subprocess.run(command, cwd=folder, env=here, capture_output=True, text=True)
     assert done.returncode == 0, done.stderr
+
+
+def test_what_needs_no_change_holds_as_it_is(tmp_path: Path) -> None:
+    shutil.copytree(ROOT / "examples", tmp_path / "examples")
+    prove(blocks("python")[:UNCHANGED], ROOT, tmp_path)
+
+
+@pytest.mark.slow  # a minute: the kernels of the copy are compiled
+def test_every_proof_of_a_change_holds(copy: Path) -> None:
+    cache = {"HYBRID_CACHE_DIR": str(copy / "cache"), "NUMBA_OPT": "1"}  # compiled once, run for a moment
+    prove(blocks("python")[UNCHANGED:], copy, copy, **cache)
 
 
 def test_there_is_a_proof_for_every_seam() -> None:
     text = PAGE.read_text(encoding="utf-8")
+    assert text[: text.index("```diff")].count("```python") == UNCHANGED
     sections = {part.partition("\n")[0]: part for part in re.split(r"^## ", text, flags=re.MULTILINE)[1:]}
     for seam, part in sections.items():
         if seam != "Kernels":
