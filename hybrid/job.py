@@ -403,7 +403,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         return
     line = model.line
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
-        if end.kind not in ("clamped", "guided") or line.spin[cell]:
+        if not hasattr(end, "tangent") or line.spin[cell]:
             continue
         s, far = float(line.s[cell]), float(line.s[-1])
         bend = float(model.cable.B[cell, :2].mean())
