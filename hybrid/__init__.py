@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
     from hybrid.results.zoneplot import plot_zones
+    from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.simulate import run, static
@@ -37,6 +38,7 @@ _HOME = {
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
+    "import_moordyn": ("hybrid.scene.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -59,6 +61,7 @@ __all__ = [
     "ResultError",
     "Scene",
     "SceneError",
+    "import_moordyn",
     "load_scene",
     "open",
     "parse_scene",
