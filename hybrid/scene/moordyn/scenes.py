@@ -215,11 +215,18 @@ class _Maker:
         line = end.line
         if end.point is None:
             if end.along is not None and bends:
-                return {"kind": "clamped", "position": end.place, "tangent": end.along}, line
+                # A rod of MoorDyn holds the direction of a line, and no twist.
+                return {"kind": "clamped", "position": end.place, "tangent": end.along, "swivel": True}, line
             return {"kind": "pinned", "position": end.place}, line
         if end.point.mass == 0.0:
             return {"kind": "free"}, line
-        return {"kind": "body", "near": end.place, "mass": end.point.mass} | self._water(end.point), line
+        body: dict[str, Any] = {"kind": "body", "near": end.place, "mass": end.point.mass}
+        other = self.cable.end if end is self.cable.start else self.cable.start
+        if math.dist(end.place, other.place) > sum(self.lengths) and other.point is None:
+            why = "the deck's first place of this point is out of the line's reach; the scene leaves it to the search"
+            self.notes.append(note(TAKEN, end.point.row, why))
+            del body["near"]
+        return body | self._water(end.point), line
 
     def _model(self, bends: Sequence[bool]) -> list[str]:
         if all(bends):
@@ -261,6 +268,9 @@ class _Maker:
                 "",
             )
         ]
+        if not all(bends):
+            why = "without EI the cable is a catenary, which stops where tension vanishes; MoorDyn's goes on, crumpled"
+            said.append((why, "if it does, give bending_stiffness (small for a chain), and leave model out"))
         if any(bends):
             why = "MoorDyn has no torsion; hybrid's rods have GJ = EI/1.3 where torsional_stiffness is left out"
             said.append((why, "with both ends free to turn it does nothing"))
@@ -297,4 +307,4 @@ def _flow(data: Any) -> str:
         return "{" + ", ".join(f"{key}: {_flow(value)}" for key, value in data.items()) + "}"
     if isinstance(data, tuple | list):
         return "[" + ", ".join(map(_flow, data)) + "]"
-    return _number(data) if isinstance(data, float) else str(data)
+    return _number(data) if isinstance(data, float) else json.dumps(data) if isinstance(data, bool) else str(data)
