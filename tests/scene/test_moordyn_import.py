@@ -107,14 +107,14 @@ def test_tables_that_count_their_rows() -> None:
     assert scene.environment.seabed.stiffness == pytest.approx(3.0e6 * 0.09)
 
 
-def test_free_points_at_the_end_are_bodies_or_nothing_and_the_bed_is_under_the_lowest() -> None:
+def test_free_points_at_the_end_are_bodies_or_nothing_and_the_bed_is_moordyns_own() -> None:
     deck = imported("free_fall")
     weight, loose = (deck.scenes[f"line{k}"].scene.ends.end for k in (1, 2))
     assert isinstance(weight, Body) and isinstance(loose, Free)
     assert (weight.mass, weight.volume, weight.drag_area, weight.near) == (500.0, 0.06, 0.2, (0.0, 0.0, -60.0))
     assert weight.added_mass == pytest.approx(0.5 * 1025.0 * 0.06)
     scene = deck.scenes["line1"].scene
-    assert scene.environment.seabed.z == -60.0
+    assert scene.environment.seabed.z == -80.0
     assert scene.environment.seabed.stiffness == pytest.approx(3.0e6 * 0.03), "MoorDyn's own, where a deck has none"
 
 

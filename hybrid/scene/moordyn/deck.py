@@ -144,7 +144,7 @@ def read_deck(source: Source) -> Deck:
             found = ", ".join(s.title for s in source.sections.values()) or "no section that MoorDyn knows"
             expected = f"a section that begins with a row such as ------- {title} -------"
             source.complain(title, found, expected, "check that this is a MoorDyn input file", None)
-        elif not source.rows(name):
+        elif not source.rows(name) and not source.complaints:
             section = source.sections[name]
             fix = "fill the table: names, units, then one row for each"
             source.complain(section.title, "", "at least one row under names and units", fix, section.line)
@@ -190,8 +190,14 @@ def _columns(source: Source, row: Row, least: int, most: int, names: Sequence[tu
 # --- line types --------------------------------------------------------------------------------
 
 
+def _types_are_old(section: Section) -> bool:
+    """Whether a row of 9 columns is one of MoorDyn 1, or lacks one: the names decide."""
+    names = {simple(cell) for cell in section.names.cells} if section.names is not None else set()
+    return "ei" not in names and bool(names & {"ca", "can"})
+
+
 def _line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
-    old = len(row.cells) == len(_TYPE_V1)
+    old = len(row.cells) == len(_TYPE_V1) and _types_are_old(source.sections["line types"])
     names = _TYPE_V1 if old else _TYPE_V2
     if not (old or _columns(source, row, 10, len(_TYPE_V2), names)):
         return None

@@ -8,7 +8,7 @@ from hybrid.scene.hints import nearest
 from hybrid.scene.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
 from hybrid.scene.moordyn.rows import Row, Source, number
 
-# What MoorDyn takes where a deck says nothing: measured with MoorDyn 2.7 (tests/bench/test_bench_moordyn.py).
+# What MoorDyn takes where a deck says nothing: measured with MoorDyn 2.7 (tests/bench/test_moordyn_measured.py).
 GRAVITY, DENSITY, BED_STIFFNESS, BED_DAMPING = 9.80665, 1025.0, 3.0e6, 3.0e5
 
 # Numbers that are read, by the names that versions of MoorDyn know, in lower case; and what each must be at least.

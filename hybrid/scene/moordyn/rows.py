@@ -39,6 +39,9 @@ _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
 # MoorDyn 1 of OpenFAST says before a table how many rows it has: "3  NLines  - number of lines".
 _COUNT = re.compile(r"\s*\d+\s+N(types|connects|conns|points|lines)\b", re.IGNORECASE)
 SHOWN = 70  # characters of a row that a complaint or a note shows
+# No quantity of a cable in SI units is larger, and none that must not vanish is smaller than its inverse; squares of
+# what is accepted are then finite, too.
+LARGEST = 1e15
 # Of a row of names or units fewer cells are numbers; with three or more it is one of the data.
 FEW_NUMBERS = 3
 
@@ -109,7 +112,10 @@ class Source:
                 fix = "the program that wrote the deck may have failed there"
             self.complain(what, cell, f"a finite number{bounds}", fix or "check the columns of this row", row.line)
             return math.nan
-        if (least is not None and value < least) or (above is not None and value <= above):
+        if abs(value) > LARGEST:
+            self.complain(what, cell, f"a number of at most {LARGEST:g} in size", "check the unit", row.line)
+            return math.nan
+        if (least is not None and value < least) or (above is not None and value <= above + 1.0 / LARGEST):
             self.complain(what, cell, f"a number{bounds}", "check the sign, and the columns of this row", row.line)
             return math.nan
         return value

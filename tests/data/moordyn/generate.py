@@ -1,7 +1,7 @@
 """Decks made by MoorDyn's own generator (moordyn.Generator), as they stand beside this file.
 
-    python tests/data/moordyn/generate.py            prints them
-    python tests/data/moordyn/generate.py FOLDER     writes them there: generator_chain.txt, ...
+python tests/data/moordyn/generate.py            prints them
+python tests/data/moordyn/generate.py FOLDER     writes them there: generator_chain.txt, ...
 """
 
 from __future__ import annotations
