@@ -105,6 +105,8 @@ def test_tables_that_count_their_rows() -> None:
     scene = only("counted").scene
     assert scene.cable.length == 900.0 and scene.ends.start.position == (850.0, 0.0, -320.0)
     assert scene.environment.seabed.stiffness == pytest.approx(3.0e6 * 0.09)
+    assert scene.cable.sections[0].axial_stiffness == 3.84e8
+    assert any(note.line == 6 and "MoorDyn-C stops reading" in note.why for note in imported("counted").notes)
 
 
 def test_free_points_at_the_end_are_bodies_or_nothing_and_the_bed_is_moordyns_own() -> None:

@@ -88,6 +88,15 @@ def test_a_refusal_has_line_value_expectation_and_fix(case: str, tmp_path: Path)
     assert refused.value.file.endswith("deck.txt")
 
 
+def test_names_of_a_table_with_columns_that_may_be_left_out(tmp_path: Path) -> None:
+    """Names of 13 columns over rows of 10, as decks have them, are held against the places all the same."""
+    row = "TypeName   Diam    Mass/m   EA       BA/-zeta   EI       Cd     Ca    CdAx    CaAx"
+    text = text_of("chain")
+    assert from_text(text.replace(row, row + " Cl dF cF"), tmp_path).scenes
+    with pytest.raises(SceneError, match="column 7"):
+        from_text(text.replace(row, row.replace("Cd     Ca ", "Ca     Cd ") + " Cl dF cF"), tmp_path)
+
+
 def test_all_mistakes_are_told_at_once_in_order(tmp_path: Path) -> None:
     text = text_of("chain").replace("-2     0 ", "zz     0 ").replace("2.0e8", "nan").replace("50       pt", "x  pt")
     with pytest.raises(SceneError) as refused:

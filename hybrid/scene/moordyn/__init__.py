@@ -1,7 +1,8 @@
 """Input files of MoorDyn ("decks"), versions 1 and 2, as scenes: one for each cable.
 
     rows     text: sections, rows, cells, each with its line
-    deck     the tables of the deck: line types, points, bodies, rods, lines
+    types    line types, of both versions
+    deck     the tables of the deck: points, bodies, rods, lines, and do they hold together
     options  its options, and those that hybrid has no use for
     cables   which lines are one cable, and what is at its ends
     scenes   the scene of a cable
@@ -18,7 +19,7 @@ from pathlib import Path
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.moordyn.cables import Cable, cables
 from hybrid.scene.moordyn.deck import Deck, read_deck
-from hybrid.scene.moordyn.notes import LEFT_OUT, NOT_NEEDED, Note, in_order, note
+from hybrid.scene.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_order, note
 from hybrid.scene.moordyn.rows import Source, read_source
 from hybrid.scene.moordyn.scenes import ImportedScene, scene_of
 
@@ -126,6 +127,8 @@ def _no_place(source: Source, deck: Deck) -> list[Note]:
     for section in source.unknown:
         why = f"the section {section.title} is not known here"
         notes += [note(LEFT_OUT, row, why) for row in section.rows]
+    why = "D of an exponent is taken as Fortran does, 1.0D+8 as 1e8; MoorDyn-C stops reading at the D, and takes 1"
+    notes += [note(TAKEN, row, why, "write e, as in 1.0e8") for row in source.fortran]
     outputs = [row for row in source.rows("outputs") if row.cells[0].upper() != "END"]
     why = "output channels; hybrid keeps the whole cable, and the pull at both ends at every step (steps/pull_end)"
     notes += [note(NOT_NEEDED, row, why) for row in outputs]

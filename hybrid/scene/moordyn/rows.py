@@ -82,6 +82,7 @@ class Source:
     def __init__(self, text: str, file: str) -> None:
         self.file = file
         self.complaints: list[Complaint] = []
+        self.fortran: list[Row] = []  # rows with an exponent that only Fortran reads
         self.sections: dict[str, Section] = {}
         self.unknown: list[Section] = []
         self.lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
@@ -100,6 +101,17 @@ class Source:
         section = self.sections.get(name)
         return section.rows if section is not None else []
 
+    def columns(self, row: Row, least: int, most: int, names: Sequence[tuple[str, ...]]) -> bool:
+        """Whether a row has `least` to `most` cells; complains if not."""
+        n = len(row.cells)
+        if least <= n <= most:
+            return True
+        counted = f"{least}" if least == most else f"{least} to {most}"
+        order = " ".join(each[0] for each in names[:least])
+        fix = "put ! before a remark" if n > most else "write 0 where there is nothing, - where there is no word"
+        self.complain(f"{n} columns", row.text, f"{counted} columns: {order}", fix, row.line)
+        return False
+
     # --- cells ---------------------------------------------------------------------------------
 
     def number(self, row: Row, cell: str, what: str, least: float | None = None, above: float | None = None) -> float:
@@ -112,6 +124,8 @@ class Source:
                 fix = "the program that wrote the deck may have failed there"
             self.complain(what, cell, f"a finite number{bounds}", fix or "check the columns of this row", row.line)
             return math.nan
+        if "d" in cell.lower():
+            self.fortran.append(row)
         if abs(value) > LARGEST:
             self.complain(what, cell, f"a number of at most {LARGEST:g} in size", "check the unit", row.line)
             return math.nan
@@ -204,18 +218,18 @@ def simple(name: str) -> str:
     return re.sub(r"[^a-z0-9]", "", name.lower())
 
 
-def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]]) -> None:
+def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]], least: int) -> None:
     """Complain of columns named otherwise than MoorDyn reads them; by place, whatever their names.
 
-    columns: the names that are usual for each place, in `simple` form, the first to be told.
+    columns: the names that are usual for each place, in `simple` form, the first to be told; `least` must be there.
     """
     names = source.sections[section].names
-    if names is None or len(names.cells) != len(columns):
+    if names is None or not least <= len(names.cells) <= len(columns):
         return  # names of several words, or a row of another kind: nothing can be said
     where = {name: i for i, usual in enumerate(columns) for name in usual}
     for i, cell in enumerate(names.cells):
         j = where.get(simple(cell))
         if j is not None and j != i:
             expected = f"{columns[i][0]} in column {i + 1}: MoorDyn reads columns by place, not by name"
-            order = " ".join(usual[0] for usual in columns)
+            order = " ".join(usual[0] for usual in columns[: len(names.cells)])
             source.complain(f"column {i + 1}", cell, expected, f"write the columns in the order {order}", names.line)

@@ -22,9 +22,10 @@ from typing import Any
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.attachments import sphere_diameter
 from hybrid.scene.moordyn.cables import Cable, End, between
-from hybrid.scene.moordyn.deck import Deck, Line, LineType, Point
+from hybrid.scene.moordyn.deck import Deck, Line, Point
 from hybrid.scene.moordyn.notes import DIFFERS, LEFT_OUT, TAKEN, Note, in_order, note
 from hybrid.scene.moordyn.rows import show
+from hybrid.scene.moordyn.types import LineType
 from hybrid.scene.read import parse_scene
 from hybrid.scene.schema import Scene
 
