@@ -52,11 +52,11 @@ class Case:
 
 CASES = {
     "chain": Case(1, "end", 2, 1e-3, (0.1, 0.1, 0.6, 1.0)),
-    "rope_and_chain": Case(1, "end", 3, 5e-4, (0.5, 0.5, 1.0, 1.0)),
+    "rope_and_chain": Case(1, "end", 3, 5e-4, (0.2, 0.1, 0.3, 0.3)),
     "generator_chain": Case(1, "end", 2, 1e-3, (0.1, 0.1, 0.6, 1.0)),
     "generator_clump": Case(1, "end", 3, 5e-4, (0.1, 0.1, 0.3, 0.3)),
-    "generator_spread": Case(1, "end", 2, 4e-4, (0.5, 0.5, 1.0, 1.0)),
-    "free_fall": Case(1, "start", 1, 2.5e-4, (0.1, 0.1, 2.0, 2.0)),
+    "generator_spread": Case(1, "end", 2, 4e-4, (0.2, 0.1, 1.0, 1.0)),
+    "free_fall": Case(1, "start", 1, 2.5e-4, (0.1, 0.1, 0.2, 0.2)),
 }
 
 
