@@ -5,8 +5,8 @@
 
 The deck is imported as `hybrid import` does; its scene gets a heave of 1 m at 8 s (ramp 16 s), accuracy 0.1 %, and cells
 of its own choice.  MoorDyn takes the deck as it stands, with 0.5, 1 and 2 times its segments, its fairlead moved the
-same way.  MoorDyn's rest is what it comes to when it is marched with its fairlead still: its own search for it leaves a
-line with a clump out of balance.  Both are the force on the fairlead, the last half segment's weight included.
+same way.  MoorDyn's rest is what it comes to when it is marched with its fairlead still, whatever its own search for it
+has found before.  Both are the force on the fairlead, the last half segment's weight included.
 
 What is expected: a first difference of a few per cent where lumped masses land on the bed one by one (the minimum of a
 chain that touches down), which goes with more segments; what is left at the finest is within the bounds below.

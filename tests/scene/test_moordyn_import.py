@@ -199,6 +199,38 @@ def test_differences_are_said_where_they_are(old: str, new: str, words: str, tmp
         assert any(words in note.why for note in notes) == there
 
 
+@pytest.mark.parametrize(
+    ("deck", "old", "new", "line", "kind", "words"),
+    [
+        ("version1", "3.0e-4   0     0     0 ", "3.0e-4   0     0     2 ", 11, "left out", "a steady force on a point"),
+        ("version1", "6.0e4    -0.6", "6.0e4    50.0", 5, "taken as", "BA is taken in N s"),
+        ("version1", "0.06   3.0e-4", "0.0    0.0   ", 11, "left out", "drag of a point without mass"),
+        ("rope_and_chain", "1.0e5      0   ", "ba.dat     0   ", 7, "left out", "BA is read from ba.dat"),
+        ("rope_and_chain", "120      WtrDpth", "bed.txt  WtrDpth", 20, "left out", "the depth is read from a file"),
+        ("three_lines", "6    Coupled ", "6    Turbine1", 15, "left out", "FAST.Farm"),
+        ("three_lines", "3        P6", "3        4 ", 15, "left out", "holds no line"),
+    ],
+)
+def test_what_is_said_of_a_row(deck: str, old: str, new: str, line: int, kind: str, words: str, tmp_path: Path) -> None:
+    text = text_of(deck)
+    assert text.count(old) == 1
+    made = from_text(text.replace(old, new), tmp_path)
+    notes = [*made.notes, *(note for scene in made.scenes.values() for note in scene.notes)]
+    found = [note for note in notes if words in note.why]
+    assert found and found[0].kind == kind
+    assert found[0].line == line or words == "FAST.Farm", "of a turbine the line that ends there is named"
+
+
+def test_a_point_with_buoyancy_and_no_mass_ends_no_cable(tmp_path: Path) -> None:
+    with pytest.raises(hybrid.SceneError, match="needs a mass"):
+        from_text(
+            text_of("chain").replace(
+                "2    Coupled      205   0    -2     0      0 ", "2    Free  205   0    -2     0      1 "
+            ),
+            tmp_path,
+        )
+
+
 def test_bending_makes_the_model_only_where_all_sections_have_it(tmp_path: Path) -> None:
     text = text_of("chain").replace("2.0e8    0          0   ", "2.0e8    0          1.0e3   ")
     (one,) = from_text(text, tmp_path).scenes.values()

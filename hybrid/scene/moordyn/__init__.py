@@ -89,7 +89,8 @@ def import_moordyn(path: str | Path, line: int | None = None) -> ImportedDeck:
     if line is not None:
         found = _chosen(deck, found, lost, line)
     if not found:
-        complaints = [Complaint(n.text, n.kind, n.why, n.instead, n.line) for n in lost]
+        expected = "a line that a scene can be made of; "
+        complaints = [Complaint("no scene", n.text, expected + n.why, n.instead, n.line) for n in lost]
         raise SceneError(complaints, deck.file)
     scenes = _all_scenes(deck, found)
     notes = [*deck.notes, *lost, *_no_place(source, deck)]
