@@ -162,12 +162,7 @@ def _at_point(deck: Deck, point: Point) -> End:
     if point.kind == "body":
         return _on_body(deck.bodies[point.on], point.place, None, point.row.line)
     if point.kind == "turbine":
-        why = "the place of the turbine stands in the file of FAST.Farm, not in the deck"
-        return End(
-            point.place,
-            point.row.line,
-            lost=note(LEFT_OUT, point.row, why, "make the point Coupled, at its place in the sea"),
-        )
+        return End(point.place, point.row.line, lost=note(LEFT_OUT, point.row, *_TURBINE))
     joined = [line.id for line, _ in _attached(deck, point.id)]
     if len(joined) > 2:
         why = f"{len(joined)} lines meet there ({', '.join(map(str, joined))}); hybrid computes one cable"
@@ -191,19 +186,13 @@ def _at_rod(deck: Deck, rod: Rod, letter: str) -> End:
     place = rod.a if at_a else rod.b
     if rod.kind == "free" or "pinned" in rod.kind:
         if rod.kind != "free" and letter == "A" and not rod.on:
-            why = "a pinned rod turns about its end A; the line is pinned there, without the rod's weight and moment"
-            return End(
-                place, rod.row.line, notes=(note(TAKEN, rod.row, why, "add what the rod does as a clump or a float"),)
-            )
-        why = "a rigid rod that moves with the line"
-        return End(
-            place, rod.row.line, lost=note(LEFT_OUT, rod.row, why, "replace it by a stiff line, or by a Free point")
-        )
+            why = "a pinned rod turns about its end A; the line is pinned there, and the rod's moment left out"
+            fix = _MOTION if rod.kind == "coupled pinned" else ""
+            return End(place, rod.row.line, notes=(note(TAKEN, rod.row, why, fix),))
+        lost = note(LEFT_OUT, rod.row, "a rigid rod that moves", "replace it by a stiff line, or by a Free point")
+        return End(place, rod.row.line, lost=lost)
     if rod.kind == "turbine":
-        why = "the place of the turbine stands in the file of FAST.Farm, not in the deck"
-        return End(
-            place, rod.row.line, lost=note(LEFT_OUT, rod.row, why, "make the rod Coupled, at its place in the sea")
-        )
+        return End(place, rod.row.line, lost=note(LEFT_OUT, rod.row, *_TURBINE))
     if rod.kind == "body":
         return _on_body(deck.bodies[rod.on], place, along, rod.row.line)
     why = "the rod is left out; it holds the end of the line, and its direction where the line bends"
@@ -221,7 +210,6 @@ def _on_body(body: Body, place: Triple, along: Triple | None, line: int) -> End:
         "fixed": "",
         "free": "a rigid body of its own motion; the scene holds the line where the deck puts the body at first",
         "pinned": "a body that turns freely; the scene holds the line where the deck puts the body at first",
-        "turbine": "",
     }.get(body.kind, "the calling program of MoorDyn moves this body; the scene holds the line on it")
     if body.kind == "turbine":
         return End(at, line, lost=note(LEFT_OUT, body.row, *_TURBINE))
