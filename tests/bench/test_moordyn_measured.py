@@ -10,8 +10,10 @@ from typing import Any
 
 import numpy as np
 import pytest
+from peers.moordyn_deck import march, options
 from peers.moordyn_touchdown import silence
 
+import hybrid
 from hybrid.scene.moordyn import options as taken
 
 moordyn = pytest.importorskip("moordyn")
@@ -155,3 +157,27 @@ def test_a_body_turns_by_degrees_about_x_then_y_then_z(tmp_path: Path) -> None:
 def test_a_negative_length_is_times_the_distance(tmp_path: Path) -> None:
     with system(tmp_path, length=-1.02) as (made, _):
         assert moordyn.GetLineUnstretchedLength(moordyn.GetLine(made, 1)) == pytest.approx(20.4)
+
+
+ROD_END = Path(__file__).parents[1] / "data" / "moordyn" / "rod_end.txt"
+
+
+@pytest.mark.parametrize(("end", "rod"), [("R1A", "-20     50    0     -19"), ("R1B", "-19     50    0     -20")])
+def test_a_rod_holds_the_direction_of_a_line_that_bends(end: str, rod: str, tmp_path: Path) -> None:
+    """The shape at rest is that of the scene, clamped as imported; pinned it would be another.
+
+    Into the rod at its end A the line goes as the rod points, into its end B the other way: here upwards both times.
+    """
+    path = tmp_path / "deck.txt"
+    path.write_text(ROD_END.read_text().replace("R1A", end).replace("-20     50    0     -19", rod))
+    (made,) = hybrid.import_moordyn(path).scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True) | {"model": "rod", "output": {"points": 61}}
+    assert data["ends"]["end"]["tangent"] == pytest.approx([0.0, 0.0, 1.0])
+    still = options(path.read_text(), dtM=2e-4, tScheme="RK4", writeLog=0, disableOutput=1, disableOutTime=1)
+    there = march(still, lambda t: np.zeros(0), 60.0, 1.0, 0.1).nodes[1]
+    here = hybrid.static(hybrid.validate_scene(data)).position[-1]
+    data["ends"]["end"] = {"kind": "pinned", "position": data["ends"]["end"]["position"]}
+    pinned = hybrid.static(hybrid.validate_scene(data)).position[-1]
+    off, without = (np.linalg.norm(there - x, axis=1).max() for x in (here, pinned))
+    print(f"{end}: {off:.4f} m of 62 m from the clamped scene, {without:.4f} m from a pinned one")
+    assert off < 0.02 and without > 1.0
