@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
     from hybrid.results.zoneplot import plot_zones
+    from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.simulate import resume, run, static
@@ -39,6 +40,7 @@ _HOME = {
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
     "export": ("hybrid.results.export", "export"),
+    "import_moordyn": ("hybrid.scene.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -63,6 +65,7 @@ __all__ = [
     "Scene",
     "SceneError",
     "export",
+    "import_moordyn",
     "load_scene",
     "open",
     "parse_scene",

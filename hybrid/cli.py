@@ -1,4 +1,4 @@
-"""The command line: hybrid run | resume | static | plan | plot | export | trade | schema.
+"""The command line: hybrid run | resume | static | plan | plot | export | trade | import | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -28,6 +28,7 @@ from hybrid.said import (
     equilibrium_table,
     errors_facts,
     errors_table,
+    import_said,
     judged,
     plan_table,
     trade_table,
@@ -283,6 +284,31 @@ def trade(
         say.done(f"{len(table.rows)} runs", *files, **facts)
 
 
+@app.command("import")
+def import_(
+    deck: Annotated[Path, typer.Argument(metavar="DECK", help="A MoorDyn input file.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="SCENE.yaml|FOLDER", help="Else this folder.")
+    ] = None,
+    line: Annotated[int | None, typer.Option(metavar="ID", help="Only the cable with this line.")] = None,
+    overwrite: Annotated[bool, _flag("--overwrite", help="Replace scenes that are there.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Make scenes of a MoorDyn deck, one for each cable, and say what could not be carried over."""
+    with _speaking(as_json, quiet) as say:
+        say.source = str(deck)
+        made = hybrid.import_moordyn(deck, line)
+        files = made.write(output or Path(), overwrite)
+        notes = [("", note) for note in made.notes]
+        notes += [(name, note) for name, scene in made.scenes.items() for note in scene.notes]
+        for name, note in notes:
+            say.json("note", scene=name, **asdict(note))
+        for text in import_said(made):
+            say.note(text)
+        lost = sum(note.kind == "left out" for _, note in notes)
+        say.done(f"{_count(len(files), 'scene')}, {lost} left out", *files, left_out=lost, notes=len(notes))
+
+
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a scene, for editors."""
@@ -348,6 +374,10 @@ def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
             signal.signal(signal.SIGTERM, before)
     if code:
         raise typer.Exit(code)
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
 
 
 def _kernels(scene: Scene) -> list[str]:
