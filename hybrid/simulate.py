@@ -78,11 +78,12 @@ def run(
     if scene.solver == "shooting":
         from hybrid.arbitrate import run_shooting
 
-        return run_shooting(scene, output, overwrite)
+        with claimed(_path(output)):
+            return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     job, target = Job(scene, criterion), _target(output, overwrite)
-    with claimed(target if isinstance(target, Path) else None), _working(job, progress):
+    with claimed(_path(output)), _working(job, progress):
         _run(job, target)
     return open_result(target)
 
@@ -182,16 +183,18 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     if scene.solver == "shooting":
         from hybrid.arbitrate import static_shooting
 
-        return static_shooting(scene, output, overwrite)
+        with claimed(_path(output)):
+            return static_shooting(scene, output, overwrite)
     job, begin = Job(scene, None), clock.process_time()
     target, effort = _target(output, overwrite), first_effort(scene)
-    if not wants_errors(scene):
-        job.record_rest(effort, target)
-        return open_result(target)
-    compute = _kept(target, job.record_rest, job.record_rest)
-    climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
-    final, errors = climb.reach(effort)
-    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    with claimed(_path(output)):
+        if not wants_errors(scene):
+            job.record_rest(effort, target)
+            return open_result(target)
+        compute = _kept(target, job.record_rest, job.record_rest)
+        climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
+        final, errors = climb.reach(effort)
+        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
 
@@ -297,6 +300,10 @@ class _Told:
             self._last = now
             zones = motion.model.zones
             self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
+
+
+def _path(output: str | Path | None) -> Path | None:
+    return None if output is None else Path(output).expanduser().resolve()
 
 
 def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:

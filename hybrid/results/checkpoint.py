@@ -193,6 +193,8 @@ def claimed(path: Path | None) -> Iterator[None]:
         advice = "a folder you may write to, with free space"
         raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
     try:
+        for left in path.parent.glob(f".{path.name}.*.new"):  # of a process that was killed
+            left.unlink(missing_ok=True)
         yield
     finally:
         beside.unlink(missing_ok=True)
