@@ -224,7 +224,7 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("run", "wire.yaml", "-o", "wire.yaml"), "is not a result of hybrid"),
         (("run", "wire.yaml", "--nonsense"), "hybrid run --help"),
         (("run",), "SCENE.yaml"),
-        (("rum",), "Did you mean 'run'?"),
+        (("rum",), "Did you mean 'run'"),
         (("plot", "wire.h5", "--times", "0,x"), "no list of numbers"),
         (("plot", "absent.h5", "--zones"), "there is no file"),
         (("plot", "wire.yaml", "--zones"), "cannot be read as a result"),

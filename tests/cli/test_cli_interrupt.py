@@ -68,7 +68,7 @@ def test_an_interrupted_run_leaves_a_whole_file(number: signal.Signals) -> None:
     last = json.loads(out.splitlines()[-1])
     assert (last["event"], last["status"], last["file"]) == ("done", "interrupted", "long.h5")
     assert last["t"] == check_file()
-    assert err == f"interrupted; long.h5 is complete up to t = {last['t']:.6g} s\n"
+    assert err == f"interrupted; long.h5 is complete up to t = {last['t']:.6g} s; `hybrid resume long.h5` goes on\n"
 
 
 def test_a_reader_who_goes_away_ends_the_run() -> None:
@@ -78,7 +78,7 @@ def test_a_reader_who_goes_away_ends_the_run() -> None:
         process.stdout.close()
         err = process.stderr.read()
     assert process.returncode == 130
-    assert err == f"interrupted; long.h5 is complete up to t = {check_file():.6g} s\n"
+    assert err == f"interrupted; long.h5 is complete up to t = {check_file():.6g} s; `hybrid resume long.h5` goes on\n"
 
 
 def test_the_live_line_on_a_terminal_and_ctrl_c() -> None:
