@@ -168,6 +168,7 @@ class Voice:
     def __init__(self, as_json: bool, quiet: bool) -> None:
         self.as_json, self.quiet = as_json, quiet
         self.source = ""  # the scene file, for complaints that do not know it
+        self.settings: list[str] = []  # what the command changes in it
         self.left = ""  # what Ctrl-C leaves, of commands that write more than a file
         self._file: Path | None = None
         self._before: tuple[int, int] | None = None

@@ -205,7 +205,7 @@ def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
     for index, target in ((0, 0.0), (len(mesh.nodes) - 1, length)):
         if abs(mesh.nodes[index] - target) > SAME_LENGTH * length:
             name = "the first node at the start of the cable" if index == 0 else "the last node at the end of the cable"
-            yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}")
+            yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}", f"{target:.12g}")
 
 
 def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
@@ -215,7 +215,10 @@ def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
         if isinstance(values, tuple):
             for i, s in enumerate(values):
                 if s > length * (1 + SAME_LENGTH):
-                    yield Finding(("output", key, i), f"an arc length between 0 and {length:.8g} m, the cable's length")
+                    expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
+                    yield Finding(
+                        ("output", key, i), expected, f"{length:.8g} is the end of the cable; or leave it out"
+                    )
 
 
 CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (

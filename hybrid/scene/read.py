@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -15,8 +17,8 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Environment, Scene, Time
-from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
-from hybrid.scene.table import Finding, dotted
+from hybrid.scene.source import Node, Spot, Unreadable, from_data, from_text, override
+from hybrid.scene.table import Finding, Place, dotted
 from hybrid.scene.task import usual_model
 from hybrid.scene.words import explain
 
@@ -50,6 +52,25 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
     data = root.plain()
     _resolve_motion_files(data, Path(file).parent)
     return _validated(data, root, complaints, file)
+
+
+def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
+    """The same refusal with line and column of complaints that were found only after reading (cells, steps, motions)."""
+    try:
+        root, _ = from_text(Path(path).read_text(encoding="utf-8"))
+    except (OSError, ValueError, Unreadable):
+        return error
+    if isinstance(root.value, dict):
+        for each in overrides:
+            override(root, each, Scene)
+    complaints = []
+    for complaint in error.complaints:
+        at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
+        place = _find(root, at, False)[1]
+        if complaint.line is None and place is not None:
+            complaint = replace(complaint, line=place[0], column=place[1])
+        complaints.append(complaint)
+    return SceneError(_in_order(complaints), error.file or str(path))
 
 
 def validate_scene(data: Any) -> Scene:
@@ -133,9 +154,18 @@ def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
-    """Where a finding was written: the value, else the key if that is wrong, else the table it is missing from."""
-    node, place, missing = root, root.place, False
-    for part in finding.at:
+    node, place, missing = _find(root, finding.at, at_key)
+    given = finding.given or ("nothing" if missing else node.show())
+    if at_key and not missing:
+        given = f"{dotted(finding.at[-1:])}: {given}"
+    line, column = place if place is not None else (None, None)
+    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+
+
+def _find(root: Node, path: Place, at_key: bool) -> tuple[Node, Spot | None, bool]:
+    """Where a path leads: the value, else the key if that is wrong, else the table it is missing from; if it is."""
+    node, place = root, root.place
+    for part in path:
         inside = node.value
         if isinstance(inside, dict) and part in inside and isinstance(part, str):
             key_place = node.key_places.get(part)
@@ -147,12 +177,8 @@ def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
         else:
             # `model: adaptive` has no key `kind`, the word itself is the kind; what else a bare word lacks is missing.
             missing = isinstance(inside, dict | list) or inside is None or (isinstance(inside, str) and part != "kind")
-            break
-    given = finding.given or ("nothing" if missing else node.show())
-    if at_key and not missing:
-        given = f"{finding.at[-1]}: {given}"
-    line, column = place if place is not None else (None, None)
-    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+            return node, place, missing
+    return node, place, False
 
 
 def _in_order(complaints: Iterable[Complaint]) -> list[Complaint]:

@@ -26,6 +26,8 @@ Spot = tuple[int, int]
 SHOWN = 60
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
+_WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
+_QUOTE = "write one word before the colon; close brackets and braces"
 _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
 
 
@@ -81,14 +83,14 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
         raise Unreadable(_not_yaml(text, error)) from None
     except (YAMLError, RecursionError, ValueError) as error:
         why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
-        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", "", 1, 1)) from None
+        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
     if top is None:
         raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
     complaints: list[Complaint] = []
     try:
         return _build(top, (), complaints, ()), complaints
     except RecursionError:
-        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", "", 1, 1)) from None
+        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
 
 
 def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
@@ -106,6 +108,8 @@ def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
         fix = "close the bracket, or put a comma between the entries"
     elif "undefined alias" in problem:
         fix = "give the anchor (&name) before the alias (*name)"
+    if not fix:
+        fix = "check indentation, brackets and quotes here and in the line before"
     problem = problem.replace("<stream end>", "the end of the text").replace("\\t", "tab")
     return Complaint("YAML", given or "nothing", f"a text that YAML can read; {problem}", fix, line + 1, column + 1)
 
@@ -133,7 +137,9 @@ def _build_table(
     for i, (key_node, value_node) in enumerate(node.value):
         spot = (key_node.start_mark.line + 1, key_node.start_mark.column + 1)
         if not isinstance(key_node, ScalarNode):
-            complaints.append(Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", "", *spot))
+            complaints.append(
+                Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", _QUOTE, *spot)
+            )
             continue
         key = str(key_node.value)
         before = str(node.value[i - 1][0].value) if i else ""
@@ -150,7 +156,15 @@ def _build_table(
                 if isinstance(source.value, dict):
                     merged = {**source.value, **merged}
                 else:
-                    complaints.append(Complaint(dotted((*path, key)), source.show(), "a table to merge", "", *spot))
+                    complaints.append(
+                        Complaint(
+                            dotted((*path, key)),
+                            source.show(),
+                            "a table to merge",
+                            "`<<` takes an alias of a table; or leave it out",
+                            *spot,
+                        )
+                    )
             continue
         if key in table.value:
             first = table.key_places[key]
@@ -217,7 +231,7 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
     name, equals, value_text = text.partition("=")
     name = name.strip()
     if not equals or not _PATH.fullmatch(name):
-        return Complaint("override", text or "nothing", _EXAMPLE, "")
+        return Complaint("override", text or "nothing", _EXAMPLE, "name the key as `hybrid plan` and docs/scene.md do")
     path: Place = tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", name))
     try:
         value, complaints = from_text(value_text) if value_text.strip() else (Node(None), [])
@@ -252,18 +266,18 @@ def _no_entry(here: Node, path: Place, index: int) -> tuple[str, str] | None:
     if index < count:
         return None
     number = f"{count} entr{'y' if count == 1 else 'ies'}, counted from 0" if count else "no entries"
-    return f"an entry that exists: {dotted(path)} has {number}", ""
+    return f"an entry that exists: {dotted(path)} has {number}", "change the entry in the file, or count again"
 
 
 def _no_key(here: Node, path: Place, key: str, known: list[str]) -> tuple[str, str] | None:
     """Why there is no `key` in the table at `path`: what was expected, and the fix."""
     table = dotted(path) or "a scene"
     if not known:
-        return f"a key that exists; {table} has none below it", ""
+        return f"a key that exists; {table} has none below it", f"{table}=value"
     if key not in known:
         return f"a key of {table}", did_you_mean(key, known)
     if not isinstance(here.value, dict):
-        return f"{table} to be a table; it is {here.show()}", ""
+        return f"{table} to be a table; it is {here.show()}", f"mend {table} in the file first"
     return None
 
 

@@ -296,7 +296,9 @@ class Mesh(Table):
             both = [name for name in ("cells", "ratio") if getattr(self, name) is not None]
             found = [Finding((name,), "nothing, because nodes already gives the mesh", fix) for name in both]
             if not _increasing(self.nodes):
-                found.append(Finding(("nodes",), "numbers that increase strictly, in m"))
+                found.append(
+                    Finding(("nodes",), "numbers that increase strictly, in m", "sort them and drop duplicates")
+                )
             refuse(found)
         return self
 
@@ -343,7 +345,7 @@ class Time(Table):
 
 
 OutputPoints = Annotated[
-    Annotated[Whole, Field(ge=2), Tag("<number>")]
+    Annotated[Whole, Field(ge=2, le=1_000_000), Tag("<number>")]  # a million points fill 160 MB at every output
     | Annotated[tuple[NonNegative, ...], Field(min_length=1), Tag("<list>")],
     Discriminator(number_or_list),
 ]

@@ -256,7 +256,13 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
         bare = isinstance(value, Mapping) and list(value) == ["kind"]
         return [(Finding(path, words, _missing_fix(str(path[-1]), spot, bare)), False)]
     key = path[-1] if path and isinstance(path[-1], str) else ""
-    return [(Finding(path, words, _fix(kind, key, value, spot)), False)]
+    if kind == "large_number":
+        fix = f"check the unit: no cable needs more than {context['most']:g}"
+        return [(Finding(path, f"{words}, and at most {context['most']:g}", fix), False)]
+    if kind == "tiny_number":
+        zero = "" if " > 0" in words else ", or write 0"
+        return [(Finding(path, f"{words}, and no less than {context['least']:g}", f"check the unit{zero}"), False)]
+    return [(Finding(path, words, _fix(kind, key, value, spot) or _usual_fix(key, words, spot)), False)]
 
 
 def _unknown_key(path: Place, spot: Spot) -> Finding:
@@ -346,6 +352,24 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     if kind in ("greater_than", "greater_than_equal") and isinstance(value, int | float) and value < 0:
         return "check the sign"
     return ""
+
+
+def _usual_fix(key: str, words: str, spot: Spot) -> str:
+    """What to try where nothing is known of why a value is wrong: how a right one is written, or to do without."""
+    found = list(arms(spot.annotation, spot.metadata))
+    shape = _shape(key, spot.annotation, spot.metadata)
+    optional = key and spot.owner is not None and spot.field is not None and not spot.field.is_required()
+    without = f", or leave {key} out" if optional else ""
+    if any(get_origin(a) is Literal for a, _ in found) or words.startswith("one of"):
+        return f"write one of these{without}"
+    if shape != "...":
+        return f"write `{key}: {shape}`{without}"
+    tables = [a for a, _ in found if isinstance(a, type) and issubclass(a, Table)]
+    if tables and key:
+        return f"write `{key}: {words.removeprefix('a table ')}`{without}"
+    if any(a is float or a is int for a, _ in found):
+        return f"give {words.partition(',')[0]}{without}"
+    return f"write it as in docs/scene.md{without}"
 
 
 # What stands before a unit, and what it is worth.

@@ -66,7 +66,7 @@ def test_round_trip(text: str) -> None:
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(
     title=st.text().map(lambda text: "".join(c for c in text if c.isprintable()).strip()),
-    mass=st.floats(1e-300, 1e300),
+    mass=st.floats(1e-30, 1e18),
     position=st.tuples(*[st.floats(-1e6, 1e6)] * 3),
 )
 def test_round_trip_is_exact(title: str, mass: float, position: tuple[float, float, float]) -> None:
