@@ -55,7 +55,7 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
 
 
 def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
-    """The same refusal with line and column of complaints that were found only after reading (cells, steps, motions)."""
+    """The same refusal with line and column of what was found only after reading (cells, steps, motions)."""
     try:
         root, _ = from_text(Path(path).read_text(encoding="utf-8"))
     except (OSError, ValueError, Unreadable):

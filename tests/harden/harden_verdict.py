@@ -17,6 +17,7 @@ import time
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, field
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -216,11 +217,7 @@ def not_whole(path: Path) -> Iterator[str]:
             yield "times or arc lengths do not increase"
         for zones in result.zones:
             edges = [x for zone in zones for x in (zone.s_a, zone.s_b)]
-            if (
-                not zones
-                or (np.diff(edges) < 0).any()
-                or any(a.s_b != b.s_a for a, b in zip(zones, zones[1:], strict=False))
-            ):
+            if not zones or (np.diff(edges) < 0).any() or any(a.s_b != b.s_a for a, b in pairwise(zones)):
                 yield f"zones do not fill the line: {zones}"
                 break
 
