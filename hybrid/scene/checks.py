@@ -32,6 +32,9 @@ from hybrid.scene.task import (
     ZonesModel,
 )
 
+# Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
+FINEST_STEP = 1e-12
+
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
     """All contradictions among `tables` (name -> table); checks that lack a table are skipped."""
@@ -162,6 +165,17 @@ def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) ->
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
 
+def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
+    if time is None or time.tolerance is None:
+        return
+    least = FINEST_STEP * cable.length
+    if time.tolerance < least:
+        expected = f"at least {least:.3g} m, a millionth of a millionth of the length: below, steps follow round-off"
+        yield Finding(
+            ("time", "tolerance"), expected, f"{1e-6 * cable.length:.3g}, or leave it out and ask `accuracy: 1%`"
+        )
+
+
 def _in_a_plane(
     environment: Environment, cable: Cable, ends: Ends, initial: Initial, solver: str, dimension: int | None
 ) -> Iterator[Finding]:
@@ -241,6 +255,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _stretches_on_cable,
     _zones_that_move,
     _arbiter_steps,
+    _tolerance_is_felt,
     _accuracy_has_errors,
     _sections_that_come_and_go,
     _in_a_plane,

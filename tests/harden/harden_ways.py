@@ -5,12 +5,23 @@ from __future__ import annotations
 import copy
 import random
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any
 
 from harden_tree import Box, Entry, Leaf, Row, to_tree, walk
 
-Harm = tuple[str, list[Any]]  # what was done, and the entries (or tables) where it can be seen
-Way = Callable[[random.Random, Box], Harm | None]
+Done = tuple[str, list[Any]]  # what was done, and the entries (or tables) where it can be seen
+Way = Callable[[random.Random, Box], Done | None]
+
+
+@dataclass(frozen=True)
+class Harm:
+    """The way a scene was harmed, in words, and the entries (or tables) where it can be seen."""
+
+    way: str
+    what: str
+    touched: list[Any]
+
 
 NOT_NUMBERS = [".nan", ".inf", "-.inf", "1e400", "-1e400", "9" * 400, "0x", "1e", "--1", "1_000", "0o17", "190:20:30"]
 EXTREMES = ["0", "-1", "-0.0", "1e-320", "1e-300", "1e-30", "-1e-30", "1e-12", "1e-6", "1e6", "1e9", "1e12", "-1e12",
@@ -105,7 +116,7 @@ def _number(rng: random.Random, tree: Box) -> Any:
     return (found[1], rng.choice(_numbers(found[1].value))) if found else None
 
 
-def forgotten(rng: random.Random, tree: Box) -> Harm | None:
+def forgotten(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -113,7 +124,7 @@ def forgotten(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} forgotten", list(inside)
 
 
-def misspelt(rng: random.Random, tree: Box) -> Harm | None:
+def misspelt(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -125,7 +136,7 @@ def misspelt(rng: random.Random, tree: Box) -> Harm | None:
     return f"{key} written {entry.key}", [entry, *inside]
 
 
-def alien(rng: random.Random, tree: Box) -> Harm | None:
+def alien(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -134,7 +145,7 @@ def alien(rng: random.Random, tree: Box) -> Harm | None:
     return f"{new.key} added", [new, *inside]
 
 
-def other_type(rng: random.Random, tree: Box) -> Harm | None:
+def other_type(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -143,7 +154,7 @@ def other_type(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key}: {new}", [entry, *inside]
 
 
-def odd_text(rng: random.Random, tree: Box) -> Harm | None:
+def odd_text(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -155,7 +166,7 @@ def odd_text(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} has odd text", [entry, *inside]
 
 
-def not_a_number(rng: random.Random, tree: Box) -> Harm | None:
+def not_a_number(rng: random.Random, tree: Box) -> Done | None:
     entry, leaf = _number(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -163,7 +174,7 @@ def not_a_number(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key}: {leaf.text[:12]}", [entry]
 
 
-def extreme(rng: random.Random, tree: Box) -> Harm | None:
+def extreme(rng: random.Random, tree: Box) -> Done | None:
     entry, leaf = _number(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -171,7 +182,7 @@ def extreme(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key}: {leaf.text}", [entry]
 
 
-def scaled(rng: random.Random, tree: Box) -> Harm | None:
+def scaled(rng: random.Random, tree: Box) -> Done | None:
     entry, leaf = _number(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -180,7 +191,7 @@ def scaled(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} times {by:.3g}", [entry]
 
 
-def with_unit(rng: random.Random, tree: Box) -> Harm | None:
+def with_unit(rng: random.Random, tree: Box) -> Done | None:
     entry, leaf = _number(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -188,7 +199,7 @@ def with_unit(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key}: {leaf.text}", [entry]
 
 
-def twice(rng: random.Random, tree: Box) -> Harm | None:
+def twice(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
         return None
@@ -197,7 +208,7 @@ def twice(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} twice", [entry, new, *inside]
 
 
-def misplaced(rng: random.Random, tree: Box) -> Harm | None:
+def misplaced(rng: random.Random, tree: Box) -> Done | None:
     """A key in another table, its value in a list, or its keys one level up."""
     inside, entry = _pick(rng, tree) or (None, None)
     if entry is None:
@@ -220,7 +231,7 @@ def misplaced(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} misplaced", [entry, *inside]
 
 
-def emptied(rng: random.Random, tree: Box) -> Harm | None:
+def emptied(rng: random.Random, tree: Box) -> Done | None:
     inside, entry = _pick(rng, tree, lambda e: not isinstance(e.value, Leaf)) or (None, None)
     if entry is None:
         return None
@@ -228,7 +239,7 @@ def emptied(rng: random.Random, tree: Box) -> Harm | None:
     return f"{entry.key} emptied", [entry, *inside]
 
 
-def other_task(rng: random.Random, tree: Box) -> Harm | None:
+def other_task(rng: random.Random, tree: Box) -> Done | None:
     table = rng.choice(list(TASKS))
     key, values = rng.choice(TASKS[table])
     box = tree.get(table)
@@ -238,13 +249,13 @@ def other_task(rng: random.Random, tree: Box) -> Harm | None:
     return f"{table}.{key}: {entry.value.text}", [entry, box]
 
 
-def other_whole(rng: random.Random, tree: Box) -> Harm | None:
+def other_whole(rng: random.Random, tree: Box) -> Done | None:
     key = rng.choice(list(WHOLE))
     entry = tree.put(key, to_tree(rng.choice(WHOLE[key])))
     return f"another {key}", [entry]
 
 
-def other_end(rng: random.Random, tree: Box) -> Harm | None:
+def other_end(rng: random.Random, tree: Box) -> Done | None:
     ends = tree.get("ends")
     if not isinstance(ends, Box):
         return None
@@ -252,7 +263,7 @@ def other_end(rng: random.Random, tree: Box) -> Harm | None:
     return f"another {entry.key}", [entry]
 
 
-def swapped(rng: random.Random, tree: Box) -> Harm | None:
+def swapped(rng: random.Random, tree: Box) -> Done | None:
     """The ends swapped, without what belongs to them."""
     ends = tree.get("ends")
     if not isinstance(ends, Box) or len(ends.entries) < 2:
@@ -262,7 +273,7 @@ def swapped(rng: random.Random, tree: Box) -> Harm | None:
     return "ends swapped", [a, b]
 
 
-def other_motion(rng: random.Random, tree: Box) -> Harm | None:
+def other_motion(rng: random.Random, tree: Box) -> Done | None:
     end = tree.get("ends", rng.choice(["start", "end"]))
     if not isinstance(end, Box):
         return None
@@ -270,7 +281,7 @@ def other_motion(rng: random.Random, tree: Box) -> Harm | None:
     return "another motion", [entry]
 
 
-def coinciding(rng: random.Random, tree: Box) -> Harm | None:
+def coinciding(rng: random.Random, tree: Box) -> Done | None:
     a, b = tree.get("ends", "start", "position"), tree.get("ends", "end", "position")
     if not (isinstance(a, Row) and isinstance(b, Row)):
         return None
@@ -282,7 +293,7 @@ def coinciding(rng: random.Random, tree: Box) -> Harm | None:
     return "ends coincide", [end.put("position", to_tree(near))]
 
 
-def another_length(rng: random.Random, tree: Box) -> Harm | None:
+def another_length(rng: random.Random, tree: Box) -> Done | None:
     sections = tree.get("cable", "sections")
     boxes = [x for x in sections.entries if isinstance(x, Box)] if isinstance(sections, Row) else []
     by = rng.choice([1e-3, 0.5, 0.9, 0.99, 0.999, 1.001, 1.1, 2.0, 100.0])
@@ -294,7 +305,7 @@ def another_length(rng: random.Random, tree: Box) -> Harm | None:
     return (f"length times {by:g}", touched) if touched else None
 
 
-def massless(rng: random.Random, tree: Box) -> Harm | None:
+def massless(rng: random.Random, tree: Box) -> Done | None:
     _, entry = _pick(rng, tree, lambda e: e.key in ("mass", "stiffness", "axial_stiffness", "density")) or (None, None)
     if entry is None:
         return None
@@ -306,9 +317,13 @@ WAYS: tuple[Way, ...] = (
     forgotten, misspelt, alien, other_type, odd_text, not_a_number, extreme, scaled, with_unit, twice, misplaced,
     emptied, other_task, other_whole, other_end, swapped, other_motion, coinciding, another_length, massless,
 )  # fmt: skip
-# What only the physics can judge comes twice as often: the reader refuses most of the rest before anything is computed.
-WEIGHTS = [2 if way in (extreme, scaled, other_task, other_whole, other_end, other_motion, another_length, massless)
-           else 1 for way in WAYS]  # fmt: skip
+# What only the physics can judge comes four times as often: the reader refuses most of the rest before it is computed.
+PHYSICAL = (extreme, scaled, other_task, other_whole, other_end, other_motion, another_length, massless)
+WEIGHTS = [4 if way in PHYSICAL else 1 for way in WAYS]
+# Ways that harm one key alone, so that a refusal has to point at it: others make contradictions, seen from both sides.
+EXPECTED_AT_KEY = {
+    "misspelt", "alien", "other_type", "odd_text", "not_a_number", "with_unit", "twice", "emptied", "forgotten",
+}  # fmt: skip
 
 
 def harmed(seed: int, scenes: dict[str, Any]) -> tuple[str, Box, list[Harm]]:
@@ -321,6 +336,6 @@ def harmed(seed: int, scenes: dict[str, Any]) -> tuple[str, Box, list[Harm]]:
         for way in rng.choices(WAYS, WEIGHTS, k=10):
             harm = way(rng, tree)
             if harm is not None:
-                done.append(harm)
+                done.append(Harm(way.__name__, *harm))
                 break
     return name, tree, done
