@@ -22,6 +22,10 @@ from hybrid.scene.table import Finding, Place, dotted
 from hybrid.scene.task import usual_model
 from hybrid.scene.words import explain
 
+# Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
+# some seconds.
+LARGEST_SCENE = 1_000_000
+
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     """Read a scene file.
@@ -30,15 +34,31 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     looked for in the folder of the scene file, and the scene keeps its absolute path.
     SceneError with every complaint if the scene is refused.
     """
+    return parse_scene(_text_of(path), str(path), overrides)
+
+
+def _text_of(path: str | Path) -> str:
+    """The text of a scene file; SceneError where there is none."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        content = b""
+        with Path(path).open("rb") as file:
+            content = file.read(LARGEST_SCENE + 1)
+        if len(content) <= LARGEST_SCENE:
+            return content.decode("utf-8-sig")
+        given, expected = f"more than {LARGEST_SCENE / 1e6:g} MB", "a scene file of at most that"
+        fix = "time series go into a file of their own (motion.file), and `ratio` grades a mesh"
+        complaint = Complaint("scene", given, expected, fix)
     except FileNotFoundError:
         complaint = Complaint("scene", str(path), "a scene file that exists", "check the name and the folder")
-        raise SceneError([complaint], str(path)) from None
-    except (OSError, UnicodeDecodeError, ValueError):
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        column = error.start - content.rfind(b"\n", 0, error.start)
+        utf16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+        given = "UTF-16" if utf16 else f"the byte {content[error.start]:#04x}"
+        complaint = Complaint("scene", given, "a text file in UTF-8", "save it anew as UTF-8", line, column)
+    except (OSError, ValueError):
         complaint = Complaint("scene", str(path), "a readable text file (UTF-8)", "check what kind of file it is")
-        raise SceneError([complaint], str(path)) from None
-    return parse_scene(text, str(path), overrides)
+    raise SceneError([complaint], str(path))
 
 
 def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
@@ -57,8 +77,8 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
 def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
     """The same refusal with line and column of what was found only after reading (cells, steps, motions)."""
     try:
-        root, _ = from_text(Path(path).read_text(encoding="utf-8"))
-    except (OSError, ValueError, Unreadable):
+        root, _ = from_text(_text_of(path))
+    except (SceneError, Unreadable):
         return error
     if isinstance(root.value, dict):
         for each in overrides:

@@ -7,13 +7,15 @@ YAML 1.2: `on`, `no` and `yes` are words, 1e-3 is a number.  The tree carries li
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
 from hybrid.scene.hints import decimal_comma, did_you_mean
@@ -24,6 +26,10 @@ Spot = tuple[int, int]
 
 # A table or list as written may be long; a complaint shows its beginning.
 SHOWN = 60
+
+# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh is far below, and a
+# few lines of aliases of aliases are far above.
+MOST_VALUES = 200_000
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
 _WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
@@ -78,9 +84,15 @@ class Unreadable(Exception):
 def from_text(text: str) -> tuple[Node, list[Complaint]]:
     """The tree of a YAML text, and complaints about its keys; Unreadable if it is not YAML."""
     try:
-        top = YAML(typ="safe", pure=True).compose(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            top = YAML(typ="safe", pure=True).compose(text)
     except MarkedYAMLError as error:
         raise Unreadable(_not_yaml(text, error)) from None
+    except ReusedAnchorWarning as warning:
+        raise Unreadable(_anchor_twice(str(warning))) from None
+    except ReaderError as error:
+        raise Unreadable(_odd_character(text, error)) from None
     except (YAMLError, RecursionError, ValueError) as error:
         why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
         raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
@@ -88,7 +100,7 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
         raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
     complaints: list[Complaint] = []
     try:
-        return _build(top, (), complaints, ()), complaints
+        return _build(top, (), complaints, (), iter(range(MOST_VALUES))), complaints
     except RecursionError:
         raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
 
@@ -114,23 +126,47 @@ def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
     return Complaint("YAML", given or "nothing", f"a text that YAML can read; {problem}", fix, line + 1, column + 1)
 
 
-def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...]) -> Node:
+def _anchor_twice(warning: str) -> Complaint:
+    """`warning` names both places, the later one last."""
+    line, column = map(int, re.findall(r"line (\d+), column (\d+)", warning)[-1])
+    name = re.findall(r"duplicate anchor '(.*)'", warning)[0]
+    return Complaint("YAML", f"the anchor &{name} twice", "every anchor once", "give it another name", line, column)
+
+
+def _odd_character(text: str, error: ReaderError) -> Complaint:
+    """A character that no YAML text may have."""
+    before = text[: error.position]
+    line, column = before.count("\n") + 1, error.position - before.rfind("\n")
+    given = f"the character U+{ord(text[error.position]):04X}"
+    return Complaint("YAML", given, "a text that YAML can read; it has no such characters", "take it out", line, column)
+
+
+def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...], room: Iterator[int]) -> Node:
+    """The tree below a node of YAML, aliases written out; `room`: one for each value that there may still be."""
     place = (node.start_mark.line + 1, node.start_mark.column + 1)
+    if next(room, None) is None:
+        given = f"more than {MOST_VALUES} values, aliases written out"
+        raise Unreadable(Complaint("YAML", given, "a scene of fewer", "write it without aliases of aliases", *place))
     if id(node) in inside:
         complaints.append(Complaint(dotted(path), "an alias of itself", "a value", "write it out", *place))
         return Node(None, place)
     inside = (*inside, id(node))
     if isinstance(node, SequenceNode):
-        entries = [_build(entry, (*path, i), complaints, inside) for i, entry in enumerate(node.value)]
+        entries = [_build(entry, (*path, i), complaints, inside, room) for i, entry in enumerate(node.value)]
         return Node(entries, place)
     if isinstance(node, MappingNode):
-        return _build_table(node, path, complaints, inside, place)
+        return _build_table(node, path, complaints, inside, room, place)
     written = f'"{node.value}"' if node.style in ("'", '"') else str(node.value)
     return Node(_scalar(node), place, written)
 
 
 def _build_table(
-    node: MappingNode, path: Place, complaints: list[Complaint], inside: tuple[int, ...], place: Spot
+    node: MappingNode,
+    path: Place,
+    complaints: list[Complaint],
+    inside: tuple[int, ...],
+    room: Iterator[int],
+    place: Spot,
 ) -> Node:
     table = Node({}, place)
     merged: dict[str, Node] = {}
@@ -151,7 +187,7 @@ def _build_table(
             table.value[before] = number
             continue
         if key_node.tag == "tag:yaml.org,2002:merge":
-            built = _build(value_node, path, complaints, inside)
+            built = _build(value_node, path, complaints, inside, room)
             for source in built.value if isinstance(built.value, list) else [built]:
                 if isinstance(source.value, dict):
                     merged = {**source.value, **merged}
@@ -171,7 +207,7 @@ def _build_table(
             fix = f"keep one of them; the first is in line {first[0]}"
             complaints.append(Complaint(dotted((*path, key)), f"{key} twice", "every key once", fix, *spot))
             continue
-        value = _build(value_node, (*path, key), complaints, inside)
+        value = _build(value_node, (*path, key), complaints, inside, room)
         if value.value is None and not value.written:
             value.place = spot  # an empty value stands nowhere; its key does
         table.value[key] = value

@@ -250,7 +250,7 @@ class AdaptiveModel(Table):
         description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
         "of the catenary's curvature, relaxed in time (curvature)",
     )
-    correct: bool = Field(
+    correct: Truth = Field(
         default=False,
         description="results corrected for the bending that catenary zones leave out, and criteria that count what "
         "is left after it",
@@ -364,7 +364,7 @@ class Output(Table):
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"
     )
 
-    criteria: bool = Field(
+    criteria: Truth = Field(
         default=False,
         description="also write the criteria of zones that move, as fields over time and arc length",
     )
