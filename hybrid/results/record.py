@@ -32,6 +32,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.results.intact import NONE, SUM, seal, sign
 from hybrid.results.read import FORMAT, FORMAT_VERSION, is_result
 
 # Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
@@ -163,7 +164,7 @@ class Recorder:
 
         def fill(file: h5py.File) -> None:
             _write_attributes(file, attributes)
-            file.create_dataset("scene", data=scene_text, dtype=h5py.string_dtype())
+            file.create_dataset("scene", data=scene_text, dtype=h5py.string_dtype()).attrs[SUM] = NONE
             _create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
             for table in tables:
                 _create_table(file, *table)
@@ -258,10 +259,13 @@ class Recorder:
         self.closed = True
         try:
             self.flush()
+            seal(self._file)
             for name, text in (("status", status), ("message", message)):
                 self._file.attrs.modify(name, _fixed(text, self._file.attrs.get_id(name).dtype))
         finally:
             self._file.close()
+        if self.path is not None:
+            sign(self.path)
 
     def __enter__(self) -> Recorder:
         return self
@@ -305,6 +309,9 @@ def amend(
                 table.rows = [(0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan) for event in events]
                 table.write()
                 table.commit()
+            seal(file)
+        if isinstance(new, Path):
+            sign(new)
         if isinstance(where, Path) and isinstance(new, Path):
             os.replace(new, where)
     except OSError as error:
@@ -427,6 +434,7 @@ def _attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Datas
 
 def _annotate(data: h5py.Dataset, unit: str, description: str, frame: str = "") -> None:
     data.attrs["units"], data.attrs["description"] = unit, description  # "units": what netCDF programs look for
+    data.attrs[SUM] = NONE
     if frame:
         data.attrs["frame"] = frame
 

@@ -60,7 +60,7 @@ class Node:
 
     def show(self) -> str:
         """The value as it was written, on one line."""
-        text = " ".join(self._flow().split())
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(self._flow().split()))
         if len(text) > SHOWN:
             text = text[: SHOWN - 4] + " ..."
         return (text or "nothing") + (f" ({self.note})" if self.note else "")

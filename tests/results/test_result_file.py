@@ -395,6 +395,7 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
     assert set(modules.split()) - {"hybrid"} == {
         "hybrid.errors",
         "hybrid.results",
+        "hybrid.results.intact",
         "hybrid.results.read",
         "hybrid.results.record",
     }
