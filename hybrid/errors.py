@@ -115,6 +115,8 @@ EVENTS_BY_WEIGHT = (
 
 # Kinds of events of zones that change: they tell of the run as it should be.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
+# Kind of the event that says how many of another kind (its criterion) were too many to write (its value).
+LEFT_OUT = "events left out"
 
 
 def weight_of_event(kind: str) -> int:

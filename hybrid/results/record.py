@@ -18,6 +18,7 @@ import io
 import os
 import platform
 import shutil
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -31,12 +32,17 @@ from typing import Any
 import h5py
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import LEFT_OUT, ResultError
 from hybrid.results.intact import NONE, SUM, seal, sign
 from hybrid.results.read import FORMAT, FORMAT_VERSION, is_result
 
 # Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
 _CHUNK_BYTES = 16384
+# Bytes of chunks that HDF5 keeps of every dataset: what is written is not read again, and its own 8 MB of each would
+# make a long run grow by 80 MB in a million steps (tests/harden/test_harden_long.py).
+_CACHE = 4 * _CHUNK_BYTES
+# Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
+MOST_OF_A_KIND = 10_000
 # Rows of the step log held back before they are written: 1 ms of writing then costs 2 us a step.
 _BLOCK = 512
 # Outputs are held back at most this long (s): a reader hardly notices, a kill loses no more, and
@@ -152,6 +158,7 @@ class Recorder:
         self._step_names = [f.name for f in step_fields]
         self._finite_steps = [k for k, f in enumerate(step_fields) if not f.nan_ok]
         self._zones: list[tuple[str, float, float]] | None = None
+        self._happened: Counter[str] = Counter()  # events by kind
         self.last = -np.inf  # time of the last output, s
         self._flushed = -np.inf  # when the file was last brought up to date, s of the clock
         self.closed = False
@@ -171,7 +178,7 @@ class Recorder:
 
         self.path: Path | None = None
         if isinstance(target, io.BytesIO):
-            self._file = h5py.File(target, "w", libver=_LIBVER)
+            self._file = h5py.File(target, "w", libver=_LIBVER, rdcc_nbytes=_CACHE)
             fill(self._file)
         else:
             self.path = Path(target).expanduser().resolve()
@@ -228,6 +235,9 @@ class Recorder:
         """Note that something happened at time t (s) on s_a <= s <= s_b (m), and why; the rest: of changes of zones."""
         if not (isfinite(t) and isfinite(s_a) and isfinite(s_b)):
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
+        self._happened[kind] += 1
+        if self._happened[kind] > MOST_OF_A_KIND:
+            return
         self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
 
     def flush(self) -> None:
@@ -258,6 +268,7 @@ class Recorder:
             raise ValueError(f"status {status!r} is none of {', '.join(_STATUS)}")
         self.closed = True
         try:
+            self._count_left_out()
             self.flush()
             seal(self._file)
             for name, text in (("status", status), ("message", message)):
@@ -266,6 +277,15 @@ class Recorder:
             self._file.close()
         if self.path is not None:
             sign(self.path)
+
+    def _count_left_out(self) -> None:
+        """Of events that were too many to write: how many there were."""
+        for kind, count in self._happened.items():
+            left = count - MOST_OF_A_KIND
+            if left > 0:
+                text = f"{left} more events '{kind}' are not written, after the first {MOST_OF_A_KIND}"
+                row = (max(self.last, 0.0), 0.0, 0.0, LEFT_OUT, text, kind, float(left), nan, nan)
+                self._events.rows.append(row)
 
     def __enter__(self) -> Recorder:
         return self
@@ -346,7 +366,7 @@ def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
         with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:
             fill(file)
         os.replace(new, path)
-        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort")
+        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=_CACHE)
         file.swmr_mode = True
     except OSError as error:
         advice = "a folder you may write to, with free space; close programs that hold the file"
