@@ -42,7 +42,6 @@ def being_written(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(_SIZE)
         size = file.seek(0, 2)
-        other_sum = _has_changed(file, size)
     wrong = f"{path} cannot be read as a result\n    detail:   "
     other = "\n    expected: an HDF5 file written by hybrid\n    try:      copy it anew, or run its scene again"
     if not head.startswith(_SIGNATURE):
@@ -56,25 +55,33 @@ def being_written(path: Path) -> bool:
         raise ResultError(f"{wrong}it is cut off: {size} of {end} bytes are there{other}")
     if head[11] & _BEING_WRITTEN:
         return True
-    if other_sum:
+    if _has_changed(path, end, size):
         raise ResultError(f"{wrong}it has changed since it was written, on the disk or on the way{other}")
     return False
 
 
 def sign(path: Path) -> None:
     """Put the sum of a closed file behind its end."""
-    with path.open("r+b") as file:
-        size = file.seek(0, 2)
-        file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
+    try:
+        with path.open("r+b") as file:
+            size = file.seek(0, 2)
+            file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
+    except OSError as error:
+        advice = "free some disk space; the result is complete but for this sum"
+        raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
 
 
-def _has_changed(file: BinaryIO, size: int) -> bool:
-    """Whether a file has a sum behind its end, and another one now."""
-    if not _TAIL.size < size <= _SUMMED:
+def _has_changed(path: Path, end: int, size: int) -> bool:
+    """Whether a file has something behind its end that is not its sum; without anything there, nothing is known."""
+    if size == end:
         return False
-    file.seek(size - _TAIL.size)
-    name, length, wanted = _TAIL.unpack(file.read(_TAIL.size))
-    return bool(name == _NAME and length == size - _TAIL.size and wanted != _sum_of(file, length))
+    with path.open("rb") as file:
+        file.seek(end)
+        tail = file.read(_TAIL.size + 1)
+        if len(tail) != _TAIL.size:
+            return True
+        name, length, wanted = _TAIL.unpack(tail)
+        return bool(name != _NAME or length != end or (end <= _SUMMED and wanted != _sum_of(file, end)))
 
 
 def _sum_of(file: BinaryIO, length: int) -> int:
