@@ -7,11 +7,13 @@ scene; this file only carries its states into a result file.
 from __future__ import annotations
 
 import io
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from hybrid.errors import ComputationError
 from hybrid.model.plan import output_times
 from hybrid.model.state import Floats
 from hybrid.results.format import Field
@@ -50,8 +52,10 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
     target = _target(output)
     due = [0.0, *output_times(scene)]
     with _recorder(scene, target, overwrite, _STEP_FIELDS) as recorder:
+        last: list[ShootingState] = []
 
         def record(state: ShootingState) -> None:
+            last[:] = [state]
             if state.t > 0.0:
                 recorder.log(
                     {"t": state.t, "iterations": state.iterations, "residual": state.residual, "growth": state.growth}
@@ -60,9 +64,24 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
                 recorder.save(state.t, _values(scene, state), _zones(state))
                 due.pop(0)
 
-        simulate(scene, record)
+        try:
+            simulate(scene, record)
+        except ComputationError as error:
+            left = _snapshot(scene, last[0], target) if last else None
+            raise ComputationError(error.outcome, error.t, error.s, error.detail, left) from None
         recorder.close("complete", "literal shooting")
     return open_result(target)
+
+
+def _snapshot(scene: Scene, state: ShootingState, target: Path | io.BytesIO) -> Path | None:
+    """The last good state, beside the result; None when it cannot be written."""
+    if not isinstance(target, Path):
+        return None
+    path = target.with_suffix(".snapshot.npz")
+    with suppress(OSError):
+        np.savez(path, scene=np.array(scene_text(scene)), **vars(state))
+        return path
+    return None
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

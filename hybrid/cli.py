@@ -354,7 +354,9 @@ def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
     try:
         yield voice
     except SceneError as error:
-        voice.refused(error)
+        from hybrid.scene.read import located
+
+        voice.refused(located(error, voice.source, voice.settings) if voice.source else error)
         code = REFUSED
     except ComputationError as error:
         voice.failed(error)
@@ -419,8 +421,8 @@ def _ended(
 
 
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:
-    say.source = str(path)
-    return hybrid.load_scene(path, settings or [])
+    say.source, say.settings = str(path), settings or []
+    return hybrid.load_scene(path, say.settings)
 
 
 def _draw(result: Result, picture: Path, **chosen: Any) -> Path:

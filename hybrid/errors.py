@@ -85,6 +85,7 @@ class Outcome(IntEnum):
 # Kinds of events that call an answer into question, the worst first; other kinds are news.
 EVENTS_BY_WEIGHT = (
     "gains energy",
+    "implausible",  # a slip of units, which all that follows may come from
     "accuracy missed",
     "no error figure",
     "error uncertain",
@@ -95,7 +96,6 @@ EVENTS_BY_WEIGHT = (
     "unresolved bend",
     "stretched",
     "deep in the seabed",
-    "implausible",
     "loses energy",
     "vibrations damped",
     "snap",
@@ -110,11 +110,16 @@ EVENTS_BY_WEIGHT = (
     "zones held",
     "friction left out",
     "turned in",
+    "events left out",
 )
 
 
 # Kinds of events of zones that change: they tell of the run as it should be.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
+# All kinds that call nothing into question: those, and what was asked for while the run was on its way.
+NEWS = (*ZONE_EVENTS, "loads change")
+# Kind of the event that says how many of another kind (its criterion) were too many to write (its value).
+LEFT_OUT = EVENTS_BY_WEIGHT[-1]
 
 
 def weight_of_event(kind: str) -> int:

@@ -64,7 +64,7 @@ def trade(
     wanted = _asked(scene, asked_for, "for")
     _must_be_finer(_asked(scene, goal, "reference"), goal, checks)
     if repeat < 1:
-        raise SceneError([Complaint("repeat", str(repeat), "1 or more runs, of which the median counts")])
+        raise SceneError([Complaint("repeat", str(repeat), "1 or more runs, of which the median counts", "--repeat 3")])
     notes = _notes(scene, names, models is None)
     kinds = [kind for kind, reason in names.items() if not reason or models is not None]
     rod = "rod" if _refusal(scene, "rod", goal) == "" else kinds[0]
@@ -116,7 +116,7 @@ def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
     known = kinds_of_models()
     for name in wanted or ():
         if name not in known:
-            raise SceneError([Complaint("models", name, f"some of: {', '.join(known)}")])
+            raise SceneError([Complaint("models", name, f"some of: {', '.join(known)}", f"--models {known[0]}")])
     return {kind: _refusal(scene, kind, ACCURACIES[0]) for kind in wanted or known}
 
 

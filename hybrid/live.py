@@ -26,7 +26,7 @@ from rich.segment import ControlType
 from rich.text import Text
 
 import hybrid
-from hybrid.errors import ZONE_EVENTS, weight_of_event
+from hybrid.errors import NEWS, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
@@ -168,6 +168,7 @@ class Voice:
     def __init__(self, as_json: bool, quiet: bool) -> None:
         self.as_json, self.quiet = as_json, quiet
         self.source = ""  # the scene file, for complaints that do not know it
+        self.settings: list[str] = []  # what the command changes in it
         self.left = ""  # what Ctrl-C leaves, of commands that write more than a file
         self._file: Path | None = None
         self._before: tuple[int, int] | None = None
@@ -286,14 +287,15 @@ class Voice:
         kinds: dict[str, list[Event]] = {}
         for event in sorted(events, key=lambda e: (weight_of_event(e.kind), e.t)):
             kinds.setdefault(event.kind, []).append(event)
-        for shown, found in enumerate(kinds.values()):
+        for found in kinds.values():
             self.json("note", **found[0]._asdict(), count=len(found))
+        news = [found for kind, found in kinds.items() if kind not in NEWS]
+        for found in news[:KINDS_SHOWN]:
             more = f" ({len(found) - 1} more like this)" if len(found) > 1 else ""
-            if found[0].kind not in ZONE_EVENTS and shown < KINDS_SHOWN:
-                self.note(f"note: t = {found[0].t:.4g} s: {found[0].text}{more}")
-        rest = [kind for kind in list(kinds)[KINDS_SHOWN:] if kind not in ZONE_EVENTS]
+            self.note(f"note: t = {found[0].t:.4g} s: {found[0].text}{more}")
+        rest = [found[0].kind for found in news[KINDS_SHOWN:]]
         if rest:
-            self.note(f"note: also {', '.join(rest)}; see the events of the result")
+            self.note(f"note: and {len(rest)} more: {', '.join(rest)}; see the events of the result")
 
     def done(self, text: str, *files: Path | None, **facts: Any) -> None:
         """The closing line."""

@@ -258,7 +258,10 @@ class Motion:
         if self.zoning is not None:
             self.zoning.manager.moments = model.ends.moments
             self.zoning.manager.loaded = bool(model.ends.moments.any())
-        self.recorder.event(self.t, 0.0, model.length, "loads change", "what acts from outside is other from now on")
+        text = (
+            f"from t = {self.t:.6g} s on other loads act, or the ends move otherwise, as `hybrid resume` was asked to"
+        )
+        self.recorder.event(self.t, 0.0, model.length, "loads change", text)
         self.restart()
 
     def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:

@@ -26,7 +26,8 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
         if not reasons:
             raise
         roads = failed.detail.splitlines()
-        tried = f"{len(roads)} ways to an equilibrium were tried, the last: {roads[-1].strip()}"
+        ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
+        tried = f"{ways} tried, the last: {roads[-1].strip()}"
         because = "\n              ".join([*reasons, tried])
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 

@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.errors import ZONE_EVENTS
+from hybrid.errors import LEFT_OUT, ZONE_EVENTS
 
 if TYPE_CHECKING:
     from hybrid.model.plan import Plan
@@ -76,7 +76,9 @@ def zones_over_time(result: Result) -> dict[str, Any]:
     """What zones that move have done: shares of the line that were rod, and changes."""
     length = float(result.s[-1])
     shares = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / length for zones in result.zones]
-    changes = sum(e.kind in ZONE_EVENTS for e in result.events)
+    events = result.events
+    changes = sum(e.kind in ZONE_EVENTS for e in events)
+    changes += sum(int(e.value or 0) for e in events if e.kind == LEFT_OUT and e.criterion in ZONE_EVENTS)
     rod = {"least": min(shares), "mean": sum(shares) / len(shares), "most": max(shares)}
     return {"rod": rod, "zone_changes": changes}
 

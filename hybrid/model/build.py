@@ -21,7 +21,7 @@ from hybrid.model.layout import Layout
 from hybrid.model.ledger import Entry, followed, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
-from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, thinned
+from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
@@ -43,7 +43,6 @@ from hybrid.scene.schema import (
 # A catenary cell counts as slack when its tension is not above this part of the tension
 # scale: a line that starts in free fall has no tension at all, but for what Newton leaves.
 SLACK_FLOOR = -1e-6
-MOST_CELLS = 1_000_000
 SHARPEST_START = np.radians(150.0)
 
 
@@ -136,7 +135,7 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
     rod = np.array([zones[int(i)].kind == "rod" for i in zone_of])
     _refuse_single_rod_cells(zones, zone_of)
-    _refuse_too_many(n)
+    refuse_too_many(n)
 
     sea = surroundings(scene, n)
     fastest = float(np.linalg.norm(sea.values.current, axis=1).max())
@@ -273,12 +272,6 @@ def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> 
         lengths = np.linalg.norm(start.e, axis=1)
         start.e[stiff] *= (h / lengths)[stiff, None]
     start.r[1:] = start.r[0] + np.cumsum(start.e, axis=0)
-
-
-def _refuse_too_many(cells: int) -> None:
-    if cells > MOST_CELLS:
-        expected = f"at most {MOST_CELLS} cells: a line has never needed more, and memory would"
-        raise SceneError([Complaint("mesh.cells", str(cells), expected, "grade the mesh with `ratio` instead")])
 
 
 def _refuse_folds(chords: Floats, s: Floats, rod: np.ndarray) -> None:

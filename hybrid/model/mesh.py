@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.state import Floats
 
+MOST_CELLS = 1_000_000
 DEFAULT_CELLS = 100  # of a line whose scene says nothing: errors of a smooth sag near 1e-4 of the length
 
 
@@ -91,6 +92,7 @@ def place_nodes(
         rest = share(left, [p.length for p in open_zones]) if open_zones else []
     it = iter(rest)
     counts = [c or next(it) for c in counts]
+    refuse_too_many(sum(counts))
 
     s = [0.0]
     zones = []
@@ -158,3 +160,10 @@ def given_nodes(
             )
         s[i] = x
     return s, tuple(Zone(p.kind, a, b) for p, (a, b) in zip(plans, pairwise(bounds.tolist()), strict=True))
+
+
+def refuse_too_many(cells: int) -> None:
+    """SceneError before anything of that size is allocated."""
+    if cells > MOST_CELLS:
+        expected = f"at most {MOST_CELLS} cells: a line has never needed more, and memory would"
+        raise SceneError([Complaint("mesh.cells", str(cells), expected, "grade the mesh with `ratio` instead")])

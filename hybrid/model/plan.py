@@ -53,6 +53,8 @@ USUAL_ITERATIONS = 2.2
 COST_ERRORS = 1.9  # times a run that a run with its coarser ones costs (tests/bench/test_bench_accuracy.py, share)
 COST_CORRECTOR = 0.3  # of the catenary's own, where the error of leaving bending out is followed
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
+# Numbers that a result has per point and output, some twenty, and the largest file that still fits a disk.
+VALUES, MOST_BYTES = 20, 1e11
 OUTPUTS = 100  # of a run whose scene does not say how often
 
 
@@ -67,18 +69,30 @@ def output_interval(scene: Scene) -> float:
     return scene.output.every or max(time.duration / OUTPUTS, time.step or 0.0)
 
 
-def output_times(scene: Scene) -> list[float]:
-    """Times (s) of the outputs after the first."""
+def refuse_too_much(scene: Scene) -> None:
+    """SceneError for more outputs, points or steps than a disk and a life have room for, before any is made."""
     time, every = scene.require_time(), output_interval(scene)
     count = time.duration / every
     if count > MOST_OUTPUTS:
         fix = f"output.every: {time.duration / 1000:.3g} makes a thousand"
         expected = f"at most {MOST_OUTPUTS} outputs"
         raise SceneError([Complaint("output.every", f"{every:g} s, {count:.3g} outputs", expected, fix)])
+    points = scene.output.points if isinstance(scene.output.points, int) else len(scene.output.points)
+    size = (count + 1.0) * points * VALUES * 8
+    if size > MOST_BYTES:
+        given = f"{points} points at {count + 1.0:.6g} times, some {size / 1e9:.3g} GB"
+        fix = f"output.points: 101, or output.every: {time.duration / 100:.3g}"
+        raise SceneError([Complaint("output.points", given, f"a result of at most {MOST_BYTES / 1e9:g} GB", fix)])
     steps = time.duration / (time.step or time.duration)
     if steps > MOST_STEPS:
         expected = f"at most {MOST_STEPS:g} steps, some months of computing"
         raise SceneError([Complaint("time.step", f"{time.step:g} s, {steps:.3g} steps", expected, "make it larger")])
+
+
+def output_times(scene: Scene) -> list[float]:
+    """Times (s) of the outputs after the first."""
+    refuse_too_much(scene)
+    time, every = scene.require_time(), output_interval(scene)
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
@@ -104,6 +118,8 @@ def count_steps(scene: Scene) -> int:
 
 def plan(scene: Scene) -> Plan:
     """Say what would be computed for a scene, and compute nothing."""
+    if scene.time:
+        refuse_too_much(scene)
     model = build(scene)
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)

@@ -19,6 +19,9 @@ from hybrid.results.read import FORMAT, FORMAT_VERSION
 
 # Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
 _CHUNK_BYTES = 16384
+# Bytes of chunks that HDF5 keeps of every dataset: what is written is not read again, and its own 8 MB of each would
+# make a long run grow by 80 MB in a million steps (tests/harden/test_harden_long.py).
+CACHE = 4 * _CHUNK_BYTES
 # Rows of the step log held back before they are written: 1 ms of writing then costs 2 us a step.
 BLOCK = 512
 # Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.

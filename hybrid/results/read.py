@@ -38,6 +38,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.results.intact import being_written, readable
 
 if TYPE_CHECKING:
     import xarray
@@ -50,6 +51,8 @@ ALIASES = {"times": "t", "moment": "bending_moment"}
 
 # The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
 _PATIENCE = 1.0
+# A writer brings the first bytes up to date in a single write, so what is still wrong after so long (s) is wrong.
+_TORN = 0.1
 
 
 class Zone(NamedTuple):
@@ -162,8 +165,9 @@ class Result:
     def _open(self) -> None:
         self._file = _open_file(self._source)
         try:
-            _check_format(self._file, self._source)
-            self._scan()
+            with readable(self._source):
+                _check_format(self._file, self._source)
+                self._scan()
         except BaseException:
             self._file.close()
             raise
@@ -242,8 +246,9 @@ class Result:
             if not self._file:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
             dims = self._dims[name]
-            data = self._dataset(name)
-            array = data[: self._rows[dims[0]]] if dims and dims[0] in self._rows else data[()]
+            with readable(self._source):
+                data = self._dataset(name)
+                array = data[: self._rows[dims[0]]] if dims and dims[0] in self._rows else data[()]
             if array.dtype.kind == "S":
                 array = np.char.decode(array, "utf-8", "replace")
             array.setflags(write=False)  # it is shared by everyone who asks again
@@ -280,7 +285,8 @@ class Result:
                 units.setdefault(self.units[f"{name}/{key}"], []).append(key)
             return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
         name = self._known(name)
-        unit, description, frame = self.label(name).values()
+        with readable(self._source):
+            unit, description, frame = self.label(name).values()
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
         return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
@@ -326,14 +332,16 @@ class Result:
     @property
     def events(self) -> list[Event]:
         """What happened and why, in the order of time."""
-        table = self._groups["events"]
-        rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
-        return [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
+        with readable(self._source):
+            table = self._groups["events"]
+            rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
+            return [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
 
     @property
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
-        return _text(self._file["scene"][()])
+        with readable(self._source):
+            return _text(self._file["scene"][()])
 
     @property
     def changes_text(self) -> str:
@@ -410,17 +418,21 @@ def _open_file(source: Path | io.BytesIO) -> h5py.File:
         raise ResultError(f"there is no file {source}\n    try:      check the name, or run the scene first")
     if source.is_dir():
         raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
-    until = time.monotonic() + _PATIENCE
+    begin = time.monotonic()
     while True:
-        # Plain first; SWMR (single writer, multiple readers) for files with a writer, alive or killed.
-        for swmr in (False, True):
-            try:
-                return h5py.File(source, "r", swmr=swmr, locking="best-effort")
-            except OSError as error:
-                problem = error
-        if "lock" not in str(problem) or time.monotonic() > until:
+        try:
+            # SWMR (single writer, multiple readers) for files with a writer, alive or killed, and for no other.
+            return h5py.File(source, "r", swmr=being_written(source), locking="best-effort")
+        except OSError as error:
+            problem: Exception = error
+        except ResultError as error:  # perhaps a writer has not come to the end of the first 48 bytes
+            problem = error
+        waited, torn = time.monotonic() - begin, isinstance(problem, ResultError)
+        if not (torn or "lock" in str(problem)) or waited > (_TORN if torn else _PATIENCE):
             break
         time.sleep(0.05)
+    if isinstance(problem, ResultError):
+        raise problem
     raise ResultError(
         f"{source} cannot be read as a result\n    detail:   {problem}\n    expected: an HDF5 file written by hybrid"
     )

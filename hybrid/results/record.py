@@ -16,6 +16,7 @@ from __future__ import annotations
 
 import io
 import os
+from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from math import isfinite, nan
@@ -27,10 +28,11 @@ from typing import Any
 import h5py
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import LEFT_OUT, ResultError
 from hybrid.results.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint
 from hybrid.results.format import (
     BLOCK,
+    CACHE,
     EVENTS,
     Field,
     annotate,
@@ -45,9 +47,12 @@ from hybrid.results.format import (
     write_attributes,
     write_texts,
 )
+from hybrid.results.intact import sign
 from hybrid.results.read import is_result
 from hybrid.results.room import ask_for_room
 
+# Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
+MOST_OF_A_KIND = 10_000
 # Outputs are held back at most this long (s), and so many times as long as writing takes: a reader hardly notices, a
 # kill loses no more, and a run that saves a thousand times a second spends 2 % of its time here instead of half.
 _PAUSE, _PART = 0.2, 50.0
@@ -147,7 +152,7 @@ class Recorder:
 
         path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
         if isinstance(target, io.BytesIO):
-            file = h5py.File(target, "w", libver=_LIBVER)
+            file = h5py.File(target, "w", libver=_LIBVER, rdcc_nbytes=CACHE)
             fill(file)
         else:
             assert path is not None
@@ -184,6 +189,7 @@ class Recorder:
         self._write_to(_created(path.expanduser().resolve(), None, fill), path, tables)
         for table, count in zip(self._all, at.rows.values(), strict=True):
             table.count = count
+        self._happened.update(x.decode() for x in self._file["events/kind"][: self._events.count])
         self._zones, self._number, self.last = list(at.zones), at.number + 1, float(self._file["t"][-1])
         return self
 
@@ -198,6 +204,7 @@ class Recorder:
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
         self._number = 0  # of the next checkpoint
+        self._happened: Counter[str] = Counter()  # events by kind
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
         self.closed = self._broken = False
 
@@ -252,7 +259,18 @@ class Recorder:
         """Note that something happened at time t (s) on s_a <= s <= s_b (m), and why; the rest: of changes of zones."""
         if not (isfinite(t) and isfinite(s_a) and isfinite(s_b)):
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
-        self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
+        self._happened[kind] += 1
+        if self._happened[kind] <= MOST_OF_A_KIND:
+            self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
+
+    def _count_left_out(self) -> None:
+        """Of events that were too many to write: how many there were."""
+        for kind, count in self._happened.items():
+            left = count - MOST_OF_A_KIND
+            if left > 0:
+                text = f"{left} more events '{kind}' are not written, after the first {MOST_OF_A_KIND}"
+                row = (max(self.last, 0.0), 0.0, 0.0, LEFT_OUT, text, kind, float(left), nan, nan)
+                self._events.rows.append(row)
 
     def flush(
         self, program: str = "", asks: bool = False, frozen: Callable[[], tuple[bytes, bytes]] | None = None
@@ -306,6 +324,7 @@ class Recorder:
             ABANDONED.append((self._file, self._all))
             return
         try:
+            self._count_left_out()
             self.flush()
         except ResultError as error:
             status, message = "failed", str(error)
@@ -316,6 +335,8 @@ class Recorder:
             else:
                 set_status(self._file, status, message)
                 self._file.close()
+        if self.path is not None and not self._broken:
+            sign(self.path)
 
     def __enter__(self) -> Recorder:
         return self
@@ -365,6 +386,7 @@ def amend(
                 table.write()
                 table.commit()
         if isinstance(where, Path) and isinstance(new, Path):
+            sign(new)
             os.replace(new, where)
     except OSError as error:
         if isinstance(new, Path):
@@ -402,7 +424,7 @@ def _created(
             with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:
                 fill(file)
         os.replace(new, path)
-        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort")
+        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE)
         file.swmr_mode = True
     except OSError as error:
         advice = "a folder you may write to, with free space; close programs that hold the file"

@@ -31,7 +31,7 @@ def amount(text: str) -> tuple[str, float]:
     what, unit = UNITS[found[2]]
     size = float(found[1]) * unit
     if not size > 0.0:
-        refuse([Finding((), f"{_EXAMPLES}, more than zero")])
+        refuse([Finding((), f"{_EXAMPLES}, more than zero", "1% is usual")])
     if what == "part" and not FINEST <= size <= ROUGHEST:
         refuse([Finding((), f"between {100 * FINEST:g}% and {100 * ROUGHEST:g}%", "1% is usual")])
     return what, size

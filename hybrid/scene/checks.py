@@ -32,6 +32,9 @@ from hybrid.scene.task import (
     ZonesModel,
 )
 
+# Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
+FINEST_STEP = 1e-12
+
 
 def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
     """All contradictions among `tables` (name -> table); checks that lack a table are skipped."""
@@ -162,6 +165,17 @@ def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) ->
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
 
+def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
+    if time is None or time.tolerance is None:
+        return
+    least = FINEST_STEP * cable.length
+    if time.tolerance < least:
+        expected = f"at least {least:.3g} m, a millionth of a millionth of the length: below, steps follow round-off"
+        yield Finding(
+            ("time", "tolerance"), expected, f"{1e-6 * cable.length:.3g}, or leave it out and ask `accuracy: 1%`"
+        )
+
+
 def _in_a_plane(
     environment: Environment, cable: Cable, ends: Ends, initial: Initial, solver: str, dimension: int | None
 ) -> Iterator[Finding]:
@@ -205,7 +219,7 @@ def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
     for index, target in ((0, 0.0), (len(mesh.nodes) - 1, length)):
         if abs(mesh.nodes[index] - target) > SAME_LENGTH * length:
             name = "the first node at the start of the cable" if index == 0 else "the last node at the end of the cable"
-            yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}")
+            yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}", f"{target:.12g}")
 
 
 def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
@@ -215,7 +229,10 @@ def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
         if isinstance(values, tuple):
             for i, s in enumerate(values):
                 if s > length * (1 + SAME_LENGTH):
-                    yield Finding(("output", key, i), f"an arc length between 0 and {length:.8g} m, the cable's length")
+                    expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
+                    yield Finding(
+                        ("output", key, i), expected, f"{length:.8g} is the end of the cable; or leave it out"
+                    )
 
 
 CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
@@ -238,6 +255,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _stretches_on_cable,
     _zones_that_move,
     _arbiter_steps,
+    _tolerance_is_felt,
     _accuracy_has_errors,
     _sections_that_come_and_go,
     _in_a_plane,

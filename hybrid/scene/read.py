@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import io
+import re
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from functools import cache
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -15,10 +17,14 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Environment, Scene, Time
-from hybrid.scene.source import Node, Unreadable, from_data, from_text, override
-from hybrid.scene.table import Finding, dotted
+from hybrid.scene.source import Node, Spot, Unreadable, from_data, from_text, override
+from hybrid.scene.table import Finding, Place, dotted
 from hybrid.scene.task import usual_model
 from hybrid.scene.words import explain
+
+# Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
+# some seconds.
+LARGEST_SCENE = 1_000_000
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
@@ -28,15 +34,31 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     looked for in the folder of the scene file, and the scene keeps its absolute path.
     SceneError with every complaint if the scene is refused.
     """
+    return parse_scene(_text_of(path), str(path), overrides)
+
+
+def _text_of(path: str | Path) -> str:
+    """The text of a scene file; SceneError where there is none."""
     try:
-        text = Path(path).read_text(encoding="utf-8")
+        content = b""
+        with Path(path).open("rb") as file:
+            content = file.read(LARGEST_SCENE + 1)
+        if len(content) <= LARGEST_SCENE:
+            return content.decode("utf-8-sig")
+        given, expected = f"more than {LARGEST_SCENE / 1e6:g} MB", "a scene file of at most that"
+        fix = "time series go into a file of their own (motion.file), and `ratio` grades a mesh"
+        complaint = Complaint("scene", given, expected, fix)
     except FileNotFoundError:
         complaint = Complaint("scene", str(path), "a scene file that exists", "check the name and the folder")
-        raise SceneError([complaint], str(path)) from None
-    except (OSError, UnicodeDecodeError, ValueError):
+    except UnicodeDecodeError as error:
+        line = content.count(b"\n", 0, error.start) + 1
+        column = error.start - content.rfind(b"\n", 0, error.start)
+        utf16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
+        given = "UTF-16" if utf16 else f"the byte {content[error.start]:#04x}"
+        complaint = Complaint("scene", given, "a text file in UTF-8", "save it anew as UTF-8", line, column)
+    except (OSError, ValueError):
         complaint = Complaint("scene", str(path), "a readable text file (UTF-8)", "check what kind of file it is")
-        raise SceneError([complaint], str(path)) from None
-    return parse_scene(text, str(path), overrides)
+    raise SceneError([complaint], str(path))
 
 
 def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
@@ -50,6 +72,25 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
     data = root.plain()
     _resolve_motion_files(data, Path(file).parent)
     return _validated(data, root, complaints, file)
+
+
+def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
+    """The same refusal with line and column of what was found only after reading (cells, steps, motions)."""
+    try:
+        root, _ = from_text(_text_of(path))
+    except (SceneError, Unreadable):
+        return error
+    if isinstance(root.value, dict):
+        for each in overrides:
+            override(root, each, Scene)
+    complaints = []
+    for complaint in error.complaints:
+        at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
+        place = _find(root, at, False)[1]
+        if complaint.line is None and place is not None:
+            complaint = replace(complaint, line=place[0], column=place[1])
+        complaints.append(complaint)
+    return SceneError(_in_order(complaints), error.file or str(path))
 
 
 def validate_scene(data: Any) -> Scene:
@@ -133,9 +174,18 @@ def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
-    """Where a finding was written: the value, else the key if that is wrong, else the table it is missing from."""
-    node, place, missing = root, root.place, False
-    for part in finding.at:
+    node, place, missing = _find(root, finding.at, at_key)
+    given = finding.given or ("nothing" if missing else node.show())
+    if at_key and not missing:
+        given = f"{dotted(finding.at[-1:])}: {given}"
+    line, column = place if place is not None else (None, None)
+    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+
+
+def _find(root: Node, path: Place, at_key: bool) -> tuple[Node, Spot | None, bool]:
+    """Where a path leads: the value, else the key if that is wrong, else the table it is missing from; if it is."""
+    node, place = root, root.place
+    for part in path:
         inside = node.value
         if isinstance(inside, dict) and part in inside and isinstance(part, str):
             key_place = node.key_places.get(part)
@@ -147,12 +197,8 @@ def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
         else:
             # `model: adaptive` has no key `kind`, the word itself is the kind; what else a bare word lacks is missing.
             missing = isinstance(inside, dict | list) or inside is None or (isinstance(inside, str) and part != "kind")
-            break
-    given = finding.given or ("nothing" if missing else node.show())
-    if at_key and not missing:
-        given = f"{finding.at[-1]}: {given}"
-    line, column = place if place is not None else (None, None)
-    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+            return node, place, missing
+    return node, place, False
 
 
 def _in_order(complaints: Iterable[Complaint]) -> list[Complaint]:

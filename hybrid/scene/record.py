@@ -47,6 +47,9 @@ ROUNDED = 3
 # No end of a cable is further away, in m or degrees; larger numbers are typing errors and overflow.
 LARGEST = 1e12
 
+# Characters of a line of the file that a complaint repeats.
+SHOWN = 60
+
 # The file and the scene may round a position differently, but not by more than this part of the excursion.
 SAME_START = 1e-3
 
@@ -95,7 +98,8 @@ def read_record(path: str | Path) -> Record:
     header = rows[0][1] if rows else []
     wanted = [c for group in (SHIFT_COLUMNS, TURN_COLUMNS) if set(group) <= set(header) for c in group]
     if "t" not in header or not wanted or len(header) != len(wanted) + 1:
-        given = f"{name} with columns {','.join(header)}" if header else f"{name}, which is empty"
+        first = _shown(",".join(header))
+        given = f"{name} with columns {first}" if header else f"{name}, which is empty"
         raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line of the file", given)
 
     values = [[_cell(name, i, cell) for cell in _row(name, i, row, len(header))] for i, row in rows[1:]]
@@ -138,8 +142,14 @@ def _cell(name: str, line: int, text: str) -> float:
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:
-        raise RecordRefused("finite numbers", "mend or drop that row", f"{name}, line {line}: {text or 'nothing'}")
+        raise RecordRefused("finite numbers", "mend or drop that row", f"{name}, line {line}: {_shown(text)}")
     return value
+
+
+def _shown(text: str) -> str:
+    """What is written, as far as a complaint has room for it and a terminal can print it."""
+    short = text if len(text) <= SHOWN else text[: SHOWN - 4] + " ..."
+    return (short if short.isprintable() else ascii(short)) or "nothing"
 
 
 def _last_digit(written: list[str], values: Array) -> Array:

@@ -36,7 +36,8 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
         place: Place = ("over", 1) if isinstance(item, Modules) else ("at",)
         if (item.over[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
             expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
-            yield Finding(("cable", "attachments", i, *place), expected)
+            fix = "move it onto the cable, or make the cable longer (cable.sections)"
+            yield Finding(("cable", "attachments", i, *place), expected, fix)
 
 
 def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Finding]:

@@ -7,13 +7,15 @@ YAML 1.2: `on`, `no` and `yes` are words, 1e-3 is a number.  The tree carries li
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping
+import warnings
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
 from ruamel.yaml import YAML
-from ruamel.yaml.error import MarkedYAMLError, YAMLError
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
 from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
 from hybrid.scene.hints import decimal_comma, did_you_mean
@@ -25,7 +27,13 @@ Spot = tuple[int, int]
 # A table or list as written may be long; a complaint shows its beginning.
 SHOWN = 60
 
+# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh is far below, and a
+# few lines of aliases of aliases are far above.
+MOST_VALUES = 200_000
+
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
+_WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
+_QUOTE = "write one word before the colon; close brackets and braces"
 _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
 
 
@@ -52,7 +60,7 @@ class Node:
 
     def show(self) -> str:
         """The value as it was written, on one line."""
-        text = " ".join(self._flow().split())
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(self._flow().split()))
         if len(text) > SHOWN:
             text = text[: SHOWN - 4] + " ..."
         return (text or "nothing") + (f" ({self.note})" if self.note else "")
@@ -76,19 +84,25 @@ class Unreadable(Exception):
 def from_text(text: str) -> tuple[Node, list[Complaint]]:
     """The tree of a YAML text, and complaints about its keys; Unreadable if it is not YAML."""
     try:
-        top = YAML(typ="safe", pure=True).compose(text)
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            top = YAML(typ="safe", pure=True).compose(text)
     except MarkedYAMLError as error:
         raise Unreadable(_not_yaml(text, error)) from None
+    except ReusedAnchorWarning as warning:
+        raise Unreadable(_anchor_twice(str(warning))) from None
+    except ReaderError as error:
+        raise Unreadable(_odd_character(text, error)) from None
     except (YAMLError, RecursionError, ValueError) as error:
         why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
-        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", "", 1, 1)) from None
+        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
     if top is None:
         raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
     complaints: list[Complaint] = []
     try:
-        return _build(top, (), complaints, ()), complaints
+        return _build(top, (), complaints, (), iter(range(MOST_VALUES))), complaints
     except RecursionError:
-        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", "", 1, 1)) from None
+        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
 
 
 def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
@@ -106,34 +120,62 @@ def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
         fix = "close the bracket, or put a comma between the entries"
     elif "undefined alias" in problem:
         fix = "give the anchor (&name) before the alias (*name)"
+    if not fix:
+        fix = "check indentation, brackets and quotes here and in the line before"
     problem = problem.replace("<stream end>", "the end of the text").replace("\\t", "tab")
     return Complaint("YAML", given or "nothing", f"a text that YAML can read; {problem}", fix, line + 1, column + 1)
 
 
-def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...]) -> Node:
+def _anchor_twice(warning: str) -> Complaint:
+    """`warning` names both places, the later one last."""
+    line, column = map(int, re.findall(r"line (\d+), column (\d+)", warning)[-1])
+    name = re.findall(r"duplicate anchor '(.*)'", warning)[0]
+    return Complaint("YAML", f"the anchor &{name} twice", "every anchor once", "give it another name", line, column)
+
+
+def _odd_character(text: str, error: ReaderError) -> Complaint:
+    """A character that no YAML text may have."""
+    before = text[: error.position]
+    line, column = before.count("\n") + 1, error.position - before.rfind("\n")
+    given = f"the character U+{ord(text[error.position]):04X}"
+    return Complaint("YAML", given, "a text that YAML can read; it has no such characters", "take it out", line, column)
+
+
+def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...], room: Iterator[int]) -> Node:
+    """The tree below a node of YAML, aliases written out; `room`: one for each value that there may still be."""
     place = (node.start_mark.line + 1, node.start_mark.column + 1)
+    if next(room, None) is None:
+        given = f"more than {MOST_VALUES} values, aliases written out"
+        raise Unreadable(Complaint("YAML", given, "a scene of fewer", "write it without aliases of aliases", *place))
     if id(node) in inside:
         complaints.append(Complaint(dotted(path), "an alias of itself", "a value", "write it out", *place))
         return Node(None, place)
     inside = (*inside, id(node))
     if isinstance(node, SequenceNode):
-        entries = [_build(entry, (*path, i), complaints, inside) for i, entry in enumerate(node.value)]
+        entries = [_build(entry, (*path, i), complaints, inside, room) for i, entry in enumerate(node.value)]
         return Node(entries, place)
     if isinstance(node, MappingNode):
-        return _build_table(node, path, complaints, inside, place)
+        return _build_table(node, path, complaints, inside, room, place)
     written = f'"{node.value}"' if node.style in ("'", '"') else str(node.value)
     return Node(_scalar(node), place, written)
 
 
 def _build_table(
-    node: MappingNode, path: Place, complaints: list[Complaint], inside: tuple[int, ...], place: Spot
+    node: MappingNode,
+    path: Place,
+    complaints: list[Complaint],
+    inside: tuple[int, ...],
+    room: Iterator[int],
+    place: Spot,
 ) -> Node:
     table = Node({}, place)
     merged: dict[str, Node] = {}
     for i, (key_node, value_node) in enumerate(node.value):
         spot = (key_node.start_mark.line + 1, key_node.start_mark.column + 1)
         if not isinstance(key_node, ScalarNode):
-            complaints.append(Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", "", *spot))
+            complaints.append(
+                Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", _QUOTE, *spot)
+            )
             continue
         key = str(key_node.value)
         before = str(node.value[i - 1][0].value) if i else ""
@@ -145,19 +187,27 @@ def _build_table(
             table.value[before] = number
             continue
         if key_node.tag == "tag:yaml.org,2002:merge":
-            built = _build(value_node, path, complaints, inside)
+            built = _build(value_node, path, complaints, inside, room)
             for source in built.value if isinstance(built.value, list) else [built]:
                 if isinstance(source.value, dict):
                     merged = {**source.value, **merged}
                 else:
-                    complaints.append(Complaint(dotted((*path, key)), source.show(), "a table to merge", "", *spot))
+                    complaints.append(
+                        Complaint(
+                            dotted((*path, key)),
+                            source.show(),
+                            "a table to merge",
+                            "`<<` takes an alias of a table; or leave it out",
+                            *spot,
+                        )
+                    )
             continue
         if key in table.value:
             first = table.key_places[key]
             fix = f"keep one of them; the first is in line {first[0]}"
             complaints.append(Complaint(dotted((*path, key)), f"{key} twice", "every key once", fix, *spot))
             continue
-        value = _build(value_node, (*path, key), complaints, inside)
+        value = _build(value_node, (*path, key), complaints, inside, room)
         if value.value is None and not value.written:
             value.place = spot  # an empty value stands nowhere; its key does
         table.value[key] = value
@@ -217,7 +267,7 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
     name, equals, value_text = text.partition("=")
     name = name.strip()
     if not equals or not _PATH.fullmatch(name):
-        return Complaint("override", text or "nothing", _EXAMPLE, "")
+        return Complaint("override", text or "nothing", _EXAMPLE, "name the key as `hybrid plan` and docs/scene.md do")
     path: Place = tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", name))
     try:
         value, complaints = from_text(value_text) if value_text.strip() else (Node(None), [])
@@ -252,18 +302,18 @@ def _no_entry(here: Node, path: Place, index: int) -> tuple[str, str] | None:
     if index < count:
         return None
     number = f"{count} entr{'y' if count == 1 else 'ies'}, counted from 0" if count else "no entries"
-    return f"an entry that exists: {dotted(path)} has {number}", ""
+    return f"an entry that exists: {dotted(path)} has {number}", "change the entry in the file, or count again"
 
 
 def _no_key(here: Node, path: Place, key: str, known: list[str]) -> tuple[str, str] | None:
     """Why there is no `key` in the table at `path`: what was expected, and the fix."""
     table = dotted(path) or "a scene"
     if not known:
-        return f"a key that exists; {table} has none below it", ""
+        return f"a key that exists; {table} has none below it", f"{table}=value"
     if key not in known:
         return f"a key of {table}", did_you_mean(key, known)
     if not isinstance(here.value, dict):
-        return f"{table} to be a table; it is {here.show()}", ""
+        return f"{table} to be a table; it is {here.show()}", f"mend {table} in the file first"
     return None
 
 

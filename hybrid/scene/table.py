@@ -25,6 +25,14 @@ from hybrid.scene.hints import nearest
 
 Place = tuple[str | int, ...]
 
+# No length, time, mass, force or stiffness of a cable is larger in SI units; products of several such numbers, and
+# their squares, are still far from where a double overflows (1e308).
+LARGEST_NUMBER = 1e18
+# What cannot be negative is nothing or at least this: smaller numbers are slips, and what is divided by them overflows.
+SMALLEST_NUMBER = 1e-30
+# No mesh and no output needs more; numpy and JSON stop at 2^63.
+LARGEST_COUNT = 10**9
+
 # A direction is of order one; outside these bounds its square could under- or overflow.
 SHORTEST_DIRECTION, LONGEST_DIRECTION = 1e-9, 1e9
 
@@ -70,7 +78,8 @@ def dotted(path: Iterable[str | int]) -> str:
     """``("cable", "sections", 0, "mass")`` -> ``cable.sections[0].mass``."""
     text = ""
     for part in path:
-        text += f"[{part}]" if isinstance(part, int) else f".{part}" if text else str(part)
+        name = part if isinstance(part, int) or part.isprintable() else repr(part)[1:-1]
+        text += f"[{part}]" if isinstance(part, int) else f".{name}" if text else str(name)
     return text
 
 
@@ -86,19 +95,23 @@ def _a_number(value: Any) -> float:
     value = unwrap(value)
     if isinstance(value, bool) or not isinstance(value, int | float):
         raise PydanticCustomError("number", "a number is needed")
-    try:
-        return float(value)
-    except OverflowError:
-        raise PydanticCustomError("finite_number", "the number is too large") from None
+    if LARGEST_NUMBER < abs(value) < math.inf:
+        raise PydanticCustomError("large_number", "the number is too large", {"most": LARGEST_NUMBER})
+    return float(value)
+
+
+def _not_tiny(value: float) -> float:
+    if 0.0 < value < SMALLEST_NUMBER:
+        raise PydanticCustomError("tiny_number", "the number is too small", {"least": SMALLEST_NUMBER})
+    return value
 
 
 def _a_whole_number(value: Any) -> int:
     value = unwrap(value)
     if isinstance(value, bool) or not isinstance(value, int | float) or value != value or value != math.floor(value):
         raise PydanticCustomError("whole_number", "a whole number is needed")
-    # No mesh and no output needs more; numpy and JSON stop at 2^63.
-    if abs(value) > 10**9:
-        raise PydanticCustomError("finite_number", "the number is too large")
+    if abs(value) > LARGEST_COUNT:
+        raise PydanticCustomError("large_number", "the number is too large", {"most": LARGEST_COUNT})
     return int(value)
 
 
@@ -141,8 +154,8 @@ def _points_somewhere(value: tuple[float, float, float]) -> tuple[float, float, 
 
 Text = Annotated[str, Field(strict=True), AfterValidator(_one_line), Words("one line of text")]
 Number = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
-Positive = Annotated[Number, Field(gt=0)]
-NonNegative = Annotated[Number, Field(ge=0)]
+Positive = Annotated[Number, Field(gt=0), AfterValidator(_not_tiny)]
+NonNegative = Annotated[Number, Field(ge=0), AfterValidator(_not_tiny)]
 Whole = Annotated[int, BeforeValidator(_a_whole_number), BeforeValidator(_no_infinity)]
 Truth = Annotated[bool, BeforeValidator(_a_truth)]
 Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words("three numbers [x, y, z]")]
@@ -232,7 +245,7 @@ class Kinds:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
         elif kind not in self.names:
-            refuse([Finding(("kind",), expected, nearest(str(kind), self.names))])
+            refuse([Finding(("kind",), expected, nearest(str(kind), self.names) or "write one of these")])
         return value
 
     def _refuse_table(self, given: str | None) -> NoReturn:

@@ -250,7 +250,7 @@ class AdaptiveModel(Table):
         description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
         "of the catenary's curvature, relaxed in time (curvature)",
     )
-    correct: bool = Field(
+    correct: Truth = Field(
         default=False,
         description="results corrected for the bending that catenary zones leave out, and criteria that count what "
         "is left after it",
@@ -296,7 +296,9 @@ class Mesh(Table):
             both = [name for name in ("cells", "ratio") if getattr(self, name) is not None]
             found = [Finding((name,), "nothing, because nodes already gives the mesh", fix) for name in both]
             if not _increasing(self.nodes):
-                found.append(Finding(("nodes",), "numbers that increase strictly, in m"))
+                found.append(
+                    Finding(("nodes",), "numbers that increase strictly, in m", "sort them and drop duplicates")
+                )
             refuse(found)
         return self
 
@@ -343,7 +345,7 @@ class Time(Table):
 
 
 OutputPoints = Annotated[
-    Annotated[Whole, Field(ge=2), Tag("<number>")]
+    Annotated[Whole, Field(ge=2, le=1_000_000), Tag("<number>")]  # a million points fill 160 MB at every output
     | Annotated[tuple[NonNegative, ...], Field(min_length=1), Tag("<list>")],
     Discriminator(number_or_list),
 ]
@@ -362,7 +364,7 @@ class Output(Table):
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"
     )
 
-    criteria: bool = Field(
+    criteria: Truth = Field(
         default=False,
         description="also write the criteria of zones that move, as fields over time and arc length",
     )

@@ -254,9 +254,15 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
     words = expected(spot.annotation, spot.metadata, spot.field)
     if kind == "missing":
         bare = isinstance(value, Mapping) and list(value) == ["kind"]
-        return [(Finding(path, words, _missing_fix(str(path[-1]), spot, bare)), False)]
+        return [(Finding(path, words, _missing_fix(str(path[-1]), words, spot, bare)), False)]
     key = path[-1] if path and isinstance(path[-1], str) else ""
-    return [(Finding(path, words, _fix(kind, key, value, spot)), False)]
+    if kind == "large_number":
+        most = "" if "<=" in words else f", and at most {context['most']:g}"
+        return [(Finding(path, words + most, "check the number and its unit: no cable needs as many"), False)]
+    if kind == "tiny_number":
+        zero = "" if " > 0" in words else ", or write 0"
+        return [(Finding(path, f"{words}, and no less than {context['least']:g}", f"check the unit{zero}"), False)]
+    return [(Finding(path, words, _fix(kind, key, value, spot) or _usual_fix(key, words, spot)), False)]
 
 
 def _unknown_key(path: Place, spot: Spot) -> Finding:
@@ -267,7 +273,7 @@ def _unknown_key(path: Place, spot: Spot) -> Finding:
     return Finding(path, f"a key of {table}", fix)
 
 
-def _missing_fix(key: str, spot: Spot, bare: bool) -> str:
+def _missing_fix(key: str, words: str, spot: Spot, bare: bool) -> str:
     """What to add; `bare`: the table says nothing but its kind, and may be that word alone."""
     unit = unit_of(spot.field)
     if (spot.kind, key) == ("guided", "tangent"):
@@ -276,6 +282,8 @@ def _missing_fix(key: str, spot: Spot, bare: bool) -> str:
         return f"write `{_example(spot.kind, spot.owner)}`"
     found = list(arms(spot.annotation, spot.metadata))
     kinds = next((mark for _, marks in found for mark in marks if isinstance(mark, Kinds)), None)
+    if kinds is None and words.startswith("a table {"):
+        return f"add `{key}: {words.removeprefix('a table ')}`"
     if kinds is None:
         return f"add `{key}: {_shape(key, spot.annotation, spot.metadata)}`" + (f" ({unit})" if unit else "")
     tables = {kind: a for kind in kinds.usual for a, marks in found if Tag(f"<{kind}>") in marks}
@@ -325,11 +333,13 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     if kind in ("number", "whole_number") and isinstance(value, str):
         return _number_in_text(value, unit)
     if kind == "whole_number" and isinstance(value, float):
-        return "round it"
+        return "round it" if abs(value) >= 1.5 else ""
     if kind == "finite_number":
         return "give a finite number"
     if kind == "too_short":
-        return "give more entries" if value else "give at least one entry"
+        least = next((m.min_length for _, marks in arms(spot.annotation, spot.metadata) for m in marks
+                      if isinstance(m, annotated_types.MinLen)), 1)  # fmt: skip
+        return f"give at least {least} entries" if least > 1 else "give at least one entry"
     if kind == "vector" and isinstance(value, str):
         return "write the numbers in brackets, with commas between them"
     if kind == "vector" and isinstance(value, list | tuple):
@@ -346,6 +356,24 @@ def _fix(kind: str, key: str, value: Any, spot: Spot) -> str:
     if kind in ("greater_than", "greater_than_equal") and isinstance(value, int | float) and value < 0:
         return "check the sign"
     return ""
+
+
+def _usual_fix(key: str, words: str, spot: Spot) -> str:
+    """What to try where nothing is known of why a value is wrong: how a right one is written, or to do without."""
+    found = list(arms(spot.annotation, spot.metadata))
+    shape = _shape(key, spot.annotation, spot.metadata)
+    optional = key and spot.owner is not None and spot.field is not None and not spot.field.is_required()
+    without = f", or leave {key} out" if optional else ""
+    if any(get_origin(a) is Literal for a, _ in found) or words.startswith("one of"):
+        return f"write one of these{without}"
+    if shape != "...":
+        return f"write `{key}: {shape}`{without}"
+    tables = [a for a, _ in found if isinstance(a, type) and issubclass(a, Table)]
+    if tables and key:
+        return f"write `{key}: {words.removeprefix('a table ')}`{without}"
+    if any(a is float or a is int for a, _ in found):
+        return f"give {words.partition(',')[0]}{without}"
+    return f"write it as in docs/scene.md{without}"
 
 
 # What stands before a unit, and what it is worth.

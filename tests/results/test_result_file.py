@@ -398,6 +398,7 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
         "hybrid.results",
         "hybrid.results.checkpoint",
         "hybrid.results.format",
+        "hybrid.results.intact",
         "hybrid.results.read",
         "hybrid.results.record",
         "hybrid.results.room",

@@ -66,7 +66,7 @@ def test_round_trip(text: str) -> None:
 @settings(derandomize=True, max_examples=60, deadline=None)
 @given(
     title=st.text().map(lambda text: "".join(c for c in text if c.isprintable()).strip()),
-    mass=st.floats(1e-300, 1e300),
+    mass=st.floats(1e-30, 1e18),
     position=st.tuples(*[st.floats(-1e6, 1e6)] * 3),
 )
 def test_round_trip_is_exact(title: str, mass: float, position: tuple[float, float, float]) -> None:
@@ -158,7 +158,7 @@ NOT_YAML = {
     "list": ("§- 1\n", "cable"),
     "word": ("§cable\n", "cable"),
     "two texts": ("cable: 1\n§---\ncable: 2\n", ""),
-    "control character": ("§cable: \x01\n", ""),
+    "control character": ("cable: §\x01\n", "take it out"),
 }
 
 
@@ -196,7 +196,7 @@ def test_files(tmp_path) -> None:
     with pytest.raises(SceneError, match="readable"):
         load_scene(tmp_path)
     path.write_bytes(b"\xff\xfe\x00")
-    with pytest.raises(SceneError, match="readable"):
+    with pytest.raises(SceneError, match="UTF-8"):
         load_scene(path)
     path.write_text(AT_REST)
     assert load_scene(path).length == 10.0

@@ -210,7 +210,7 @@ def test_a_complaint_reads_well() -> None:
 
 def test_nothing_is_said_twice() -> None:
     (kind,) = complaints(change(SUSPENSION, PINNED, "{kind: xyzzy, position: [0, 0, 0]}"))
-    assert kind.expected == "one of: pinned, clamped, guided, free, body" and not kind.fix
+    assert kind.expected == "one of: pinned, clamped, guided, free, body" and kind.fix == "write one of these"
     (bare,) = complaints(change(SUSPENSION, STRAIGHT, "straight"))
     assert bare.value == "nothing"
 

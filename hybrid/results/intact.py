@@ -1,0 +1,142 @@
+"""Whether a result file is as it was written; asked before HDF5 touches it.
+
+HDF5 checks its own tables, but not the numbers: a byte that has changed on a disk or on the way would be another
+result.  And over tables that are spoilt it may crash or never come back (tests/harden/test_harden_files.py counts).
+So a closed file has a few bytes behind its end (HDF5 ignores them) with the CRC-32 of all the others, which is compared
+before it is opened; a very long file is asked for its length only.
+A file that is marked as being written is read with patience (SWMR): HDF5 then reads a table again and again until it is
+right, waiting twice as long each time, so a file that is cut off or spoilt would never open.  The first 48 bytes
+(superblock, version 3 of the HDF5 file format specification) tell such files beforehand.
+"""
+
+from __future__ import annotations
+
+import struct
+import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from hybrid.errors import ResultError
+
+_SIGNATURE = b"\x89HDF\r\n\x1a\n"
+_SIZE = 48  # bytes of the superblock, its checksum the last four
+_BEING_WRITTEN = 1  # bit of its flags
+_TAIL = struct.Struct("<12sQI")  # a name, the bytes before it, and their sum
+_NAME = b"hybrid-crc32"
+# Bytes that are summed before a file is opened, in half a second or less; to read a longer one twice would be felt.
+_SUMMED = 500_000_000
+# Bytes that a writer who ran out of room leaves out at most: what one flush writes.
+_LACKING = 1 << 24
+_PIECE = 1 << 20  # bytes read at a time
+
+
+def being_written(path: Path) -> bool:
+    """Whether a file has a writer, alive or killed; ResultError when it is no HDF5 file, spoilt or cut off."""
+    with path.open("rb") as file:
+        head = file.read(_SIZE)
+        size = file.seek(0, 2)
+    wrong = f"{path} cannot be read as a result\n    detail:   "
+    other = "\n    expected: an HDF5 file written by hybrid\n    try:      copy it anew, or run its scene again"
+    if not head.startswith(_SIGNATURE):
+        raise ResultError(f"{wrong}it does not begin as HDF5 files do{other}")
+    if len(head) == _SIZE and head[8] != 3:
+        return False  # another program's: what HDF5 says of it will do
+    if len(head) < _SIZE or _lookup3(head[:44]) != struct.unpack("<I", head[44:])[0]:
+        raise ResultError(f"{wrong}its beginning is spoilt{other}")
+    end = struct.unpack("<Q", head[28:36])[0]
+    if end > size and head[11] & _BEING_WRITTEN and end - size <= _LACKING:
+        advice = f"\n    try:      free some space, then `hybrid resume {path}`"
+        raise ResultError(f"{wrong}the last {end - size} of {end} bytes could not be written{advice}")
+    if end > size:
+        raise ResultError(f"{wrong}it is cut off: {size} of {end} bytes are there{other}")
+    if head[11] & _BEING_WRITTEN:
+        return True
+    if _has_changed(path, end, size):
+        raise ResultError(f"{wrong}it has changed since it was written, on the disk or on the way{other}")
+    return False
+
+
+def fill_up(path: Path) -> None:
+    """Give a file whose last bytes could not be written its length: nothing that is complete lies there."""
+    with path.open("r+b") as file:
+        head = file.read(_SIZE)
+        size = file.seek(0, 2)
+        if len(head) == _SIZE and head.startswith(_SIGNATURE) and head[11] & _BEING_WRITTEN:
+            end = struct.unpack("<Q", head[28:36])[0]
+            if size < end <= size + _LACKING:
+                file.truncate(end)
+
+
+def sign(path: Path) -> None:
+    """Put the sum of a closed file behind its end."""
+    try:
+        with path.open("r+b") as file:
+            size = file.seek(0, 2)
+            file.write(_TAIL.pack(_NAME, size, _sum_of(file, size)))
+    except OSError as error:
+        advice = "free some disk space; the result is complete but for this sum"
+        raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
+
+
+def _has_changed(path: Path, end: int, size: int) -> bool:
+    """Whether a file has something behind its end that is not its sum; without anything there, nothing is known."""
+    if size == end:
+        return False
+    with path.open("rb") as file:
+        file.seek(end)
+        tail = file.read(_TAIL.size + 1)
+        if len(tail) != _TAIL.size:
+            return True
+        name, length, wanted = _TAIL.unpack(tail)
+        return bool(name != _NAME or length != end or (end <= _SUMMED and wanted != _sum_of(file, end)))
+
+
+def _sum_of(file: BinaryIO, length: int) -> int:
+    """CRC-32 of the first bytes of a file; what is written next goes behind them."""
+    file.seek(0)
+    found, left = 0, length
+    while left:
+        piece = file.read(min(left, _PIECE))
+        found, left = zlib.crc32(piece, found), left - len(piece)
+    return found
+
+
+@contextmanager
+def readable(source: object) -> Iterator[None]:
+    """What HDF5, or what makes sense of its tables, raises over a spoilt file, as a ResultError."""
+    try:
+        yield
+    except ResultError:
+        raise
+    except Exception as error:  # a table that is spoilt may say anything, and fail anywhere
+        said = str(error).splitlines()
+        name = source if isinstance(source, Path) else "the file in memory"
+        raise ResultError(
+            f"{name} is spoilt and cannot be read\n    detail:   {said[0] if said else type(error).__name__}\n"
+            "    try:      copy it anew, or run its scene again"
+        ) from error
+
+
+def _lookup3(data: bytes) -> int:
+    """The checksum of HDF5's tables: Bob Jenkins' lookup3 of 2006 (public domain), for whole words of 4 bytes."""
+    mask = 0xFFFFFFFF
+
+    def turn(x: int, k: int) -> int:
+        return ((x << k) | (x >> (32 - k))) & mask
+
+    words = list(struct.unpack(f"<{len(data) // 4}I", data))
+    a = b = c = (0xDEADBEEF + len(data)) & mask
+    while len(words) > 3:
+        a, b, c = (a + words[0]) & mask, (b + words[1]) & mask, (c + words[2]) & mask
+        for k in (4, 6, 8, 16, 19, 4):
+            a = ((a - c) & mask) ^ turn(c, k)
+            c = (c + b) & mask
+            a, b, c = b, c, a
+        words = words[3:]
+    a, b, c = ((x + y) & mask for x, y in zip((a, b, c), [*words, 0, 0], strict=False))
+    for k in (14, 11, 25, 16, 4, 14, 24):
+        c = ((c ^ b) - turn(b, k)) & mask
+        a, b, c = b, c, a
+    return b

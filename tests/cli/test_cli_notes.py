@@ -1,0 +1,84 @@
+"""What is said at the end of a run: little, the worst first, and nothing that hides it."""
+
+from __future__ import annotations
+
+import ast
+import random
+from pathlib import Path
+
+import pytest
+
+import hybrid
+from hybrid.errors import EVENTS_BY_WEIGHT, NEWS, ZONE_EVENTS, Outcome
+from hybrid.live import KINDS_SHOWN, Voice
+from hybrid.results.read import Event
+
+PACKAGE = Path(hybrid.__file__).parent
+# Calls that write an event take its kind as a text among their arguments.
+WRITERS = ("event", "note", "append")
+EXAMPLES = sorted((PACKAGE.parent / "examples").glob("*.yaml"))
+
+
+def lines_of(events: list[Event], capsys: pytest.CaptureFixture[str]) -> list[str]:
+    capsys.readouterr()
+    Voice(False, False).events(events)
+    return capsys.readouterr().err.splitlines()
+
+
+def test_few_lines_and_the_worst_first(capsys: pytest.CaptureFixture[str]) -> None:
+    kinds = [*EVENTS_BY_WEIGHT, *ZONE_EVENTS, "news"]
+    events = [Event(float(t), 0.0, 1.0, kind, f"text of {kind}") for t, kind in enumerate(kinds)] * 3
+    random.Random(1).shuffle(events)
+    said = lines_of(events, capsys)
+    assert len(said) == KINDS_SHOWN + 1
+    for line, kind in zip(said[:-1], EVENTS_BY_WEIGHT, strict=False):
+        assert line == f"note: t = {kinds.index(kind):g} s: text of {kind} (2 more like this)"
+    left = len(EVENTS_BY_WEIGHT) + 1 - KINDS_SHOWN
+    assert said[-1].startswith(f"note: and {left} more: {EVENTS_BY_WEIGHT[KINDS_SHOWN]}, ")
+    assert said[-1].endswith("news; see the events of the result")
+
+
+def test_changes_of_zones_take_no_line_from_others(capsys: pytest.CaptureFixture[str]) -> None:
+    zones = [Event(0.0, 0.0, 1.0, kind, kind) for kind in ZONE_EVENTS]
+    said = lines_of([*zones, Event(5.0, 0.0, 1.0, "news", "something new")], capsys)
+    assert said == ["note: t = 5 s: something new"]
+    assert lines_of(zones, capsys) == []
+
+
+def test_an_event_that_repeats_is_said_once(capsys: pytest.CaptureFixture[str]) -> None:
+    said = lines_of([Event(0.1 * k, 0.0, 1.0, "slack", "no tension") for k in range(10_000)], capsys)
+    assert said == ["note: t = 0 s: no tension (9999 more like this)"]
+
+
+def test_a_slip_of_units_comes_before_what_follows_from_it() -> None:
+    order = list(EVENTS_BY_WEIGHT)
+    for consequence in ("slack", "unstable", "unresolved bend", "stretched", "deep in the seabed", "coarse step"):
+        assert order.index("implausible") < order.index(consequence)
+    assert order[0] == "gains energy"  # then nothing else counts
+
+
+def test_every_kind_of_event_that_doubts_an_answer_has_a_weight() -> None:
+    known = {*EVENTS_BY_WEIGHT, *NEWS, *(outcome.name.lower() for outcome in Outcome)}
+    found = set()
+    for file in (f for f in PACKAGE.rglob("*.py") if f.name != "live.py"):  # whose notes are lines, not events
+        for call in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr in WRITERS):
+                continue
+            notes = isinstance(call.func.value, ast.Attribute) and call.func.value.attr == "_notes"
+            if call.func.attr == "append" and not notes:
+                continue
+            inside = call.args[0].elts[:1] if notes and isinstance(call.args[0], ast.Tuple) else call.args
+            found |= {a.value for a in inside if isinstance(a, ast.Constant) and isinstance(a.value, str)}
+    assert len(found) > 15, "the calls that write events are called otherwise now"
+    assert found <= known, found - known
+
+
+@pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
+def test_an_example_says_at_most_two_things(path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    """What its beginning says; the whole runs are in tests/test_examples.py, with their events."""
+    scene = hybrid.load_scene(path)
+    step = scene.require_time().step
+    short = [f"time.duration={40 * step}", f"output.every={10 * step}"]
+    said = lines_of(hybrid.run(hybrid.load_scene(path, short)).events, capsys)
+    assert len(said) <= 2
+    assert all(len(line) < 250 for line in said)
