@@ -20,13 +20,15 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.ladder import trade
     from hybrid.model.plan import plan
+    from hybrid.results.export import export
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
     from hybrid.results.zoneplot import plot_zones
+    from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.simulate import run, static
+    from hybrid.simulate import resume, run, static
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -37,12 +39,15 @@ _HOME = {
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
+    "export": ("hybrid.results.export", "export"),
+    "import_moordyn": ("hybrid.scene.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
     "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
+    "resume": ("hybrid.simulate", "resume"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
@@ -59,12 +64,15 @@ __all__ = [
     "ResultError",
     "Scene",
     "SceneError",
+    "export",
+    "import_moordyn",
     "load_scene",
     "open",
     "parse_scene",
     "plan",
     "plot",
     "plot_zones",
+    "resume",
     "run",
     "scene_text",
     "static",

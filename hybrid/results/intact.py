@@ -50,11 +50,11 @@ def being_written(path: Path) -> bool:
         return False  # another program's: what HDF5 says of it will do
     if len(head) < _SIZE or _lookup3(head[:44]) != struct.unpack("<I", head[44:])[0]:
         raise ResultError(f"{wrong}its beginning is spoilt{other}")
+    if head[11] & _BEING_WRITTEN:  # of a full disk it may lack its end, and is good as far as it goes
+        return True
     end = struct.unpack("<Q", head[28:36])[0]
     if end > size:
         raise ResultError(f"{wrong}it is cut off: {size} of {end} bytes are there{other}")
-    if head[11] & _BEING_WRITTEN:
-        return True
     if _has_changed(path, end, size):
         raise ResultError(f"{wrong}it has changed since it was written, on the disk or on the way{other}")
     return False
