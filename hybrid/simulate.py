@@ -29,7 +29,6 @@ from hybrid.motion import Motion
 from hybrid.remainder import Remainder, remainder
 from hybrid.results.checkpoint import claimed
 from hybrid.results.format import Field
-from hybrid.results.intact import fill_up
 from hybrid.results.read import Result, open_result
 from hybrid.results.record import amend, check_target
 from hybrid.scene.motion import check_motions
@@ -110,11 +109,11 @@ def resume(
     """
     path = Path(source).expanduser().resolve()
     target = path if output is None else Path(output).expanduser().resolve()
-    check_target(path, True) if path.exists() else open_result(path)
+    if not path.is_file():
+        open_result(path)  # which says what is there instead
     if target != path:
         check_target(target, True)
     with claimed(path), claimed(target if target != path else None):
-        fill_up(path)
         left = remainder(path, until, settings, start)
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"

@@ -27,7 +27,7 @@ _TAIL = struct.Struct("<12sQI")  # a name, the bytes before it, and their sum
 _NAME = b"hybrid-crc32"
 # Bytes that are summed before a file is opened, in half a second or less; to read a longer one twice would be felt.
 _SUMMED = 500_000_000
-# Bytes that a writer who ran out of room leaves out at most: what one flush writes.
+# Bytes that the file of a writer who ran out of room lacks at most, what one flush writes: it is good as far as it goes.
 _LACKING = 1 << 24
 _PIECE = 1 << 20  # bytes read at a time
 
@@ -45,28 +45,14 @@ def being_written(path: Path) -> bool:
         return False  # another program's: what HDF5 says of it will do
     if len(head) < _SIZE or _lookup3(head[:44]) != struct.unpack("<I", head[44:])[0]:
         raise ResultError(f"{wrong}its beginning is spoilt{other}")
-    end = struct.unpack("<Q", head[28:36])[0]
-    if end > size and head[11] & _BEING_WRITTEN and end - size <= _LACKING:
-        advice = f"\n    try:      free some space, then `hybrid resume {path}`"
-        raise ResultError(f"{wrong}the last {end - size} of {end} bytes could not be written{advice}")
-    if end > size:
+    end, writing = struct.unpack("<Q", head[28:36])[0], bool(head[11] & _BEING_WRITTEN)
+    if end > size + (_LACKING if writing else 0):
         raise ResultError(f"{wrong}it is cut off: {size} of {end} bytes are there{other}")
-    if head[11] & _BEING_WRITTEN:
+    if writing:
         return True
     if _has_changed(path, end, size):
         raise ResultError(f"{wrong}it has changed since it was written, on the disk or on the way{other}")
     return False
-
-
-def fill_up(path: Path) -> None:
-    """Give a file whose last bytes could not be written its length: nothing that is complete lies there."""
-    with path.open("r+b") as file:
-        head = file.read(_SIZE)
-        size = file.seek(0, 2)
-        if len(head) == _SIZE and head.startswith(_SIGNATURE) and head[11] & _BEING_WRITTEN:
-            end = struct.unpack("<Q", head[28:36])[0]
-            if size < end <= size + _LACKING:
-                file.truncate(end)
 
 
 def sign(path: Path) -> None:
