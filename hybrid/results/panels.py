@@ -16,11 +16,15 @@ from hybrid.errors import ResultError
 from hybrid.results.look import (
     BED,
     BODY,
+    DOUBT,
     GREY,
     INK,
     KIND_COLOURS,
+    LEVEL,
+    POINT_COLOURS,
     SAND,
     SMALL,
+    WATER,
     ZERO,
     earlier_grey,
     mark,
@@ -47,9 +51,7 @@ from hybrid.results.views import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_DOUBT = "#D55E00"  # of estimated errors
-_RANGE, _WATER, _LEVEL = "#E8E8E8", "#EFF6FA", "#4A90C2"
-_POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+_RANGE = "#E8E8E8"
 AXES = ("x", "y", "z")
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
 
@@ -215,7 +217,7 @@ def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, name: 
     low, high = values - error, values + error
     if name in ("curvature", "bending_moment"):
         low = np.maximum(low, 0.0)
-    ax.fill_between(x, low, high, color=_DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
+    ax.fill_between(x, low, high, color=DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
 
 
 def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
@@ -243,7 +245,7 @@ def _draw_sea(ax: Axes, view: View, result: Result) -> None:
     top = int(np.argmax(view.project(result.position[-1])[1]))
     aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
     wet = "surface" in result and view.upright
-    planes = [(float(result["surface"]), 0.0, _WATER, _LEVEL, "still water", 2)] if wet else []
+    planes = [(float(result["surface"]), 0.0, WATER, LEVEL, "still water", 2)] if wet else []
     planes += [(*bed, SAND, BED, "seabed", -3)] if bed else []
     for n, (height, rise, fill, line, name, lift) in enumerate(planes):
         z, at = height + rise * x, box[0, aside]
@@ -258,4 +260,4 @@ def _draw_sea(ax: Axes, view: View, result: Result) -> None:
 
 def _point(k: int) -> dict[str, Any]:
     width = max(1.8 - 0.5 * k, 0.8)  # later curves are thinner, so that coinciding ones all show
-    return {"color": _POINT_COLOURS[k % len(_POINT_COLOURS)], "linewidth": width, "marker": "o", "markersize": 3}
+    return {"color": POINT_COLOURS[k % len(POINT_COLOURS)], "linewidth": width, "marker": "o", "markersize": 3}
