@@ -170,8 +170,8 @@ def _bend(result: Result) -> Fact:
     if worst > 1.0:
         times = int((np.nan_to_num(ratio) > 1.0).any(axis=1).sum())
         part = f", at {times} of {len(result.times)} outputs" if len(result.times) > 1 else ""
-        elsewhere = "" if (t, s) == place_of else f" {place(result, s)}{moment(result, t)}"
-        said = f"Below the {amount(allowed, 'm')} allowed: {amount(values['radius_there'], 'm')}{elsewhere}{part}."
+        there = f": {amount(values['radius_there'], 'm')} {place(result, s)}{moment(result, t)}"
+        said = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
         return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
     said = f"Allowed are {amount(allowed, 'm')}: {100 * worst:.3g} % of that bend is used."
     return Fact("bend", title, f"{text} {said}", "plain", values, t, s)

@@ -33,7 +33,7 @@ def layout(across: str, up: str, **more: Any) -> Spec:
     axis |= {"tickcolor": "#BDBDBD", "ticklen": 4, "automargin": True, "exponentformat": "SI"}
     base: Spec = {
         "font": {"family": "system-ui, sans-serif", "size": 13, "color": INK},
-        "margin": {"l": 56, "r": 12, "t": 8, "b": 44},
+        "margin": {"l": 56, "r": 22, "t": 8, "b": 44},
         "paper_bgcolor": "#FFFFFF", "plot_bgcolor": "#FFFFFF", "hovermode": "x",
         "xaxis": axis | {"title": {"text": across, "standoff": 6}}, "yaxis": axis | {"title": {"text": up, "standoff": 6}},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
@@ -121,7 +121,7 @@ def _at_points(result: Result, store: Store, name: str, points: np.ndarray, comp
         colour = POINT_COLOURS[n % len(POINT_COLOURS)]
         data.append(curve(store, result.times[k], y[k] * factor, f"s = {s:.4g} m", colour, unit))
     if component is None:
-        return _over_time(name, "Tension along the way", "At points of the cable.", data, f"tension ({unit})")
+        return _over_time(name, "Tension at points", "At some points of the cable.", data, f"tension ({unit})")
     axis = "xyz"[component]
     said = f"Change of {axis} since the first output, at the same points."
     return _over_time("displacement", f"Displacement, {axis}", said, data, f"Δ{axis} ({unit})")
@@ -161,7 +161,7 @@ def _range(result: Result, store: Store, shown: Kept, name: str, values: np.ndar
         outer = [(values - result[error]).min(axis=0) * factor, (values + result[error]).max(axis=0) * factor]
         if name in ("curvature", "bending_moment", "shear"):  # sizes
             outer[0] = np.maximum(outer[0], 0.0)
-        data.append(band(store, s, *outer, "with estimated error", rgba(DOUBT, 0.25)))
+        data.append(band(store, s, *outer, "± error", rgba(DOUBT, 0.25)))
     if several:
         data.append(band(store, s, low, high, "range", rgba(GREY, 0.22), showlegend=False))
         data.append(curve(store, s, high, "highest", "#B84F04", unit))
@@ -175,7 +175,7 @@ def _range(result: Result, store: Store, shown: Kept, name: str, values: np.ndar
         data.append(curve(store, s, limit, "allowed", ALARM, unit, dash="dot", width=2))
     title = title_of(name).replace("|", "").capitalize()
     figure = {"key": f"range-{name}", "title": title, "said": "", "data": data}
-    figure["layout"] = layout("s (m)", f"{title_of(name)} ({unit})")
+    figure["layout"] = layout("s (m)", f"{title_of(name).replace('bending ', '').replace('contact ', '')} ({unit})")
     if several:
         frames = values[np.ix_(shown.frames, shown.points)] * factor
         figure["now"] = {"trace": data.index(now), "frames": store.add(frames)}

@@ -22,6 +22,7 @@ from hybrid.errors import ResultError
 from hybrid.results.card import picture
 from hybrid.results.facts import CAUSES, Fact, amount, attention, facts_of
 from hybrid.results.figures import energy, energy_parts, histories, ranges
+from hybrid.results.look import prefix
 from hybrid.results.read import Result
 from hybrid.results.scenery import scenery
 from hybrid.results.thin import Kept, Store, kept, script_json
@@ -133,9 +134,14 @@ def _subtitle(result: Result, shown: Kept) -> str:
 
 def _attention(facts: list[Fact], several: bool) -> str:
     if not facts:
-        return '<div class="attention well"><h2>Nothing to worry about: no warnings, no limit is broken.</h2></div>'
-    rows = "".join(f"<li><b>{escape(f.title)}.</b> {escape(f.text)} {_show(f, several)}</li>" for f in facts)
+        return '<div class="attention well"><h2>No warnings, and no limit is broken.</h2></div>'
+    rows = "".join(f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in facts)
     return f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul></div>'
+
+
+def _code(text: str) -> str:
+    """A text, escaped, with what stands between backticks as code."""
+    return re.sub(r"`([^`]*)`", r"<code>\1</code>", escape(text))
 
 
 def _show(fact: Fact, several: bool) -> str:
@@ -152,7 +158,7 @@ def _facts(facts: list[Fact], several: bool) -> str:
         if fact.key == "warning" and fact.weight == "alarm":
             continue
         table = _error_table(fact) if fact.key == "errors" and fact.values else ""
-        text = f"<dt>{escape(fact.title)}</dt><dd>{escape(fact.text)}{table}</dd>{_show(fact, several)}"
+        text = f"<dt>{escape(fact.title)}</dt><dd>{_code(fact.text)}{table}</dd>{_show(fact, several)}"
         rows.append(f'<div class="fact {fact.weight}" id="fact-{fact.key}">{text}</div>')
     return f'<dl class="facts">{"".join(rows)}</dl>'
 
@@ -162,9 +168,15 @@ def _error_table(fact: Fact) -> str:
     rows = ""
     for what, name, unit in (("position", "position", "m"), ("pull", "pulls at the ends", "N")):
         cells = [fact.values.get(f"{cause}_{what}") for cause in CAUSES]
-        said = (f'<td class="number">{"–" if x is None else escape(amount(x, unit, 2))}</td>' for x in cells)
-        rows += f"<tr><td>{name}</td>{''.join(said)}</tr>"
+        factor, short = prefix(unit, max((x for x in cells if x is not None), default=0.0))
+        said = (f'<td class="number">{"–" if x is None else _two(x * factor)}</td>' for x in cells)
+        rows += f"<tr><td>{name} ({short})</td>{''.join(said)}</tr>"
     return f'<div class="scroll"><table><tr><th>largest error by</th>{head}</tr>{rows}</table></div>'
+
+
+def _two(x: float) -> str:
+    """Two digits."""
+    return f"{float(f'{x:.2g}'):g}"
 
 
 def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
@@ -172,11 +184,14 @@ def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
         f'<button type="button" value="{k}" aria-pressed="{str(k == 0).lower()}">{escape(c["key"])}</button>'
         for k, c in enumerate(scene["colours"])
     )
-    colour = f'<label id="by">colour</label><div class="switch" id="colour" role="group" aria-labelledby="by">{colours}</div>'
+    colour = (
+        '<div><span class="quiet" id="by">colour</span><div class="switch" id="colour" role="group" '
+        f'aria-labelledby="by">{colours}</div></div>'
+    )
     axes = (
-        '<label id="axes-by">axes</label><div class="switch" id="axes" role="group" aria-labelledby="axes-by">'
-        '<button type="button" value="equal" aria-pressed="true">equal</button>'
-        '<button type="button" value="stretched" aria-pressed="false">stretched</button></div>'
+        '<div><span class="quiet" id="axes-by">axes</span><div class="switch" id="axes" role="group" '
+        'aria-labelledby="axes-by"><button type="button" value="equal" aria-pressed="true">equal</button>'
+        '<button type="button" value="stretched" aria-pressed="false">stretched</button></div></div>'
     )
     time = ""
     if len(shown.frames) > 1:

@@ -97,6 +97,12 @@
     return { x: between(at.x), y: between(at.y), z: between(at.z) };
   };
 
+  const marks = () => {  // all of them, and the place that was asked for
+    const at = state.picked === null ? { x: [NaN], y: [NaN], z: [NaN] } : placeOf(state.picked);
+    const all = (axis) => [...scene.marks.flatMap((mark) => [...row(mark[axis], state.frame)]), ...at[axis]];
+    return { x: all("x"), y: all("y"), z: all("z") };
+  };
+
   const view = () => {
     // Axes: the size of the box as drawn, so large that its projection fills the panel.
     const size = scene.box.map(([a, b], k) => (b - a) * (state.stretched ? scene.factors[k] : 1));
@@ -108,20 +114,21 @@
     const up = [d[1] * right[2] - d[2] * right[1], d[2] * right[0] - d[0] * right[2], d[0] * right[1] - d[1] * right[0]];
     const reach = (axis) => size.reduce((sum, v, k) => sum + Math.abs(axis[k]) * v, 0);
     const panel = box3d.clientWidth / box3d.clientHeight;
-    const scale = Math.min(SEEN * panel * 0.80 / reach(right), SEEN * 0.74 / reach(up));
+    const scale = Math.min((SEEN * panel * 0.84) / reach(right), (SEEN * 0.8) / reach(up));
     const camera = { eye: { x: 2 * d[0], y: 2 * d[1], z: 2 * d[2] }, up: { x: 0, y: 0, z: 1 },
       center: { x: 0, y: 0, z: -0.03 }, projection: { type: "orthographic" } };
-    return { camera, aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale }, reach };
+    return { camera, aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale } };
   };
-  const SEEN = 1.66;  // height of the panel in units of aspectratio, of an eye 2 away: 2 * 2 * tan(22.5 degrees)
+  const SEEN = 2.0;  // height of the panel in units of aspectratio, measured: plotly scales orthographic views by it
 
   const sceneLayout = () => {
     const largest = Math.max(...scene.box.map(([a, b]) => b - a));
     const axis = (k) => {
       const drawn = (scene.box[k][1] - scene.box[k][0]) * (state.stretched ? scene.factors[k] : 1);
-      return { title: { text: "xyz"[k] + " (m)", font: { size: 12 } }, range: scene.box[k], backgroundcolor: "#ffffff",
+      return { title: { text: "" }, tickprefix: "xyz"[k] + " = ", showtickprefix: "first", ticksuffix: " m",
+        showticksuffix: "last", range: scene.box[k], backgroundcolor: "#ffffff",
         gridcolor: "#e4e4e4", linecolor: "#bdbdbd", zeroline: false, showspikes: false, showbackground: false,
-        tickfont: { size: 11, color: "#5f5f5f" }, nticks: drawn < 0.3 * largest ? 2 : touch ? 4 : 7 };
+        tickfont: { size: 11, color: "#5f5f5f" }, tickangle: 0, nticks: drawn < 0.3 * largest ? 2 : touch ? 4 : 7 };
     };
     const { camera, aspectratio } = view();
     return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", aspectratio, camera, dragmode: "turntable" };
@@ -156,7 +163,9 @@
     strip.className = "ramp";
     strip.style.background = "linear-gradient(to right," + shades.join(",") + ")";
     const text = (v) => Number(v.toPrecision(3)).toString();
-    item.append(name, (log ? "≤ " : "") + text(low), strip, text(high) + " " + unit + (log ? " (log.)" : ""));
+    const lowest = document.createElement("span");
+    lowest.textContent = (log ? "≤ " : "") + text(low);
+    item.append(name, lowest, strip, text(high) + " " + unit + (log ? " (log.)" : ""));
     return item;
   };
 
@@ -166,18 +175,14 @@
       return;
     }
     const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: "#b5b5b5", width: 2 }, hoverinfo: "skip" }];
-    space = { cable: traces.length, marks: [], picked: 0 };
+    space = { cable: 1, marks: 2 };
     traces.push({ type: "scatter3d", mode: "lines", ...shape(0), line: line(), customdata: flat(scene.s),
       hovertemplate: "s = %{customdata:.4g} m<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
-    for (const mark of scene.marks) {
-      space.marks.push(traces.length);
-      traces.push({ type: "scatter3d", mode: "markers", x: row(mark.x, 0), y: row(mark.y, 0), z: row(mark.z, 0), name: mark.name,
-        marker: { symbol: mark.symbol, color: mark.colour, size: mark.size, line: { color: scene.ink, width: 1 } },
-        hovertemplate: mark.name + "<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
-    }
-    space.picked = traces.length;
-    traces.push({ type: "scatter3d", mode: "markers", x: [null], y: [null], z: [null], hoverinfo: "skip",
-      marker: { symbol: "circle-open", color: "#c00000", size: 12, line: { width: 3 } } });
+    const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
+    traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
+      marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => m.colour), "#c00000"],
+        size: [...each((m) => m.size), 13], line: { color: scene.ink, width: 1 }, opacity: 1 },
+      hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     for (const plane of scene.planes) if (plane.x) {
       traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: [0, 0], j: [1, 2], k: [2, 3], color: plane.fill,
         opacity: plane.solid, hoverinfo: "skip", lighting: { ambient: 1, diffuse: 0, specular: 0 } });
@@ -187,16 +192,19 @@
     box3d.querySelector("svg")?.remove();
     await Plotly.newPlot(box3d, traces, { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
       font: { family: "system-ui, sans-serif", color: scene.ink }, paper_bgcolor: "#ffffff" }, config);
-    new ResizeObserver(() => Plotly.relayout(box3d, { "scene.aspectratio": view().aspectratio })).observe(box3d);
+    let width = box3d.clientWidth;
+    new ResizeObserver(() => {
+      if (box3d.clientWidth === width) return;  // it also calls at the start
+      width = box3d.clientWidth;
+      Plotly.relayout(box3d, { "scene.aspectratio": view().aspectratio });
+    }).observe(box3d);
   };
 
   const moveCable = () => {
     if (!space) return;
-    const at = shape(state.frame), k = state.frame;
-    const moved = [at, ...scene.marks.map((m) => ({ x: row(m.x, k), y: row(m.y, k), z: row(m.z, k) }))];
-    moved.push(state.picked === null ? { x: [null], y: [null], z: [null] } : placeOf(state.picked));
-    Plotly.restyle(box3d, { x: moved.map((m) => m.x), y: moved.map((m) => m.y), z: moved.map((m) => m.z) },
-      [space.cable, ...space.marks, space.picked]);
+    const both = [shape(state.frame), marks()];
+    Plotly.restyle(box3d, { x: both.map((m) => m.x), y: both.map((m) => m.y), z: both.map((m) => m.z) },
+      [space.cable, space.marks]);
     if (state.colour !== 0 || (scene.colours[0] && scene.colours[0].legend.length > 1)) recolour();
   };
   const recolour = () => space && Plotly.restyle(box3d, { line: [line()] }, [space.cable]);
@@ -212,7 +220,8 @@
     if (graphs.has(element)) return;
     graphs.set(element, figure);
     const layout = figure.layout;
-    layout.dragmode = touch ? false : "zoom";
+    layout.dragmode = touch ? false : "zoom";  // a finger scrolls the page
+    if (element.clientWidth < 500) layout.legend.font.size = 11;
     if (figure.cursor && times.length > 1) layout.shapes = [cursor()];
     const data = revived(figure.data);
     for (const trace of data) if (trace.type === "heatmap") trace.zsmooth = false;
