@@ -23,6 +23,7 @@ if TYPE_CHECKING:
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
+    from hybrid.results.report import write_report as report
     from hybrid.results.zoneplot import plot_zones
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
@@ -43,6 +44,7 @@ _HOME = {
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
     "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
+    "report": ("hybrid.results.report", "write_report"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
@@ -65,6 +67,7 @@ __all__ = [
     "plan",
     "plot",
     "plot_zones",
+    "report",
     "run",
     "scene_text",
     "static",

@@ -113,7 +113,8 @@ def _warnings(result: Result) -> list[Fact]:
         middle = 0.5 * (event.s_a + event.s_b)
         facts.append(Fact("warning", event.kind.capitalize(), text, weight, values, event.t, middle))
     if not any(fact.weight == "alarm" for fact in facts):
-        facts.insert(0, Fact("warning", "Warnings", "None were given.", values={"count": 0}))
+        none = "None were given." if result.status == "complete" else "None, beside how it ended."
+        facts.insert(0, Fact("warning", "Warnings", none, values={"count": 0}))
     return facts
 
 

@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.results.look import ALARM, BED, DOUBT, GREY, INK, POINT_COLOURS, ZERO, prefix, title_of
-from hybrid.results.read import Result
+from hybrid.results.look import ALARM, BED, DOUBT, GREY, INK, KIND_COLOURS, POINT_COLOURS, ZERO, prefix, title_of
+from hybrid.results.read import Result, Zone
 from hybrid.results.thin import Kept, Store, outline
-from hybrid.results.views import STILL, free_edges, history_points
+from hybrid.results.views import STILL, free_edges, history_points, whole_zones
 
 Spec = dict[str, Any]
 _PULLS = {"start": "#0072B2", "end": "#D55E00"}
@@ -37,7 +37,8 @@ def layout(across: str, up: str, **more: Any) -> Spec:
         "paper_bgcolor": "#FFFFFF", "plot_bgcolor": "#FFFFFF", "hovermode": "x",
         "xaxis": axis | {"title": {"text": across, "standoff": 6}}, "yaxis": axis | {"title": {"text": up, "standoff": 6}},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
-        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "font": {"size": 12, "color": INK}, "align": "left"},
+        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}
+        | {"font": {"size": 12, "color": INK, "family": "system-ui, sans-serif"}},
     }  # fmt: skip
     return base | more
 
@@ -176,10 +177,18 @@ def _range(result: Result, store: Store, shown: Kept, name: str, values: np.ndar
     title = title_of(name).replace("|", "").capitalize()
     figure = {"key": f"range-{name}", "title": title, "said": "", "data": data}
     figure["layout"] = layout("s (m)", f"{title_of(name).replace('bending ', '').replace('contact ', '')} ({unit})")
-    if several:
+    if not several:
+        figure["layout"]["shapes"] = [_shade(zone) for zone in whole_zones(result.zones[0])]
+    else:
         frames = values[np.ix_(shown.frames, shown.points)] * factor
         figure["now"] = {"trace": data.index(now), "frames": store.add(frames)}
     return figure
+
+
+def _shade(zone: Zone) -> Spec:
+    """A zone as a band behind a profile."""
+    fill = {"fillcolor": KIND_COLOURS.get(zone.kind, INK), "opacity": 0.1, "line": {"width": 0}, "layer": "below"}
+    return fill | {"type": "rect", "xref": "x", "yref": "paper", "x0": zone.s_a, "x1": zone.s_b, "y0": 0, "y1": 1}
 
 
 def energy(result: Result, store: Store) -> list[Spec]:

@@ -70,7 +70,7 @@ def plot_shape(
 
     view = view_named(view) if isinstance(view, str) else view or views_of(result)[0]
     position, last, s = result.position, result.position[-1], result.s
-    _draw_sea(ax, view, result)
+    draw_sea(ax, view, result)
     earlier = telling_times(result) if times is None else np.asarray(times, dtype=float)
     outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
     strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
@@ -83,22 +83,22 @@ def plot_shape(
     zones = whole_zones(result.zones[-1]) or [Zone("cable", float(s[0]), float(s[-1]))]
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
-        piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
+        piece = place_along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
         ax.plot(*view.project(piece), color=KIND_COLOURS.get(zone.kind, INK), lw=2.0, zorder=3, label=zone.kind)
     joints = np.array([z.s_b for z in zones[:-1]])
     if len(joints):
-        ax.plot(*view.project(_along(joints, s, last)), zorder=5, **mark("o", "white"), label="joint")
+        ax.plot(*view.project(place_along(joints, s, last)), zorder=5, **mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
         ax.plot(*view.project(last[[k]]), zorder=4, **mark(marker), label="end" if k else "start")
     if "attached" in result:
-        bodies = view.project(_along(result["attached"], s, last))
+        bodies = view.project(place_along(result["attached"], s, last))
         ax.plot(*bodies, zorder=3.5, **mark("o", BODY) | {"markersize": 8}, label="float, clump, body")
     if "touchdown_position" in result:
         away = np.abs(result["touchdown"][-1] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own marks
         places = view.project(result["touchdown_position"][-1][away])  # NaN, of a cable that hangs, is not away
         ax.plot(*places, zorder=5, **mark("v", BED), label="touchdown" if away.any() else "_")
     for k, point in enumerate(points):
-        ax.plot(*view.project(_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
+        ax.plot(*view.project(place_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
     wider, taller = magnification(view, result)
     factors = zip((view.across_label.split(",")[0], view.up_label), (wider, taller), strict=True)
     stretch = "".join(f", {name} × {factor:g}" for name, factor in factors if factor > 1.0)
@@ -220,7 +220,7 @@ def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, name: 
     ax.fill_between(x, low, high, color=DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
 
 
-def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
+def place_along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
 
 
@@ -235,7 +235,7 @@ def _at(result: Result, output: int) -> str:
     return f" at t = {result.times[output]:.5g} s" if len(result.times) > 1 else ""
 
 
-def _draw_sea(ax: Axes, view: View, result: Result) -> None:
+def draw_sea(ax: Axes, view: View, result: Result) -> None:
     """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
     from matplotlib.patches import Polygon
 

@@ -230,7 +230,10 @@ def _graphs(result: Result, groups: dict[str, list[tuple[int, dict[str, Any]]]],
         out += f'<section id="histories"><h2>Over time</h2>{text}<div class="grid">{figures}</div></section>'
     if groups["ranges"]:
         figures = "".join(_figure(k, f) for k, f in groups["ranges"])
-        said = "Lowest, mean and highest of all outputs, and now: the time of the slider." if several else ""
+        said = "Lowest, mean and highest of all outputs, and now: the time of the slider."
+        if not several:
+            kinds = list(dict.fromkeys(zone.kind for zone in result.zones[0]))
+            said = f"{shares(result)} Shaded as in the picture above: {', '.join(kinds)}." if kinds else ""
         out += f'<section id="ranges"><h2>Along the cable</h2><p class="quiet">{said}</p>'
         out += f'<div class="grid">{figures}</div></section>'
     return out

@@ -44,10 +44,11 @@ def zone_map(result: Result, store: Store, shown: Kept) -> list[Spec]:
         values = cells.values(kind, result[name][rows]).filled(np.nan) * factor
         straight = factor * STILL / float(np.ptp(result.s))
         low, high, log = span_of(values, bends=kind == "rod", straight=straight)
+        stored = store.add(values)
         data.append(
             {
                 "type": "heatmap", "x": store.add(cells.t), "y": store.add(cells.s),
-                "z": store.add(values) | {"log": log}, "customdata": store.add(values),
+                "z": stored | {"log": log}, "customdata": stored,
                 "colorscale": colour_scale(COLOURS[kind]), "showscale": False, "name": kind,
                 "zmin": np.log10(low) if log else low, "zmax": np.log10(high) if log else high,
                 "hovertemplate": f"{kind}: {name} %{{customdata:.4g}} {unit}<br>t = %{{x:.5g}} s, s = %{{y:.4g}} m",

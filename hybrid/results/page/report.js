@@ -57,7 +57,8 @@
     return Object.fromEntries(Object.entries(x).map(([key, value]) => [key, revived(value)]));
   };
 
-  const config = { displaylogo: false, responsive: true, displayModeBar: touch ? false : "hover",
+  // plotly's own button to upload a picture to its servers is switched off: nothing leaves this page.
+  const config = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "", responsive: true, displayModeBar: touch ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
 
   // ---- the cable -------------------------------------------------------------------------------
@@ -181,7 +182,7 @@
     const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
     traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
       marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => m.colour), "#c00000"],
-        size: [...each((m) => m.size), 13], line: { color: scene.ink, width: 1 }, opacity: 1 },
+        size: [...each((m) => 2 * m.size), 28], line: { color: scene.ink, width: 1 }, opacity: 1 },
       hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     for (const plane of scene.planes) if (plane.x) {
       traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: [0, 0], j: [1, 2], k: [2, 3], color: plane.fill,
@@ -203,9 +204,9 @@
   const moveCable = () => {
     if (!space) return;
     const both = [shape(state.frame), marks()];
-    Plotly.restyle(box3d, { x: both.map((m) => m.x), y: both.map((m) => m.y), z: both.map((m) => m.z) },
-      [space.cable, space.marks]);
-    if (state.colour !== 0 || (scene.colours[0] && scene.colours[0].legend.length > 1)) recolour();
+    const update = { x: both.map((m) => m.x), y: both.map((m) => m.y), z: both.map((m) => m.z) };
+    if (scene.colours.length) update["line.color"] = [line().color, undefined];  // undefined: as it is
+    Plotly.restyle(box3d, update, [space.cable, space.marks]);
   };
   const recolour = () => space && Plotly.restyle(box3d, { line: [line()] }, [space.cable]);
 
@@ -259,7 +260,7 @@
   let last = 0;
   const tick = (now) => {
     if (!state.playing) return;
-    const t = state.clock + (Math.min(now - last, 250) / 1000) * Number(pace.value);
+    const t = state.clock + (Math.min(now - last, 1000) / 1000) * Number(pace.value);
     last = now;
     if (t >= times.at(-1)) { show(times.length - 1); stop(); return; }
     state.clock = t;
