@@ -342,7 +342,7 @@ def _film(say: Voice, result: Result, source: Path, output: Path | None) -> None
 
     suffix = ".mp4" if output or ffmpeg() else ".gif"
     if suffix == ".gif":
-        say.note("note: there is no ffmpeg for mp4, so it is a gif; pip install \"hybrid-cable[video]\" brings one")
+        say.note('note: there is no ffmpeg for mp4, so it is a gif; pip install "hybrid-cable[video]" brings one')
     film = animate(result, output or source.with_suffix(suffix))
     size = film.path.stat().st_size
     facts = {"status": result.status, "size": size} | {k: v for k, v in film._asdict().items() if k != "path"}

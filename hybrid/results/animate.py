@@ -179,7 +179,9 @@ def _shape(ax: Axes, result: Result, view: View) -> list[tuple[Any, Any]]:
     s = result.s
 
     def along(line: Any, i: int) -> None:
-        _set_pieces(line, result, i, lambda where: np.column_stack(view.project(place_along(where, s, result.position[i]))))
+        _set_pieces(
+            line, result, i, lambda where: np.column_stack(view.project(place_along(where, s, result.position[i])))
+        )
 
     def points(where: np.ndarray) -> Any:
         def move(dots: Any, i: int) -> None:
@@ -225,9 +227,7 @@ def _set_pieces(line: Any, result: Result, i: int, curve: Any) -> None:
     s = result.s
     zones = whole_zones(result.zones[i]) or [Zone("cable", float(s[0]), float(s[-1]))]
     inside = ((s > zone.s_a) & (s < zone.s_b) for zone in zones)
-    line.set_segments(
-        [curve(np.array([z.s_a, *s[here], z.s_b])) for z, here in zip(zones, inside, strict=True)]
-    )
+    line.set_segments([curve(np.array([z.s_a, *s[here], z.s_b])) for z, here in zip(zones, inside, strict=True)])
     line.set_color([KIND_COLOURS.get(zone.kind, INK) for zone in zones])
 
 

@@ -44,8 +44,9 @@ def card(result: Result) -> str:
     alarm = "".join(f'<div style="color:{ALARM}">{escape(_cut(text))}</div>' for text in alarms[:3])
     alarm += f'<div style="color:{ALARM}">and {len(alarms) - 3} more</div>' if len(alarms) > 3 else ""
     drawing = f'<div style="flex:0 1 {_WIDTH:.0f}px;min-width:220px">{picture(result)}</div>' if n else ""
+    title = escape(result.title or "(no title)")
     return (
-        f'<div style="{_FRAME}"><div style="font-weight:600;font-size:15px">{escape(result.title or "(no title)")}</div>'
+        f'<div style="{_FRAME}"><div style="font-weight:600;font-size:15px">{title}</div>'
         f'<div style="color:{colour}">{escape(_cut(status))}; {escape(head)}</div>{alarm}'
         f'<div style="display:flex;flex-wrap:wrap;gap:14px;margin-top:6px">{drawing}<table style="flex:1 1 280px;'
         f'border-collapse:collapse;font-size:12.5px;margin:0;display:block;border:0">{cells}</table></div></div>'
@@ -86,7 +87,9 @@ def _shapes(result: Result, view: View) -> tuple[str, float]:
     def line(position: np.ndarray, colour: str, width: float) -> str:
         points = to_page(*view.project(position[even(len(position), _POINTS)]))
         text = " ".join(f"{x:.1f},{y:.1f}" for x, y in points)
-        return f'<polyline points="{text}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"/>'
+        return (
+            f'<polyline points="{text}" fill="none" stroke="{colour}" stroke-width="{width}" stroke-linejoin="round"/>'
+        )
 
     parts = []
     across = np.array([middle[0] - 0.5 * _WIDTH / scale / wider, middle[0] + 0.5 * _WIDTH / scale / wider])
@@ -99,8 +102,9 @@ def _shapes(result: Result, view: View) -> tuple[str, float]:
         if min(y0, y1) < bottom:
             parts.append(f'<path d="M{x0:.1f},{y0:.1f}L{x1:.1f},{y1:.1f}V{bottom:.1f}H{x0:.1f}Z" fill="{fill}"/>')
             parts.append(f'<path d="M{x0:.1f},{y0:.1f}L{x1:.1f},{y1:.1f}" stroke="{edge}"/>')
-    for shape in result.at(t=telling_times(result), names=["position"])["position"] if len(result.times) > 1 else ():
-        parts.append(line(shape, "#C4C4C4", 0.8))
+    if len(result.times) > 1:
+        earlier = result.at(t=telling_times(result), names=["position"])["position"]
+        parts += [line(shape, "#C4C4C4", 0.8) for shape in earlier]
     s, last = result.s, result.position[-1]
     for zone in whole_zones(result.zones[-1]) or [Zone("cable", float(s[0]), float(s[-1]))]:
         where = np.array([zone.s_a, *s[(s > zone.s_a) & (s < zone.s_b)], zone.s_b])

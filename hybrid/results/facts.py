@@ -19,8 +19,8 @@ from hybrid.results.views import STILL, free_edges
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
 HOCKLING = (
-    "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, Proc. Inst. Mech. "
-    "Eng. 34, 1883; for cables F. Rosenthal, J. Appl. Mech. 43, 1976)"
+    "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
+    "Proc. Inst. Mech. Eng. 34, 1883; for cables F. Rosenthal, J. Appl. Mech. 43, 1976)"
 )
 CAUSES = {"mesh": "mesh", "time": "time step", "model": "model", "total": "together"}
 
@@ -56,7 +56,13 @@ def attention(facts: list[Fact]) -> list[Fact]:
 def amount(value: float, unit: str, digits: int = 4) -> str:
     """A number as engineers write it: "41.34 kN"."""
     factor, name = prefix(unit, abs(value)) if value else (1.0, unit)
-    return f"{value * factor:.{digits}g} {name}"
+    return f"{short(value * factor, digits)} {name}"
+
+
+def short(value: float, digits: int) -> str:
+    """So many digits, without an exponent where a person would write none."""
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:.9g}" if 1e-4 <= abs(rounded) < 1e6 or rounded == 0.0 else f"{rounded:g}"
 
 
 def place(result: Result, s: float) -> str:
@@ -70,6 +76,11 @@ def place(result: Result, s: float) -> str:
 def moment(result: Result, t: float) -> str:
     """When, in words; of a result with one output nothing."""
     return f", t = {t:.5g} s" if len(result.times) > 1 else ""
+
+
+def _at(values: np.ndarray, k: int) -> tuple[int, int]:
+    """Output and point of the k-th value of an array (nt, ns)."""
+    return divmod(k, values.shape[1])
 
 
 def rods(result: Result) -> np.ndarray:
@@ -104,9 +115,7 @@ def _warnings(result: Result) -> list[Fact]:
     for event, count in warnings_of(result):
         more = f" ({count} times; this is the first)" if count > 1 else ""
         at = f"At t = {event.t:.5g} s, " if len(result.times) > 1 else ""
-        where = (
-            f"s = {event.s_a:.4g} m: " if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m: "
-        )
+        where = f"s = {event.s_a:.4g} m: " if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m: "
         text = f"{at}{where}{event.text}{more}"
         weight = "note" if event.kind in NEWS else "alarm"
         values = {"kind": event.kind, "count": count}
@@ -120,7 +129,7 @@ def _warnings(result: Result) -> list[Fact]:
 
 def _tension(result: Result) -> Fact:
     tension = result.tension
-    i, k = np.unravel_index(int(tension.argmax()), tension.shape)
+    i, k = _at(tension, int(tension.argmax()))
     most, t, s = float(tension[i, k]), float(result.times[i]), float(result.s[k])
     text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, k)}."
     values: dict[str, Any] = {"tension": most}
@@ -143,13 +152,15 @@ def _doubt(result: Result, name: str, i: int, k: int) -> str:
 
 
 def _bend(result: Result) -> Fact:
-    title, limit = "Smallest bend radius", result["min_bend_radius"] if "min_bend_radius" in result else None
+    title = "Smallest bend radius"
     if "curvature" not in result:
         return Fact("bend", title, "The curvature was not recorded.", "absent")
+    limit = _recorded(result, "min_bend_radius")
     curvature = result["curvature"]
-    i, k = np.unravel_index(int(curvature.argmax()), curvature.shape)
+    i, k = _at(curvature, int(curvature.argmax()))
     most, t, s = float(curvature[i, k]), float(result.times[i]), float(result.s[k])
     values: dict[str, Any] = {"radius": 1.0 / most if most > 0.0 else None, "allowed": None, "ratio": None}
+    place_of: tuple[float | None, float | None]
     if most * float(np.ptp(result.s)) < STILL:
         text, place_of = "The cable stays straight, to round-off.", (None, None)
     else:
@@ -164,7 +175,7 @@ def _bend(result: Result) -> Fact:
     ratio = curvature * limit  # above 1: too tight; NaN where nothing is allowed or forbidden
     if np.isnan(ratio).all():
         return Fact("bend", title, f"{text} No allowed radius given.", "plain", values, *place_of)
-    i, k = np.unravel_index(int(np.nanargmax(ratio)), ratio.shape)
+    i, k = _at(ratio, int(np.nanargmax(ratio)))
     worst, allowed = float(ratio[i, k]), float(limit[k])
     values |= {"allowed": allowed, "ratio": worst, "radius_there": 1.0 / max(float(curvature[i, k]), ZERO)}
     t, s = float(result.times[i]), float(result.s[k])
@@ -174,8 +185,12 @@ def _bend(result: Result) -> Fact:
         there = f": {amount(values['radius_there'], 'm')} {place(result, s)}{moment(result, t)}"
         said = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
         return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
-    said = f"Allowed are {amount(allowed, 'm')}: {100 * worst:.3g} % of that bend is used."
+    said = f"Allowed are {amount(allowed, 'm')}: {short(100 * worst, 3)} % of that bend is used."
     return Fact("bend", title, f"{text} {said}", "plain", values, t, s)
+
+
+def _recorded(result: Result, name: str) -> np.ndarray | None:
+    return result[name] if name in result else None  # noqa: SIM401  a Result is no dict
 
 
 def _kind_at(result: Result, i: int, s: float) -> str:
@@ -188,12 +203,12 @@ def _doubt_of_radius(result: Result, i: int, k: int) -> str:
     if found not in result:
         return ""
     part = float(result[found][i, k]) / float(result["curvature"][i, k])
-    return f" (± {100 * part:.2g} %)"
+    return f" (± {short(100 * part, 2)} %)"
 
 
 def _slack(result: Result) -> Fact:
     tension, title = result.tension, "Lowest tension"
-    i, k = np.unravel_index(int(tension.argmin()), tension.shape)
+    i, k = _at(tension, int(tension.argmin()))
     least, t, s = float(tension[i, k]), float(result.times[i]), float(result.s[k])
     zero = NOTHING * float(np.abs(tension).max())
     pressed = tension < -zero
@@ -231,12 +246,12 @@ def _hockling(result: Result) -> Fact:
     needed = np.divide(torque**2, 4.0 * stiffness, out=np.zeros_like(torque), where=stiffness > 0.0)
     scale = NOTHING * float(np.abs(tension).max())
     if float(needed.max()) <= scale:
-        i, k = np.unravel_index(int(np.abs(torque).argmax()), torque.shape)
+        i, k = _at(torque, int(np.abs(torque).argmax()))
         text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, is far too small for loops."
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}
         return Fact("hockling", title, f"{text} {HOCKLING}.", "plain", values)
     ratio = np.where(needed > scale, needed / np.maximum(tension, scale), 0.0)
-    i, k = np.unravel_index(int(ratio.argmax()), ratio.shape)
+    i, k = _at(ratio, int(ratio.argmax()))
     t, s = float(result.times[i]), float(result.s[k])
     values = {
         "torque": float(torque[i, k]), "needed": float(needed[i, k]), "tension": float(tension[i, k]),
@@ -249,7 +264,7 @@ def _hockling(result: Result) -> Fact:
     )
     verdict = ": the criterion is broken, a straight cable would throw a loop" if values["ratio"] >= 1.0 else ""
     if not verdict:
-        verdict = f", {1.0 / values['ratio']:.3g} times as much"
+        verdict = f", {short(1.0 / values['ratio'], 3)} times as much"
     weight = "alarm" if values["ratio"] >= 1.0 else "plain"
     return Fact("hockling", title, f"{text}{verdict}. {HOCKLING}.", weight, values, t, s)
 
@@ -291,7 +306,9 @@ def _errors(result: Result) -> Fact:
         text = "Not estimated; `accuracy: 1%` or `output: {errors: true}` in the scene asks for it."
         return Fact("errors", title, text, "absent")
     asked = result.attributes.get("accuracy_asked")
-    text = f"Position {amount(found['total_position'], 'm', 2)}, pulls at the ends {amount(found['total_pull'], 'N', 2)}"
+    text = (
+        f"Position {amount(found['total_position'], 'm', 2)}, pulls at the ends {amount(found['total_pull'], 'N', 2)}"
+    )
     text += f"; asked was {asked}." if asked else "."
     return Fact("errors", title, text, "plain", found | {"asked": asked})
 

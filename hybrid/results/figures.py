@@ -35,7 +35,8 @@ def layout(across: str, up: str, **more: Any) -> Spec:
         "font": {"family": "system-ui, sans-serif", "size": 13, "color": INK},
         "margin": {"l": 56, "r": 22, "t": 8, "b": 44},
         "paper_bgcolor": "#FFFFFF", "plot_bgcolor": "#FFFFFF", "hovermode": "x",
-        "xaxis": axis | {"title": {"text": across, "standoff": 6}}, "yaxis": axis | {"title": {"text": up, "standoff": 6}},
+        "xaxis": axis | {"title": {"text": across, "standoff": 6}},
+        "yaxis": axis | {"title": {"text": up, "standoff": 6}},
         "legend": {"orientation": "h", "x": 0, "y": 1.02, "yanchor": "bottom", "font": {"size": 12}},
         "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}
         | {"font": {"size": 12, "color": INK, "family": "system-ui, sans-serif"}},
@@ -81,7 +82,7 @@ def _pulls(result: Result, store: Store) -> Spec:
         elif f"reaction_{end}" in result:
             found[end] = (result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1))
     factor, unit = prefix("N", max((float(y.max()) for _, y in found.values()), default=0.0))
-    data = []
+    data: list[Spec] = []
     for end, (t, y) in found.items():
         error = f"errors/total/pull_{end}"
         if error in result and f"reaction_{end}" in result:
@@ -111,7 +112,8 @@ def _at_points(result: Result, store: Store, name: str, points: np.ndarray, comp
     peak = float(np.abs(values).max())
     round_off = STILL * float(np.ptp(result.position, axis=(0, 1)).max())
     factor, unit = prefix(result.units[name], max(peak, round_off if component is not None else 0.0))
-    error = result[f"errors/total/{name}"] if f"errors/total/{name}" in result else None
+    estimated = f"errors/total/{name}"
+    error = result[estimated] if estimated in result else None  # noqa: SIM401  a Result is no dict
     data: list[Spec] = []
     for n, s in enumerate(points):
         y = values[:, n]
@@ -162,7 +164,7 @@ def _range(result: Result, store: Store, shown: Kept, name: str, values: np.ndar
         outer = [(values - result[error]).min(axis=0) * factor, (values + result[error]).max(axis=0) * factor]
         if name in ("curvature", "bending_moment", "shear"):  # sizes
             outer[0] = np.maximum(outer[0], 0.0)
-        data.append(band(store, s, *outer, "± error", rgba(DOUBT, 0.25)))
+        data.append(band(store, s, outer[0], outer[1], "± error", rgba(DOUBT, 0.25)))
     if several:
         data.append(band(store, s, low, high, "range", rgba(GREY, 0.22), showlegend=False))
         data.append(curve(store, s, high, "highest", "#B84F04", unit))
@@ -175,7 +177,7 @@ def _range(result: Result, store: Store, shown: Kept, name: str, values: np.ndar
         limit = factor / result["min_bend_radius"]
         data.append(curve(store, s, limit, "allowed", ALARM, unit, dash="dot", width=2))
     title = title_of(name).replace("|", "").capitalize()
-    figure = {"key": f"range-{name}", "title": title, "said": "", "data": data}
+    figure: Spec = {"key": f"range-{name}", "title": title, "said": "", "data": data}
     figure["layout"] = layout("s (m)", f"{title_of(name).replace('bending ', '').replace('contact ', '')} ({unit})")
     if not several:
         figure["layout"]["shapes"] = [_shade(zone) for zone in whole_zones(result.zones[0])]
@@ -233,4 +235,3 @@ def energy_parts(result: Result, group: str) -> dict[str, np.ndarray]:
 
 def colour_scale(colours: Sequence[str]) -> list[list[Any]]:
     return [[k / (len(colours) - 1), colour] for k, colour in enumerate(colours)]
-

@@ -334,7 +334,6 @@ class Result:
             text += f"last zones {_joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
 
-
     def _repr_html_(self) -> str:
         """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
         try:

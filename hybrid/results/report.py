@@ -20,7 +20,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.results.card import picture
-from hybrid.results.facts import CAUSES, Fact, amount, attention, facts_of
+from hybrid.results.facts import CAUSES, Fact, amount, attention, facts_of, short
 from hybrid.results.figures import energy, energy_parts, histories, ranges
 from hybrid.results.look import prefix
 from hybrid.results.read import Result
@@ -95,12 +95,14 @@ def _check_target(target: Path) -> None:
     if target.is_dir():
         raise ResultError(f"{target} is a folder\n    try:      name a file in it, such as {target / 'run.html'}")
     if target.exists():
-        with target.open("rb") as file:
-            ours = _MARK in file.read(_HEAD)
-        if target.stat().st_size and not ours:
-            raise ResultError(f"{target} exists and is not a report of hybrid\n    try:      another name, or delete it")
-        if not os.access(target, os.W_OK):
-            raise ResultError(f"{target} exists and is write-protected\n    try:      another name, or delete it")
+        try:
+            with target.open("rb") as file:
+                ours = _MARK in file.read(_HEAD) or target.stat().st_size == 0
+        except OSError:
+            ours = False
+        if not (ours and os.access(target, os.W_OK)):
+            why = "is write-protected" if ours else "is not a report of hybrid"
+            raise ResultError(f"{target} exists and {why}\n    try:      another name, or delete the file yourself")
     if not target.parent.is_dir():
         raise ResultError(f"there is no folder {target.parent}\n    try:      mkdir -p {target.parent}")
 
@@ -168,15 +170,10 @@ def _error_table(fact: Fact) -> str:
     rows = ""
     for what, name, unit in (("position", "position", "m"), ("pull", "pulls at the ends", "N")):
         cells = [fact.values.get(f"{cause}_{what}") for cause in CAUSES]
-        factor, short = prefix(unit, max((x for x in cells if x is not None), default=0.0))
-        said = (f'<td class="number">{"–" if x is None else _two(x * factor)}</td>' for x in cells)
-        rows += f"<tr><td>{name} ({short})</td>{''.join(said)}</tr>"
+        factor, written = prefix(unit, max((x for x in cells if x is not None), default=0.0))
+        said = (f'<td class="number">{"–" if x is None else short(x * factor, 2)}</td>' for x in cells)
+        rows += f"<tr><td>{name} ({written})</td>{''.join(said)}</tr>"
     return f'<div class="scroll"><table><tr><th>largest error by</th>{head}</tr>{rows}</table></div>'
-
-
-def _two(x: float) -> str:
-    """Two digits."""
-    return f"{float(f'{x:.2g}'):g}"
 
 
 def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
@@ -208,7 +205,9 @@ def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
         )
     notice = f'<p class="quiet" id="thinned">{escape(shown.notice)}</p>' if shown.notice else ""
     poster = picture(result).replace("<svg ", '<svg class="poster" ', 1)
-    hint = "Drag to turn, pinch or scroll to zoom." if time else "Drag to turn, pinch or scroll to zoom; a static result."
+    hint = (
+        "Drag to turn, pinch or scroll to zoom." if time else "Drag to turn, pinch or scroll to zoom; a static result."
+    )
     return (
         f'<section id="cable"><h2>The cable</h2><div class="controls">{colour}{axes}</div>'
         f'<div class="plot" id="cable-plot">{poster}</div>{time}<div class="legend" id="cable-legend"></div>'
@@ -312,14 +311,18 @@ def _settings(result: Result) -> str:
     """What was chosen, by the scene or by the program, and with which versions."""
     hidden = {"title", "status", "message", "format", "format_version"}
     given = {k: v for k, v in result.attributes.items() if k not in hidden and not k.startswith(("version_", "error_"))}
-    rows = [(_SETTINGS.get(k, k.replace("_", " ")), f"{v:.6g}" if isinstance(v, float) else v) for k, v in given.items()]
+    rows = [
+        (_SETTINGS.get(k, k.replace("_", " ")), f"{v:.6g}" if isinstance(v, float) else v) for k, v in given.items()
+    ]
     if "steps/dt" in result and len(result["steps/dt"]):
         dt = result["steps/dt"]
         low, high = f"{dt.min():.4g}", f"{dt.max():.4g}"
         rows.append(("steps", f"{len(dt)}, of {low} s" if low == high else f"{len(dt)}, of {low} to {high} s"))
     rows += [("version of " + name, version) for name, version in result.versions.items()]
     cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(str(value))}</td></tr>" for name, value in rows)
-    return f'<details><summary>Settings and versions</summary><div class="scroll"><table>{cells}</table></div></details>'
+    return (
+        f'<details><summary>Settings and versions</summary><div class="scroll"><table>{cells}</table></div></details>'
+    )
 
 
 def _footer() -> str:

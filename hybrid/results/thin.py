@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,8 +58,7 @@ def outline(values: np.ndarray, most: int = MOST_ON_CURVE) -> np.ndarray:
     if n <= most:
         return np.arange(n)
     bounds = np.linspace(0, n, most // 2 + 1).astype(int)
-    ends = zip(bounds[:-1], bounds[1:], strict=True)
-    found = [a + x for a, b in ends for x in (values[a:b].argmin(), values[a:b].argmax())]
+    found = [a + x for a, b in pairwise(bounds) for x in (values[a:b].argmin(), values[a:b].argmax())]
     return np.unique([0, *found, n - 1])
 
 

@@ -167,5 +167,3 @@ def shares(result: Result) -> str:
     if not changes:
         return f"{low:.3g} % of the cable is rod, all the time." if len(result.times) > 1 else f"{low:.3g} % is rod."
     return f"Rod is {low:.3g} to {high:.3g} % of the cable; zones changed at {changes} outputs."
-
-

@@ -255,7 +255,8 @@
     for (const element of seen) if (graphs.has(element)) follow(element, graphs.get(element));
   };
   const go = (t) => { stop(); show(nearest(t)); };
-  const places = times.length > 1 ? Math.min(Math.max(1 - Math.floor(Math.log10((times.at(-1) - times[0]) / times.length)), 0), 6) : 3;
+  const pause = times.length > 1 ? (times.at(-1) - times[0]) / (times.length - 1) : 1;
+  const places = Math.min(Math.max(1 - Math.floor(Math.log10(pause) + 1e-9), 0), 6);
 
   let last = 0;
   const tick = (now) => {
