@@ -48,7 +48,7 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(clone)
     found = list(commands())
-    assert {arguments[0] for arguments in found} == {"run", "plan", "static", "plot", "schema", "trade"}
+    assert {arguments[0] for arguments in found} == {"run", "plan", "static", "plot", "report", "schema", "trade"}
     for arguments in found:
         with pytest.raises(SystemExit) as left:
             main(arguments)

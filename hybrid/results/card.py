@@ -147,7 +147,7 @@ def _strip(result: Result, top: float) -> str:
             y = y0 + _STRIP * (s[-1] - zone.s_b) / length
             size = f'width="{x[k + n] - x[k] + 0.3:.1f}" height="{_STRIP * (zone.s_b - zone.s_a) / length:.1f}"'
             colour = KIND_COLOURS.get(zone.kind, INK)
-            parts.append(f'<rect x="{x[k]:.1f}" y="{y:.1f}" {size} fill="{colour}" fill-opacity="0.75"/>')
+            parts.append(f'<rect x="{x[k]:.1f}" y="{y:.1f}" {size} fill="{colour}"/>')
         k += n
     foot = f"{y0 + _STRIP + 14:.0f}"
     said = f"zones: s = 0 (below) to {s[-1]:.5g} m, over t = {times[0]:.5g} … {times[-1]:.5g} s"

@@ -26,8 +26,8 @@ sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not 
 QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 QUIET += ("--disable-component-update", "--disable-sync")
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend 1.05 > 1 at s = 49 to 51 m"), (7.0, 0.0, 100.0, "snap", "a <b>blow</b>")]
-# On two free cores it takes 1.4 s, most of it plotly and the software WebGL of a machine without graphics; tests run
-# beside others, so the bound here is a generous one.  docs/report.md has the figures.
+# It takes 2 to 3 s, most of it to start plotly and the WebGL of a machine without graphics; tests run beside others, so
+# the bound here is a generous one.  The timing (-m bench) below has the strict one.
 OPEN_WITHIN = 15.0
 
 
@@ -246,8 +246,15 @@ def test_the_report_of_a_touchdown_opens_in_three_seconds(browser: Any, tmp_path
     begin = time.perf_counter()
     file = write_report(hybrid.run(scene, progress=False), tmp_path / "touchdown.html")
     wrote = time.perf_counter() - begin
-    seconds = sorted(Visit(browser, file).seconds for _ in range(5))
+    visits = sorted((Visit(browser, file) for _ in range(5)), key=lambda visit: visit.seconds)
+    marks = "Object.fromEntries(performance.getEntriesByType('mark').map(m => [m.name, m.startTime / 1000]))"
+    when = visits[2].page.evaluate(marks)
+    seconds = [visit.seconds for visit in visits]
     size = file.stat().st_size
     print(f"\nreport of 100 s of touchdown: {size / 1e6:.2f} MB, run and written in {wrote:.1f} s, opens in", end=" ")
-    print(f"{seconds[2]:.2f} s (median of 5, {seconds[0]:.2f} to {seconds[-1]:.2f} s)")
+    print(
+        f"{seconds[2]:.2f} s (median of 5, {seconds[0]:.2f} to {seconds[-1]:.2f} s): text after {when['text']:.2f} s,"
+    )
+    print(f"unpacked in {when['unpacked'] - when['text']:.2f} s, plotly started in", end=" ")
+    print(f"{when['plotly'] - when['unpacked']:.2f} s, cable drawn in {when['ready'] - when['plotly']:.2f} s")
     assert size <= 8e6 and seconds[2] <= 3.0

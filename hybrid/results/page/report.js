@@ -28,10 +28,13 @@
 
   let numbers;
   try {
+    performance.mark("text");
     numbers = await unpacked("data");
     const script = document.createElement("script");
     script.textContent = new TextDecoder().decode(await unpacked("plotly"));
+    performance.mark("unpacked");
     document.head.append(script);
+    performance.mark("plotly");
     for (const id of ["data", "plotly"]) byId(id).textContent = "";  // their memory is wanted elsewhere
     if (!window.Plotly) throw new Error("plotly did not start");
   } catch (error) {
@@ -182,7 +185,7 @@
     const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
     traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
       marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => m.colour), "#c00000"],
-        size: [...each((m) => 2 * m.size), 28], line: { color: scene.ink, width: 1 }, opacity: 1 },
+        size: [...each((m) => 2 * m.size), 28], line: { color: [...each(() => scene.ink), "#c00000"], width: 1 }, opacity: 1 },
       hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     for (const plane of scene.planes) if (plane.x) {
       traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: [0, 0], j: [1, 2], k: [2, 3], color: plane.fill,
@@ -243,14 +246,16 @@
     while (high - low > 1) { const k = (low + high) >> 1; if (times[k] <= t) low = k; else high = k; }
     return t - times[low] < times[high] - t ? low : high;
   };
+  const sayTime = () => {
+    if (!slider) return;
+    slider.value = String(state.frame);
+    said.textContent = "t = " + state.t.toFixed(places) + " s";
+    slider.setAttribute("aria-valuetext", said.textContent);
+  };
   const show = (frame) => {
     state.frame = window.report.frame = frame;
     state.t = times[frame];
-    if (slider) {
-      slider.value = String(frame);
-      said.textContent = "t = " + state.t.toFixed(places) + " s";
-      slider.setAttribute("aria-valuetext", said.textContent);
-    }
+    sayTime();
     if (box3d) moveCable();
     for (const element of seen) if (graphs.has(element)) follow(element, graphs.get(element));
   };
@@ -315,7 +320,8 @@
       place.append(ramp(bar.label, bar.shades, bar.low, bar.high, bar.unit, bar.log));
     }
   }
-  if (box3d && scene) { say3d(); await drawCable(); show(0); }
+  sayTime();
+  if (box3d && scene) { say3d(); await drawCable(); }
   const places2d = [...document.querySelectorAll(".plot[data-figure]")];
   const figureOf = (element) => index.figures[Number(element.dataset.figure)];
   const watcher = new IntersectionObserver((entries) => {
@@ -328,5 +334,6 @@
   }, { rootMargin: "300px" });
   for (const element of places2d) watcher.observe(element);
   addEventListener("beforeprint", () => places2d.forEach((element) => drawGraph(element, figureOf(element))));
+  performance.mark("ready");
   window.report.ready = true;
 })();
