@@ -211,7 +211,8 @@ def _tension(ax: Axes, result: Result) -> list[tuple[Any, Any]]:
     ax.fill_between(s, tension.min(axis=0) * factor, tension.max(axis=0) * factor, color=GREY, alpha=0.18, linewidth=0)
     style(ax, "tension, and its range over all times", "s (m)", f"tension ({unit})")
     ax.title.set_fontsize(NORMAL)
-    ax.set_xlim(s[0], s[-1])
+    if len(s) > 1:
+        ax.set_xlim(s[0], s[-1])
     line = LineCollection([], linewidths=1.8, zorder=3)
     ax.add_collection(line, autolim=False)
 

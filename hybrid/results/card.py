@@ -10,7 +10,7 @@ from itertools import groupby
 
 import numpy as np
 
-from hybrid.results.facts import attention, facts_of
+from hybrid.results.facts import attention, facts_of, length_of
 from hybrid.results.look import ALARM, BED, BODY, GREY, INK, KIND_COLOURS, LEVEL, SAND, WATER
 from hybrid.results.read import Result, Zone
 from hybrid.results.thin import even
@@ -30,7 +30,7 @@ def card(result: Result) -> str:
     good = result.status == "complete"
     n, s = len(result.times), result.s
     span = f"t = {result.times[0]:.6g} … {result.times[-1]:.6g} s" if n > 1 else "static" if n and good else ""
-    head = f"{n} output{'s' * (n != 1)}" + f", {span}" * bool(span) + f"; {len(s)} points on {s[-1] - s[0]:.6g} m"
+    head = f"{n} output{'s' * (n != 1)}" + f", {span}" * bool(span) + f"; {len(s)} points on {length_of(result):.6g} m"
     status = result.status if good else result.status_text.splitlines()[0]
     colour = GREY if good else ALARM
     rows = [(f.title, f.text) for f in facts if f.key in _SHOWN and f.weight != "absent"]

@@ -67,10 +67,16 @@ def short(value: float, digits: int) -> str:
 
 def place(result: Result, s: float) -> str:
     """An arc length in words: "at the start", "at the end (s = 250 m)", "at s = 85 m"."""
-    first, last = float(result.s[0]), float(result.s[-1])
-    if s == first:
+    length = length_of(result)
+    if s <= 1e-9 * length:
         return f"at the start (s = {s:.4g} m)"
-    return f"at the end (s = {s:.5g} m)" if s == last else f"at s = {s:.4g} m"
+    return f"at the end (s = {s:.5g} m)" if s >= (1.0 - 1e-9) * length else f"at s = {s:.4g} m"
+
+
+def length_of(result: Result) -> float:
+    """Length of the line, m; its output points may cover only a part of it."""
+    last = result.zones[-1] if len(result.times) else []
+    return last[-1].s_b if last else float(result.s[-1])
 
 
 def moment(result: Result, t: float) -> str:
@@ -222,7 +228,9 @@ def _slack(result: Result) -> Fact:
         return Fact("slack", title, text, "note", values, t, s)
     if least <= zero:
         return Fact("slack", title, f"Zero, {there}; nowhere is the cable compressed.", "plain", values, t, s)
-    text = f"{amount(least, 'N')} {there}: the cable is taut everywhere{' and always' * (len(result.times) > 1)}."
+    covered = float(np.ptp(result.s)) >= 0.999 * length_of(result)
+    where = "everywhere" if covered else "at all points that were saved"
+    text = f"{amount(least, 'N')} {there}: the cable is taut {where}{' and always' * (len(result.times) > 1)}."
     return Fact("slack", title, text, "plain", values, t, s)
 
 

@@ -20,7 +20,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.results.card import picture
-from hybrid.results.facts import CAUSES, Fact, amount, attention, facts_of, short
+from hybrid.results.facts import CAUSES, Fact, amount, attention, facts_of, length_of, short
 from hybrid.results.figures import energy, energy_parts, histories, ranges
 from hybrid.results.look import prefix
 from hybrid.results.read import Result
@@ -128,7 +128,7 @@ def _subtitle(result: Result, shown: Kept) -> str:
     n, s = len(result.times), result.s
     outputs = "no output" if n == 0 else "static, one output" if n == 1 and result.status == "complete" else ""
     outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {result.times[-1]:.6g} s"
-    size = f"{s[-1] - s[0]:.6g} m of cable, {len(s)} points"
+    size = f"{length_of(result):.6g} m of cable, {len(s)} point{'s' * (len(s) != 1)}"
     made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
     computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
     return f"{outputs}; {size}; {computed}"

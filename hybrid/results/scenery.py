@@ -76,12 +76,13 @@ def _colours(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
             {"key": "zone", "label": "zone", "values": store.add(of, "u1"), "scale": steps, "legend": legend}
             | {"low": -0.5, "high": len(kinds) - 0.5}
         )
+    straight = STILL / (float(np.ptp(result.s)) or 1.0)
     for name, shades in (("tension", COLOURS["catenary"]), ("curvature", COLOURS["rod"])):
         if name not in result:
             continue
         values = result[name]
         factor, unit = prefix(result.units[name], float(np.abs(values).max()))
-        low, high, log = span_of(values * factor, bends=name == "curvature", straight=STILL / float(np.ptp(result.s)))
+        low, high, log = span_of(values * factor, bends=name == "curvature", straight=straight * factor)
         out.append(
             {"key": name, "label": f"{name} ({unit})", "values": store.add(values[rows] * factor), "unit": unit}
             | {"scale": colour_scale(shades[_FROM_SHADE:]), "low": low, "high": high, "log": log}
@@ -99,7 +100,9 @@ def _kinds(zones: list[Any], kinds: list[str], s: np.ndarray) -> np.ndarray:
 def span_of(values: np.ndarray, *, bends: bool, straight: float = 0.0) -> tuple[float, float, bool]:
     """From where to where colours run, and whether by the logarithm: bends that span much; tension from zero."""
     seen = values[np.isfinite(values)]
-    low, high = (float(seen.min()), float(seen.max())) if len(seen) else (0.0, 1.0)
+    if not len(seen):
+        return 0.0, 1.0, False
+    low, high = float(seen.min()), float(seen.max())
     if bends:
         if high <= straight:
             return 0.0, straight or 1.0, False

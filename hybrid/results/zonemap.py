@@ -17,7 +17,7 @@ from hybrid.results.read import Event, Result
 from hybrid.results.scenery import span_of
 from hybrid.results.thin import Kept, Store, outline
 from hybrid.results.views import STILL, free_edges
-from hybrid.results.zoneplot import COLOURS, SHOWN, cells_of, outlines
+from hybrid.results.zoneplot import COLOURS, SHOWN, cells_of, outlines, rod_share
 
 _MOST_CELLS = 150_000  # of the map: a browser colours so many at once
 _MOST_MARKS = 600  # events on the map; the worst stay
@@ -42,7 +42,7 @@ def zone_map(result: Result, store: Store, shown: Kept) -> list[Spec]:
             continue
         factor, unit = prefix(result.units[name], float(np.abs(result[name]).max()))
         values = cells.values(kind, result[name][rows]).filled(np.nan) * factor
-        straight = factor * STILL / float(np.ptp(result.s))
+        straight = factor * STILL / (float(np.ptp(result.s)) or 1.0)
         low, high, log = span_of(values, bends=kind == "rod", straight=straight)
         stored = store.add(values)
         data.append(
@@ -160,8 +160,7 @@ def shares(result: Result) -> str:
     """How much of the cable was rod, in a sentence."""
     if len(result.times) < 1 or not any(result.zones):
         return ""
-    part = np.array([sum(z.s_b - z.s_a for z in zones if z.kind == "rod") for zones in result.zones])
-    part = 100.0 * part / float(result.s[-1] - result.s[0])
+    part = 100.0 * rod_share(result)
     low, high = float(part.min()), float(part.max())
     changes = sum(a != b for a, b in pairwise(result.zones))
     if not changes:

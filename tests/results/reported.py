@@ -31,13 +31,14 @@ def reported(
     events: Sequence[tuple[float, float, float, str, str]] = (),
     points: int = POINTS,
     dip: float = 0.0,
+    span: tuple[float, float] = (0.0, LENGTH),
 ) -> Result:
     """A line that swings on 0 <= s <= 100 m, 0 <= t <= 10 s.
 
     Tension 10 kN (1 + s/100 + 0.1 sin(2 pi t / 10)): largest at the end, t = 2.5 s; dip: N taken away in the middle at
-    t = 5 s; curvature 0.02 1/m at s = 50 m, t = 2.5 s; rod from 40 to 60 m after half the time, with EI 2000 N m^2.
+    t = 5 s; span: where output points are, m; curvature 0.02 1/m at s = 50 m, t = 2.5 s; rod from 40 to 60 m after half the time, with EI 2000 N m^2.
     """
-    s = np.linspace(0.0, LENGTH, points)
+    s = np.linspace(*span, points)
     scalar: dict[str, str] = {"tension": "N", "curvature": "1/m"}
     if rod:
         scalar |= {"bending_moment": "N m", "torque": "N m"}

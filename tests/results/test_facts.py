@@ -51,6 +51,12 @@ def test_slack_says_where_when_how_often_and_how_long() -> None:
     assert slack.weight == "note" and "at 1 of 21 outputs, at most 2.5 m of it" in slack.text
 
 
+def test_points_on_a_part_of_the_line_are_not_taken_for_all_of_it() -> None:
+    part = reported(span=(10.0, 90.0))
+    assert "at s = 90 m" in fact(part, "tension").text and "at s = 10 m" in fact(part, "slack").text
+    assert "at all points that were saved" in fact(part, "slack").text
+
+
 def test_torque_is_held_against_greenhills_criterion() -> None:
     """T > M^2 / (4 EI): of 2000 N m, 500 N are needed in the rods, where at least 12.9 kN are there."""
     found = fact(reported(torque=2000.0), "hockling")

@@ -65,6 +65,8 @@ CASES: dict[str, dict[str, Any]] = {
     "bare and static": {"rod": False, "seabed": False, "energy": False, "outputs": 1},
     "interrupted": {"status": "interrupted", "message": "stopped from outside"},
     "failed": {"status": "failed", "message": "it diverged\n    try:      smaller steps", "outputs": 4},
+    "a point": {"points": 1},
+    "two points": {"points": 2},
     "long": {"outputs": 1501, "points": 301},
 }
 
