@@ -25,7 +25,7 @@ from hybrid.results.figures import energy, energy_parts, histories, ranges
 from hybrid.results.look import prefix
 from hybrid.results.read import Result
 from hybrid.results.scenery import scenery
-from hybrid.results.thin import Kept, Store, kept, script_json
+from hybrid.results.thin import MOST_ON_CURVE, Kept, Store, kept, script_json
 from hybrid.results.zonemap import event_rows, shares, zone_map
 
 _MARK = b"<!-- hybrid report -->"
@@ -225,6 +225,8 @@ def _graphs(result: Result, groups: dict[str, list[tuple[int, dict[str, Any]]]],
         figures = "".join(_figure(k, f) for k, f in groups["histories"])
         bands = any("errors/total" in name for name in result.names)
         note = "Bands are the estimated error." if bands else "Errors were not estimated, so there are no bands."
+        if max(len(result.times), len(result["steps/t"]) if "steps/t" in result else 0) > MOST_ON_CURVE:
+            note += " Long curves are drawn by the lowest and highest value of every short stretch."
         text = f'<p class="quiet">{note} Click a graph to set the time.</p>'
         out += f'<section id="histories"><h2>Over time</h2>{text}<div class="grid">{figures}</div></section>'
     if groups["ranges"]:

@@ -59,8 +59,19 @@ def zone_map(result: Result, store: Store, shown: Kept) -> list[Spec]:
         )
     data += _lines(result, store, cells)
     data += _events(result, store)
-    figure = {"key": "zones", "title": "Zones over time", "data": data, "bars": bars, "cursor": True, "tall": True}
+    figure: Spec = {
+        "key": "zones",
+        "title": "Zones over time",
+        "data": data,
+        "bars": bars,
+        "cursor": True,
+        "tall": True,
+    }
     figure["said"] = "What kind of model holds where and when. Point at a mark, or tap it, to read what happened."
+    if len(frames) < len(shown.frames):
+        figure["said"] += f" {len(frames)} of {len(result.times)} outputs are drawn."
+    if len(result.events) > _MOST_MARKS:
+        figure["said"] += f" Of {len(result.events)} events the {_MOST_MARKS} that matter most are marked."
     look = layout("t (s)", "s (m)", hovermode="closest")
     look["xaxis"] |= {"range": [float(cells.t[0]), float(cells.t[-1])], "showgrid": False}
     look["yaxis"] |= {"range": [float(cells.s[0]), float(cells.s[-1])], "showgrid": False}

@@ -112,6 +112,7 @@ def test_a_long_run_is_thinned_and_says_so_but_its_extremes_are_exact() -> None:
     short, long = reported(), reported(outputs=1501, points=301)
     assert "To keep this file small" not in html(short)
     page = html(long)
+    assert "Long curves are drawn by the lowest" in page
     scene = index_of(page)["scene"]
     nf, ns = array(page, scene["x"]).shape
     assert nf * ns <= MOST_VALUES + 20 * ns and ns <= 251
@@ -121,6 +122,14 @@ def test_a_long_run_is_thinned_and_says_so_but_its_extremes_are_exact() -> None:
     assert set(when) <= set(scene["times"]), "the moments of the summary are among the frames"
     peak = array(page, highest(page, "tension (kN)")["y"]).max()
     assert peak == pytest.approx(long.tension.max() / 1e3, rel=1e-6)
+
+
+def test_a_map_of_many_events_says_that_it_marks_the_worst() -> None:
+    events = [(0.001 * k, 0.0, 10.0, "snap" if k % 100 == 0 else "grow", f"number {k}") for k in range(2000)]
+    page = html(reported(events=events))
+    assert "Of 2000 events the 600 that matter most are marked." in page and "1600 more are in the result file" in page
+    marks = {t["name"]: t for f in index_of(page)["figures"] for t in f["data"] if t.get("mode") == "markers"}
+    assert len(marks["warning"]["x"]) == 20 and len(marks["change of zones"]["x"]) == 580
 
 
 def test_thinning_keeps_ends_peaks_and_asked_moments() -> None:

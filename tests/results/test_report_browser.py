@@ -1,6 +1,7 @@
 """The report in a browser, without a screen: it opens, moves, explains itself, fits a phone, and complains of nothing.
 
-Needs playwright and a Chromium: named by HYBRID_CHROMIUM, or `chromium`, `chromium-browser` or `google-chrome` on PATH.
+Needs playwright and a Chromium: named by HYBRID_CHROMIUM, or `chromium`, `chromium-browser` or `google-chrome` on PATH,
+or the one of `playwright install chromium`.
 """
 
 from __future__ import annotations
@@ -31,20 +32,24 @@ EVENTS = [(5.5, 40.0, 60.0, "split", "bend 1.05 > 1 at s = 49 to 51 m"), (7.0, 0
 OPEN_WITHIN = 15.0
 
 
-def chromium() -> str:
+def chromium(own: str) -> str:
+    """A Chromium; own: where playwright keeps the one that it can download."""
     named = os.environ.get("HYBRID_CHROMIUM")
     if named and not Path(named).is_file():
         pytest.fail(f"HYBRID_CHROMIUM names {named}, which is no file")
-    found = named or next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
-    if not found:
-        pytest.skip("no Chromium: HYBRID_CHROMIUM is not set, and neither chromium nor google-chrome is on PATH")
+    on_path = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
+    found = named or next(filter(None, on_path), None) or own
+    if not Path(found).is_file():
+        pytest.skip(
+            "no Chromium: not named by HYBRID_CHROMIUM, not on PATH, and `playwright install chromium` not done"
+        )
     return found
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    program = chromium()
     with sync_api.sync_playwright() as play:
+        program = chromium(play.chromium.executable_path)
         opened = play.chromium.launch(executable_path=program, args=list(QUIET))
         yield opened
         opened.close()
