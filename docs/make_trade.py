@@ -30,10 +30,13 @@ HEAD = """\
 What is paid for accuracy, and with which model it costs least: `hybrid trade scene.yaml` runs a ladder of models and
 accuracies on a scene and says which setting to take.
 
-    hybrid trade scene.yaml                      a folder scene.trade with trade.md, trade.csv and trade.png
-    hybrid trade scene.yaml --for "3 cm"         the cheapest setting for this accuracy
-    hybrid trade scene.yaml --models rod,adaptive --accuracies 3%,1% --repeat 3
-    hybrid trade scene.yaml --peers              other programs as well, those that are installed and can do the scene
+<!-- not run in CI: whole ladders, and other programs, take minutes; the README runs a short one -->
+```bash
+hybrid trade scene.yaml                      # a folder scene.trade with trade.md, trade.csv and trade.png
+hybrid trade scene.yaml --for "3 cm"         # the cheapest setting for this accuracy
+hybrid trade scene.yaml --models rod,adaptive --accuracies 3%,1% --repeat 3
+hybrid trade scene.yaml --peers              # other programs as well, those that are installed and can do the scene
+```
 
 Every run is compared with a rod everywhere, at an accuracy of 0.03 % (or a third of the finest on the ladder). How
 converged that is, its own error figure says, and a run of the same model that was asked for three times its error.
@@ -51,15 +54,19 @@ median of three.
 A finished run is kept in the folder `runs`, under a hash of the scene, the model, the accuracy and the package: a
 second call makes those that are missing, after Ctrl-C for instance. In Python:
 
-    table = hybrid.trade(hybrid.load_scene("scene.yaml"), "scene.trade")
-    table.recommended, table.front(), table.rows
+```python
+import hybrid
+
+scene = hybrid.load_scene("examples/s_tether.yaml", ["time.duration=6"])
+table = hybrid.trade(scene, "s_tether.trade", models=["catenary", "rod"], accuracies=["10%"], asked_for="10%")
+print(table.recommendation)
+print(table.recommended, table.front(), table.rows)
+```
 
 Other programs run in processes of their own (`hybrid/peers/` has an adapter for each): a uniform line between two
 points that are held or moved, in still water, on a level seabed. Their CPU time holds their search for the rest, too.
 
-The sections below are the pages that the program has written for example scenes:
-
-    python docs/make_trade.py
+The sections below are the pages that the program has written for example scenes, by `python docs/make_trade.py`.
 """
 
 

@@ -20,14 +20,16 @@ if TYPE_CHECKING:
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.ladder import trade
     from hybrid.model.plan import plan
+    from hybrid.results.export import export
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
     from hybrid.results.report import write_report as report
     from hybrid.results.zoneplot import plot_zones
+    from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.simulate import run, static
+    from hybrid.simulate import resume, run, static
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -38,6 +40,8 @@ _HOME = {
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
+    "export": ("hybrid.results.export", "export"),
+    "import_moordyn": ("hybrid.scene.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "open": ("hybrid.results.read", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
@@ -45,6 +49,7 @@ _HOME = {
     "plot": ("hybrid.results.plot", "plot_summary"),
     "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
     "report": ("hybrid.results.report", "write_report"),
+    "resume": ("hybrid.simulate", "resume"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulate", "static"),
@@ -61,6 +66,8 @@ __all__ = [
     "ResultError",
     "Scene",
     "SceneError",
+    "export",
+    "import_moordyn",
     "load_scene",
     "open",
     "parse_scene",
@@ -68,6 +75,7 @@ __all__ = [
     "plot",
     "plot_zones",
     "report",
+    "resume",
     "run",
     "scene_text",
     "static",

@@ -316,7 +316,8 @@ class Climb:
     """Chooses efforts until what is asked is met.
 
     asked: None asks for an error figure alone.  sketch: computes with an effort, for comparison; result: computes
-    the result; both raise ComputationError.
+    the result; both raise ComputationError.  What it has found until then is in the file of every result (`freeze`
+    leaves out what computes), so that a climb that was cut off goes on with `go_on`.
     """
 
     asked: Asked | None
@@ -326,9 +327,16 @@ class Climb:
     moves: bool  # whether there is a time
     sketch: Callable[[Effort], Sketch]
     result: Callable[[Effort], Sketch]
-    runs: list[Sketch] = field(default_factory=list)
+    runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
+    next: Effort | None = None  # of the result that is to be computed
+    coarse: tuple[Sketch, Sketch | None, Sketch | None] | None = None  # what the first result is compared with
     estimate: Estimate | None = None  # of the result as it is
+    _ratio: float = np.inf  # of the error of the result to what is asked, and how that has changed
+    _finer: int = 0  # results that were judged
     _notes: list[tuple[str, str]] = field(default_factory=list)
+
+    def __getstate__(self) -> dict[str, object]:
+        return {name: x for name, x in vars(self).items() if name not in ("sketch", "result")}
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
@@ -338,65 +346,88 @@ class Climb:
 
     def stopped(self) -> tuple[Sketch, Errors]:
         """The result before a finer run that was stopped from outside, and its errors."""
-        assert self.estimate is not None and self.asked is not None
-        found = self.estimate
-        verdict = judge(self.asked, found.errors, found.run)
-        self._notes.append(("accuracy missed", f"{verdict.text}; a finer run was stopped from outside"))
-        return found.run, found.errors
+        return self._kept("a finer run was stopped from outside")
 
     def reach(self, effort: Effort) -> tuple[Sketch, Errors | None]:
         """From a first effort to the result and its errors, None where they cannot be told."""
-        coarse = self._coarse(effort)
-        final = self._counted(self.result(effort))
-        if coarse is None:
+        self.coarse, self.next = self._coarse(effort), effort
+        return self.go_on()
+
+    def go_on(self) -> tuple[Sketch, Errors | None]:
+        """The same from the next result on."""
+        while self.next is not None:
+            effort = self.next
+            try:
+                final = self._counted(self.result(effort))
+            except ComputationError as error:
+                if self.estimate is None:
+                    raise
+                return self._kept(f"a finer run failed: {str(error).splitlines()[0]}")
+            if self.estimate is not None:
+                stricter = effort.zones < self.estimate.run.effort.zones
+                self.estimate.follow(final)
+                if stricter:
+                    self._model_anew(self.estimate, effort)
+            elif not self._compared(final):
+                return final, None
+            self.next = self._better()
+        assert self.estimate is not None
+        errors = self.estimate.errors
+        if self.asked is not None:
+            verdict = judge(self.asked, errors, self.estimate.run)
+            if verdict.ratio > 1.0:
+                self._missed(verdict)
+        return self.estimate.run, errors
+
+    def _compared(self, final: Sketch) -> bool:
+        """Compare the first result with the coarser runs; whether they say anything."""
+        if self.coarse is None:
             self._notes += final.notes
-            return final, None
-        self.estimate = estimate = Estimate(final, *coarse)
+            return False
+        estimate = Estimate(final, *self.coarse)
         if not estimate.cells:
             text = f"no error figure: {final.cells} cells are so few that there is nothing coarser to compare with"
             self._notes.append(("no error figure", text))
-            return final, None
+            self._notes += [*final.notes, *estimate.notes]
+            return False
         if self.moves and not estimate.late:
             text = (
                 "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
             )
             self._notes.append(("error uncertain", f"{text}; the error may be larger; leave time.step out"))
-        before = np.inf
-        for k in range(MOST_RUNS + 1):
-            errors = estimate.errors
-            if self.asked is None:
-                return final, errors
-            verdict = judge(self.asked, errors, final)
-            falls = verdict.ratio / before  # 0 for the first
-            last = k == MOST_RUNS or falls > STALLED or verdict.ratio * falls ** (MOST_RUNS - k) > 1.0
-            before = verdict.ratio
-            met = verdict.ratio <= 1.0
-            if met and not (final.unresolved and self.mesh_is_free):
-                return final, errors
-            better = None
-            if not (last or self._spent()):
-                better = finer(final.effort, verdict, self.mesh_is_free, self.steps_are_free, self.zones_are_free)
-            if better is None:
-                return final, errors if met else self._missed(verdict, errors)
-            stricter = better.zones < final.effort.zones
-            try:
-                final = self._counted(self.result(better))
-            except ComputationError as error:
-                failed = f"a finer run failed: {str(error).splitlines()[0]}"
-                if not met:
-                    self._notes.append(("accuracy missed", f"{verdict.text}; {failed}"))
-                return final, errors
-            estimate.follow(final)
-            if stricter:
-                self._model_anew(estimate, better)
-        raise AssertionError("unreachable: the last of the loop returns")
+        self.estimate, self.coarse = estimate, None
+        return True
+
+    def _better(self) -> Effort | None:
+        """The effort of the next result; None: what is asked is met, or more of it would not help."""
+        assert self.estimate is not None
+        if self.asked is None:
+            return None
+        run, before = self.estimate.run, self._ratio
+        verdict = judge(self.asked, self.estimate.errors, run)
+        self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
+        self._finer += 1
+        left = MOST_RUNS + 1 - self._finer
+        last = left == 0 or falls > STALLED or verdict.ratio * falls**left > 1.0
+        if (verdict.ratio <= 1.0 and not (run.unresolved and self.mesh_is_free)) or last or self._spent():
+            return None
+        return finer(run.effort, verdict, self.mesh_is_free, self.steps_are_free, self.zones_are_free)
+
+    def _kept(self, why: str) -> tuple[Sketch, Errors]:
+        """The result as it is, where a finer one did not come to its end."""
+        assert self.estimate is not None and self.asked is not None
+        run, errors = self.estimate.run, self.estimate.errors
+        verdict = judge(self.asked, errors, run)
+        if verdict.ratio > 1.0:
+            self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
+        return run, errors
 
     def _spent(self) -> bool:
         """Whether so much has been computed that more of it should be asked for."""
-        return sum(run.cpu for run in self.runs) > MOST_CPU
+        return sum(self.runs) > MOST_CPU
 
     def _counted(self, run: Sketch) -> Sketch:
-        self.runs.append(run)
+        self.runs.append(run.cpu)
         return run
 
     def _coarse(self, effort: Effort) -> tuple[Sketch, Sketch | None, Sketch | None] | None:
@@ -426,7 +457,7 @@ class Climb:
             text = f"the effect of bending that is left out is that of a run before: {str(error).splitlines()[0]}"
             self._notes.append(("error uncertain", text))
 
-    def _missed(self, verdict: Verdict, errors: Errors) -> Errors:
+    def _missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
         main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
         free = {"mesh": self.mesh_is_free, "time step": self.steps_are_free, "model": self.zones_are_free}[main]
@@ -436,7 +467,6 @@ class Climb:
             try_ = "model: adaptive, or rod"
         text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"
         self._notes.append(("accuracy missed", text))
-        return errors
 
 
 def summary(errors: Errors) -> dict[str, float]:

@@ -14,9 +14,10 @@ import numpy as np
 
 from hybrid.model.plan import output_times
 from hybrid.model.state import Floats
+from hybrid.results.format import Field
 from hybrid.results.probes import PROBES, output_points
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.record import Recorder
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.solve.shooting import ShootingState, simulate, static
@@ -77,7 +78,7 @@ def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: t
     ]
     return Recorder(
         target, grid_s=s, fields=fields, step_fields=steps, attributes={"title": scene.title, "solver": "shooting"},
-        scene_text=scene_text(scene), overwrite=overwrite,
+        texts={"scene": scene_text(scene)}, overwrite=overwrite,
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""The command line: hybrid run | static | plan | plot | report | trade | schema.
+"""The command line: hybrid run | resume | static | plan | plot | report | export | trade | import | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -28,6 +28,7 @@ from hybrid.said import (
     equilibrium_table,
     errors_facts,
     errors_table,
+    import_said,
     judged,
     plan_table,
     trade_table,
@@ -61,6 +62,17 @@ def _numbers(text: str) -> list[float]:
 
 def _words(text: str) -> list[str]:
     return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def _window(text: str) -> tuple[float | None, float | None]:
+    first, colon, last = text.partition(":")
+    try:
+        window = (float(first) if first.strip() else None, float(last) if last.strip() else None)
+    except ValueError:
+        colon = ""
+    if not colon:
+        raise typer.BadParameter(f"'{text}' is no window of time such as 20:60, 20: or :60")
+    return window
 
 
 def _flag(*names: str, help: str) -> Any:
@@ -106,27 +118,38 @@ def run(
         duration = asked.require_time().duration
         target = say.will_write(output or Path(f"{scene.stem}.h5"))
         cold = say.compiling(_kernels(asked))
-        from hybrid.live import span, speed
-
         begin = clock.perf_counter()
         with say.progress() as tell:
             result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
-        wall = clock.perf_counter() - begin
-        picture = _draw(result, target.with_suffix(".png")) if plot else None
-        steps = len(result["steps/t"]) if "steps/t" in result else 0
-        pace = "compilation included" if cold else f"{speed(duration / wall)} x real time"
-        text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
-        say.events(result.events)
-        facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
-        if facts:
-            say.show(lambda: zones_said(facts, target))
-        errors = errors_facts(result)
-        if errors:
-            say.show(lambda: errors_table(errors, result))
-        else:
-            text += "; error not estimated"
-        facts |= {"errors": errors}
-        say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
+        _ended(say, asked, result, target, clock.perf_counter() - begin, duration, cold, plot)
+
+
+@app.command()
+def resume(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to go on with.", show_default=False)],
+    output: Annotated[Path | None, _output("Another file; else the same.")] = None,
+    until: Annotated[float | None, typer.Option(metavar="T", help="Go on until then (s).")] = None,
+    settings: Annotated[
+        list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Other currents, waves, motions, loads ..")
+    ] = None,
+    start: Annotated[
+        float | None, typer.Option("--from", metavar="T", help=".. from then on (s); else from where it is.")
+    ] = None,
+    plot: Drawn = False, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Go on with a run that was stopped, beyond its end, or with other loads."""
+    with _speaking(as_json, quiet) as say:
+        from hybrid.remainder import remainder
+
+        say.source = str(result)
+        target, changed = say.will_write(output or result), settings or []
+        left = remainder(result.resolve(), until, changed, start)
+        cold = say.compiling(_kernels(left.scene))
+        begin = clock.perf_counter()
+        with say.progress() as tell:
+            more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=tell)
+        computed = left.scene.require_time().duration - left.reached
+        _ended(say, left.scene, more, target, clock.perf_counter() - begin, computed, cold, plot)
 
 
 @app.command()
@@ -216,6 +239,32 @@ def report(
 
 
 @app.command()
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to export.", show_default=False)],
+    output: Annotated[Path | None, _output("FILE.nc, .csv or .vtkhdf; else RUN.nc ..")] = None,
+    format: Annotated[
+        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else what FILE says.")
+    ] = None,
+    at: Annotated[Any, typer.Option(metavar="S,S,..", parser=_numbers, help="Only at these arc lengths (m).")] = None,
+    names: Annotated[Any, typer.Option(metavar="NAME,..", parser=_words, help="Only these fields or groups.")] = None,
+    times: Annotated[Any, typer.Option(metavar="A:B", parser=_window, help="Only from A to B (s).")] = None,
+    keep: Annotated[bool, _flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue."""
+    from hybrid.results.export import beside
+
+    with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
+        target = output or beside(result, format)
+        made = hybrid.export(opened, target, format=format, names=names, times=times, at=at, overwrite=not keep)
+        for text in made.notes:
+            say.json("note", text=text)
+            say.note(f"note: {text}")
+        status = "" if opened.status == "complete" else f"; {opened.status_text}"
+        say.done(made.text + status, *made.files, status=opened.status, notes=list(made.notes))
+
+
+@app.command()
 def trade(
     context: typer.Context, scene: SceneFile,
     output: Annotated[
@@ -257,6 +306,31 @@ def trade(
         say.done(f"{len(table.rows)} runs", *files, **facts)
 
 
+@app.command("import")
+def import_(
+    deck: Annotated[Path, typer.Argument(metavar="DECK", help="A MoorDyn input file.", show_default=False)],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="SCENE.yaml|FOLDER", help="Else this folder.")
+    ] = None,
+    line: Annotated[int | None, typer.Option(metavar="ID", help="Only the cable with this line.")] = None,
+    overwrite: Annotated[bool, _flag("--overwrite", help="Replace scenes that are there.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Make scenes of a MoorDyn deck, one for each cable, and say what could not be carried over."""
+    with _speaking(as_json, quiet) as say:
+        say.source = str(deck)
+        made = hybrid.import_moordyn(deck, line)
+        files = made.write(output or Path(), overwrite)
+        notes = [("", note) for note in made.notes]
+        notes += [(name, note) for name, scene in made.scenes.items() for note in scene.notes]
+        for name, note in notes:
+            say.json("note", scene=name, **asdict(note))
+        for text in import_said(made):
+            say.note(text)
+        lost = sum(note.kind == "left out" for _, note in notes)
+        say.done(f"{_count(len(files), 'scene')}, {lost} left out", *files, left_out=lost, notes=len(notes))
+
+
 @app.command()
 def schema() -> None:
     """Print the JSON schema of a scene, for editors."""
@@ -279,6 +353,11 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # the reader has gone, as in `hybrid schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = INTERRUPTED
+    record = sys.modules.get("hybrid.results.record")
+    if record is not None and record.ABANDONED:  # HDF5 would crash when Python lets go of them
+        sys.stdout.flush()
+        sys.stderr.flush()
+        os._exit(int(code or 0))
     sys.exit(code)
 
 
@@ -319,6 +398,10 @@ def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
         raise typer.Exit(code)
 
 
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
+
+
 def _kernels(scene: Scene) -> list[str]:
     """What a run of a scene needs compiled, by the last of each family: step, zones, model error."""
     from hybrid.model.effort import wants_errors
@@ -329,6 +412,32 @@ def _kernels(scene: Scene) -> list[str]:
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
         needed.append("correct.follow")
     return needed
+
+
+def _ended(
+    say: Voice, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool, plot: bool
+) -> None:
+    """What there is to say of a run that has come to its end; computed: s of it, just now."""
+    from hybrid.live import span, speed
+
+    picture = _draw(result, target.with_suffix(".png")) if plot else None
+    steps = len(result["steps/t"]) if "steps/t" in result else 0
+    pace = "compilation included" if cold else f"{speed(computed / wall)} x real time"
+    duration = asked.require_time().duration
+    text = f"{duration:.6g} s in {steps} steps, {span(wall)} of wall time ({pace})"
+    if computed < duration:
+        text = f"{duration:.6g} s in {steps} steps, the last {computed:.6g} s in {span(wall)} of wall time ({pace})"
+    say.events(result.events)
+    facts = zones_over_time(result) if asked.model.kind == "adaptive" else {}
+    if facts:
+        say.show(lambda: zones_said(facts, target))
+    errors = errors_facts(result)
+    if errors:
+        say.show(lambda: errors_table(errors, result))
+    else:
+        text += "; error not estimated"
+    facts |= {"errors": errors}
+    say.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
 
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from typing import Protocol
 
 import numpy as np
 
@@ -14,7 +14,11 @@ from hybrid.model.state import Ends, State
 from hybrid.solve.corrector import Corrector, Shift
 from hybrid.solve.timestep import Stepper
 
-Torque = Callable[[Ends, State], float]  # N m, of the whole line as far as its rods do not carry it
+
+class Twisted(Protocol):
+    """Who knows the torque, N m, of the whole line as far as its rods do not carry it."""
+
+    def torque(self, ends: Ends, state: State) -> float: ...
 
 
 def corrector_for(model: Model) -> Corrector:
@@ -27,10 +31,10 @@ def corrector_for(model: Model) -> Corrector:
 class Correction:
     """The error of one run: what is left out now, where it was clipped, and what it makes of every output."""
 
-    def __init__(self, model: Model, torque: Torque | None = None) -> None:
-        """torque: what twists the line, where something else watches that; None: watched here."""
+    def __init__(self, model: Model, twisted: Twisted | None = None) -> None:
+        """twisted: what watches the twist of the line, where something else does; None: watched here."""
         self.model, self.corrector = model, corrector_for(model)
-        self._torque = torque or _TurnOfEnds(model)
+        self._twisted = twisted or _TurnOfEnds(model)
         self.ends = model.ends.values
 
     def begin(self, ends: Ends, state: State, at_rest: bool, rubbed: bool = False) -> None:
@@ -40,12 +44,14 @@ class Correction:
         """
         self.ends, self.corrector.sea = ends, self.model.sea.values
         if at_rest:
-            self.corrector.rest(self.model.sea.values, ends, state, self._torque(ends, state), rubbed)
+            self.corrector.rest(self.model.sea.values, ends, state, self._twisted.torque(ends, state), rubbed)
 
     def step(self, stepper: Stepper, ends: Ends, state: State, dt: float, before: float, rho: float) -> None:
         """After the step of dt, after one of `before`, that led to `state`, before anything else uses the stepper."""
         self.ends = ends
-        self.corrector.step(stepper, self.model.sea.values, ends, state, dt, before, rho, self._torque(ends, state))
+        self.corrector.step(
+            stepper, self.model.sea.values, ends, state, dt, before, rho, self._twisted.torque(ends, state)
+        )
 
     def switch(self, model: Model) -> None:
         """Zones have changed: the error goes on from where it was."""
@@ -83,7 +89,7 @@ class _TurnOfEnds:
         self.free = float(line.h @ cable.kappa[of, 2])
         self.line, self.all_rod, self.twist = line, bool(line.spin.all()), 0.0
 
-    def __call__(self, ends: Ends, state: State) -> float:
+    def torque(self, ends: Ends, state: State) -> float:
         if not self.held or self.all_rod:
             return 0.0
         turn = end_turn(state.e, ends.frame)

@@ -21,7 +21,8 @@ from hybrid.accuracy import (
 from hybrid.adapt.manager import UserCriterion
 from hybrid.adapt.table import CRITERIA
 from hybrid.correction import Correction
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, ResultError
+from hybrid.freeze import freeze, program, thaw
 from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.effort import Effort, mesh_is_free, wants_errors
 from hybrid.model.grade import Grading
@@ -30,11 +31,14 @@ from hybrid.model.properties import allowed_radius, weakest_bending
 from hybrid.model.state import Floats
 from hybrid.motion import Motion
 from hybrid.physics.loads import SEABED, SURFACE
+from hybrid.remainder import Phase, changes_text
 from hybrid.rest import equilibrium_of, zones_and_rest
+from hybrid.results.checkpoint import Checkpoint, read_checkpoint
+from hybrid.results.format import Field
 from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer, output_points
-from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.read import Result, is_result, open_result, opened
+from hybrid.results.record import Recorder
 from hybrid.scene.motion import ramp_ends
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -74,27 +78,91 @@ class Told(Protocol):
 class Job:
     """One scene, computed as often and as finely as it takes."""
 
-    def __init__(self, scene: Scene, criterion: UserCriterion | None) -> None:
-        self.scene, self.criterion = scene, criterion
+    def __init__(self, scene: Scene, criterion: UserCriterion | None, changes: Sequence[Phase] = ()) -> None:
+        """changes: scenes that hold from some time on; what they may differ in, `remainder` has looked at."""
+        self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
         self.told: Told
         self.interrupted: Callable[[], bool] = lambda: False
 
-    def record(self, effort: Effort, target: Path | io.BytesIO) -> Sketch:
-        """Compute the result into a file, or memory; what is to be compared of it."""
+    def record(self, effort: Effort, target: Path | io.BytesIO, climb: bytes = b"") -> Sketch:
+        """Compute the result into a file, or memory; what is to be compared of it.  climb: what was found before."""
         begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
         model, equilibrium, zoning = self._model(effort)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
-        recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium)
+        keeps = climb if isinstance(target, Path) else None
+        recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps, self._texts)
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones held", HELD)
         with recorder:
             correction = _correction(model, zoning)
             motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning, correction)
-            self._move(motion, outputs)
-            recorder.close("complete", f"{motion.steps} steps")
+            motion.save()
+            motion.keep()
+            self._finish(motion, outputs)
+        return self._seen(motion, target, clock.process_time() - begin)
+
+    def go_on(self, source: Path, target: Path) -> Sketch:
+        """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
+        begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
+        with opened(source) as file:
+            point = read_checkpoint(file)
+            if point is None:
+                raise ResultError(f"{source} has no checkpoint\n    try:      run its scene again")
+            motion = self._thawed(point, source)
+            s = output_points(self.scene.output.points, motion.model.length)
+            observer = self._observer(motion.model, motion.zoning, s)
+            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts)
+        now = self.changes[motion.changes - 1].scene if motion.changes else self.scene
+        motion.rejoin(now, observer, recorder, target)
+        with recorder:
+            self._finish(motion, output_times(self.scene))
+        return self._seen(motion, target, clock.process_time() - begin)
+
+    @property
+    def _texts(self) -> dict[str, str]:
+        """What the file says of the scene, and of what changes."""
+        return {"scene": scene_text(self.scene), "changes": changes_text(self.changes)}
+
+    def goes_on(self, source: Path, effort: Effort) -> bool:
+        """Whether a file holds a run with this effort that was cut off."""
+        if not is_result(source):
+            return False
+        with opened(source) as file:
+            point = read_checkpoint(file)
+        return point is not None and point.program == program() and point.effort == freeze(thaw(freeze(effort)))
+
+    def _thawed(self, point: Checkpoint, source: Path) -> Motion:
+        """The motion of a checkpoint.  ResultError: its criterion is missing, or the ends move otherwise."""
+        if point.asks and self.criterion is None:
+            advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
+            raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
+        effort = thaw(point.effort)
+        outside: dict[str, object] = {"recorder": None, "criterion": self.criterion}
+        for n, scene in enumerate((self.scene, *(x.scene for x in self.changes))):
+            outside |= {f"motion {n} {k}": x for k, x in build(scene, effort).ends.motions.items()}
+        motion: Motion = thaw(point.state, outside)
+        was = motion.model.ends.values.position.copy()
+        motion.model.ends.at(motion.t)
+        if not np.array_equal(was, motion.model.ends.values.position):
+            apart = float(np.abs(was - motion.model.ends.values.position).max())
+            detail = f"an end is {apart:.3g} m from where it was at t = {motion.t:.6g} s: has its motion file changed?"
+            raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
+        return motion
+
+    def _finish(self, motion: Motion, outputs: Sequence[float]) -> None:
+        """From where a motion is to its end, and close its file."""
+        self._move(motion, outputs)
+        motion.keep(at_once=True)
+        motion.watch.finish()
+        self.told(motion, finished=True)
+        motion.recorder.close("complete", f"{motion.steps} steps")
+
+    def _seen(self, motion: Motion, target: Path | io.BytesIO, cpu: float) -> Sketch:
+        """What is to be compared of a complete result."""
+        effort, cells, steps = motion.effort, cells_of(motion.model), motion.steps
         if not wants_errors(self.scene):
-            return Sketch(effort, {}, cells_of(model), motion.steps, 0.0)
+            return Sketch(effort, {}, cells, steps, 0.0)
         with open_result(target) as result:
             values = {name: np.array(result[name]) for name in COMPARED if name in result}
             model_error = (
@@ -102,8 +170,7 @@ class Job:
             )
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
             notes = _damped(result) if effort.local is not None else ()
-        spent = clock.process_time() - begin
-        return Sketch(effort, values, cells_of(model), motion.steps, spent, 1, unresolved, model_error, 0.0, notes)
+        return Sketch(effort, values, cells, steps, cpu, 1, unresolved, model_error, 0.0, notes)
 
     def sketch(self, effort: Effort, points: Floats | None = None) -> Sketch:
         """Compute for comparison only; points: places, m, instead of those of the result.
@@ -120,7 +187,9 @@ class Job:
             times = [*times[effort.every - 1 : -1 : effort.every], times[-1]]
         correction = _correction(model, zoning)
         motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning, correction)
+        motion.save()
         self._move(motion, times)
+        self.told(motion, finished=True)
         values = {name: notebook[name] for name in COMPARED if name in notebook}
         model_error = {name.removeprefix(MODEL): notebook[name] for name in notebook.names if name.startswith(MODEL)}
         spent = clock.process_time() - begin
@@ -203,13 +272,20 @@ class Job:
         )  # fmt: skip
 
     def _move(self, motion: Motion, outputs: Sequence[float]) -> None:
+        """From where a motion is to the last output, with what changes on the way."""
+        for t, scene in [(x.t, x.scene) for x in self.changes[motion.changes :]]:
+            self._until(motion, [*(x for x in outputs if x < t), t], set(outputs))
+            motion.change(scene)
+            motion.keep()
+        self._until(motion, outputs, set(outputs))
+
+    def _until(self, motion: Motion, stops_at: Sequence[float], outputs: set[float]) -> None:
         """The loop over time."""
-        breaks = motion.model.ends.breaks
-        stops = {*outputs, *(t for t in breaks if t < outputs[-1])}
+        end, breaks = stops_at[-1], motion.model.ends.breaks
+        stops = {*stops_at, *(t for t in breaks if t < end)}
         if motion.control is not None:
-            stops |= {t for t in ramp_ends(self.scene) if t < outputs[-1]}
-        motion.save()
-        for stop in sorted(stops):
+            stops |= {t for t in ramp_ends(motion.scene) if t < end}
+        for stop in sorted(t for t in stops if t > motion.t):
             for until in motion.ends_of_steps(stop):
                 motion.advance(until)
                 self.told(motion)
@@ -220,8 +296,8 @@ class Job:
                 motion.save()
             if stop in breaks:
                 motion.restart()
-        motion.watch.finish()
-        self.told(motion, finished=True)
+            if stop in outputs:
+                motion.keep()
 
 
 # Energy lost to the scheme that is worth a word, as a part of the largest kinetic energy, and of tension scale times
@@ -252,7 +328,7 @@ def _damped(result: Result) -> tuple[tuple[str, str], ...]:
 
 def _correction(model: Model, zoning: Zoning | None) -> Correction | None:
     """What follows the error of leaving bending out, where that is wanted."""
-    return Correction(model, zoning.torque if zoning else None) if model.follows_error else None
+    return Correction(model, zoning) if model.follows_error else None
 
 
 def _values_at_rest(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
@@ -284,6 +360,8 @@ def _recorder(
     target: Path | io.BytesIO,
     outputs: int,
     found: Equilibrium | None = None,
+    climb: bytes | None = None,
+    texts: Mapping[str, str] | None = None,
 ) -> Recorder:
     """The file of a result; whether it may be replaced was asked before anything was computed."""
     attributes: dict[str, str | float | int] = {
@@ -299,7 +377,8 @@ def _recorder(
         )
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
-        attributes=attributes, scene_text=scene_text(scene), fixed=fixed, outputs=outputs + 1, overwrite=True,
+        attributes=attributes, texts=texts or {"scene": scene_text(scene)}, fixed=fixed,
+        outputs=outputs + 1, overwrite=True, climb=climb,
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "clamp left out", text)
@@ -325,7 +404,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         return
     line = model.line
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
-        if end.kind not in ("clamped", "guided") or line.spin[cell]:
+        if not hasattr(end, "tangent") or line.spin[cell]:
             continue
         s, far = float(line.s[cell]), float(line.s[-1])
         bend = float(model.cable.B[cell, :2].mean())

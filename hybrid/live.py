@@ -154,7 +154,7 @@ class LiveLine:
         self._drawn = True
 
     def _show(self, text: str) -> None:
-        from IPython.display import display  # type: ignore[import-not-found]  # a notebook has it
+        from IPython.display import display  # a notebook has it
 
         if self._display is None:
             self._display = display({"text/plain": text}, raw=True, display_id=True)
@@ -309,6 +309,8 @@ class Voice:
             with hybrid.open(self.written) as result:
                 t = float(result.times[-1]) if len(result.times) else None
             text = f"{self.written} " + ("holds no output yet" if t is None else f"is complete up to t = {t:.6g} s")
+            if t is not None:
+                text += f"; `hybrid resume {self.written}` goes on"
         self.json("done", file=self.written, status="interrupted", t=t)
         self._err.print(f"interrupted; {text}", style="yellow", soft_wrap=True)
 

@@ -6,6 +6,7 @@ import io
 import tempfile
 import time as clock
 from collections.abc import Iterator
+from dataclasses import replace
 from math import sqrt
 from pathlib import Path
 from typing import Any
@@ -16,9 +17,12 @@ from hybrid.adapt.manager import Change
 from hybrid.correction import Correction
 from hybrid.errors import ComputationError, Outcome
 from hybrid.flat import Flat
-from hybrid.model.build import Model
+from hybrid.freeze import freeze, program, thaw
+from hybrid.model.build import Model, build
 from hybrid.model.effort import Effort
 from hybrid.model.plan import step_ends
+from hybrid.model.plane import in_space, planar
+from hybrid.model.state import Floats
 from hybrid.physics.loads import SEABED
 from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer
@@ -29,11 +33,12 @@ from hybrid.solve.control import Controller
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.timestep import POWERS, Stepper, Taken
 from hybrid.watch import Stop, Watch
-from hybrid.zoning import Zoning
+from hybrid.zoning import Zoning, on_layout
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 MOST_RESCUES = 20  # of one step, by more rod
 CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
+OUTSIDE = ("scene", "observer", "recorder", "target")  # of a motion: what a checkpoint does not hold
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 
 
@@ -63,6 +68,7 @@ class Motion:
         self.zoning, self.effort, self._stale = zoning, effort, False
         self.control = None if effort.local is None else Controller(effort.local, effort.step, effort.shortest)
         self.t, self.steps, self.iterations = 0.0, 0, 0
+        self.changes = 0  # of the scene, so far
         self.dt = 0.0  # s, of the last step; 0 after a start
         self.cpu = clock.process_time()
         self.work = [0.0] * len(POWERS)
@@ -93,9 +99,40 @@ class Motion:
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             recorder.event(0.0, 0.0, model.length, "undamped", text)
 
+    def __getstate__(self) -> dict[str, Any]:
+        """What `rejoin` does not give it."""
+        return {name: x for name, x in vars(self).items() if name not in OUTSIDE} | {
+            "cpu": clock.process_time() - self.cpu, "first_energy": self.observer.first_energy,
+        }  # fmt: skip
+
+    def rejoin(self, scene: Scene, observer: Observer, recorder: Recorder | Notebook, target: Path) -> None:
+        """Go on after a checkpoint, with what was not in it."""
+        self.scene, self.observer, self.recorder, self.target = scene, observer, recorder, target
+        self.cpu = clock.process_time() - self.cpu
+        observer.first_energy = self.__dict__.pop("first_energy")
+        self.watch.recorder = recorder
+
+    def keep(self, at_once: bool = False) -> None:
+        """Bring the file up to date, with a checkpoint at the output just written, if it is time to (or `at_once`)."""
+        recorder = self.recorder
+        if not isinstance(recorder, Recorder) or not (at_once or recorder.due):
+            return
+        if isinstance(self.target, Path):
+            asks = self.zoning is not None and self.zoning.manager.user is not None
+            recorder.flush(program(), asks, lambda: (freeze(thaw(freeze(self.effort))), freeze(self, self.outside)))
+        else:
+            recorder.flush()
+
+    @property
+    def outside(self) -> dict[str, object]:
+        """What a checkpoint names but does not hold: it is made anew from the scene."""
+        manager = self.zoning.manager if self.zoning is not None else None
+        motions = {f"motion {self.changes} {k}": motion for k, motion in self.model.ends.motions.items()}
+        return {"recorder": self.recorder, "criterion": manager and manager.user, **motions}
+
     def _on(self, model: Model) -> None:
         """Go on with another line on the same nodes: in a plane, or in space."""
-        self.model = model
+        self.model = self.flat.model = model
         if self.zoning is not None:
             self.zoning.model = model
         self.watch.follow(model)
@@ -190,12 +227,39 @@ class Motion:
             self._stop(Taken(found[0], 0, 0.0, found[1], 0.0), 0.0)
 
     def restart(self) -> None:
-        """A load has just stopped: accelerations jump, so find consistent ones."""
+        """A load has just stopped, or others act: accelerations jump, so find consistent ones."""
         self.model.ends.set_loads(self.t)
         self._ignite()
         if self.control is not None:
             self.control.restart()
         self.power = self._powers()
+
+    def change(self, scene: Scene) -> None:
+        """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
+        old, flat = self.model, self.flat
+        model = build(scene, self.effort)
+        if self.zoning is not None:
+            model = on_layout(model, self.zoning.manager.layout)
+            self.zoning.settle_joints(self.state)
+        model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
+        model.ends.go_on_from(old.ends, self.t)
+        self.scene, self.changes, self._stale = scene, self.changes + 1, True
+        leaves = flat.push is not None and not _same_plane(old.plane, model.plane)
+        if old.plane is not None and not leaves:
+            model = replace(model, line=planar(model.line, old.plane), plane=old.plane)
+        elif leaves:
+            model = flat.rise(replace(model, plane=old.plane), self.state)
+        else:
+            model = replace(model, line=in_space(model.line), plane=None)
+        if self.correction is not None:
+            self.correction.switch(model)
+        self._on(model)
+        self.spare = self.state.copy()
+        if self.zoning is not None:
+            self.zoning.manager.moments = model.ends.moments
+            self.zoning.manager.loaded = bool(model.ends.moments.any())
+        self.recorder.event(self.t, 0.0, model.length, "loads change", "what acts from outside is other from now on")
+        self.restart()
 
     def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> None:
         dt = end - self.t
@@ -393,3 +457,8 @@ class Motion:
         except OSError:
             return None
         return path
+
+
+def _same_plane(a: Floats | None, b: Floats | None) -> bool:
+    """Whether two planes (3, 3) have the same normal, of either sense."""
+    return a is not None and b is not None and bool(abs(abs(float(a[2] @ b[2])) - 1.0) < 1e-12)

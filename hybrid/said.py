@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     from hybrid.model.plan import Plan
     from hybrid.results.read import Result
     from hybrid.results.tradetable import Row, TradeTable
+    from hybrid.scene.moordyn import ImportedDeck
     from hybrid.scene.schema import Scene
 
 
@@ -199,3 +200,16 @@ def plan_table(scene: Scene, plan: Plan) -> Any:
     if moving:
         size = f"{plan.base_cells} cells where it is catenary, {size} if all of it is rod"
     return Group(*head, ledger, zones, "", f"{size}; {work}")
+
+
+def import_said(made: ImportedDeck) -> list[str]:
+    """What could not be carried over from a deck: of the deck, then of each scene what the others do not share."""
+    parts = [note.told(made.file) for note in made.notes if note.kind != "not needed"]
+    shared = set.intersection(*(set(scene.notes) for scene in made.scenes.values()))
+    parts += [note.told(made.file) for note in next(iter(made.scenes.values())).notes if note in shared]
+    for name, scene in made.scenes.items():
+        parts += [f"{name}: {note.told(made.file)}" for note in scene.notes if note not in shared]
+    settings = [f"    {note.line}: {note.text}" for note in made.notes if note.kind == "not needed"]
+    if settings:
+        parts += ["not needed, MoorDyn's own settings and outputs (--json says why):", *settings]
+    return parts

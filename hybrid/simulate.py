@@ -11,7 +11,7 @@ import os
 import signal
 import threading
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -20,16 +20,21 @@ import numpy as np
 
 from hybrid.accuracy import Climb, Errors, Sketch, summary
 from hybrid.adapt.manager import UserCriterion
-from hybrid.errors import SceneError
+from hybrid.errors import ResultError, SceneError
+from hybrid.freeze import freeze
 from hybrid.job import Job
 from hybrid.model.effort import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.model.mesh import Zone
 from hybrid.motion import Motion
+from hybrid.remainder import Remainder, remainder
+from hybrid.results.checkpoint import claimed
+from hybrid.results.format import Field
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, amend, check_target
+from hybrid.results.record import amend, check_target
 from hybrid.scene.motion import check_motions
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 
+Record = Callable[[Effort, Path | io.BytesIO], Sketch]
 REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
 
 
@@ -73,30 +78,103 @@ def run(
     if scene.solver == "shooting":
         from hybrid.arbitrate import run_shooting
 
-        return run_shooting(scene, output, overwrite)
+        with claimed(_path(output)):
+            return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    job, begin = Job(scene, criterion), clock.process_time()
-    target, effort = _target(output, overwrite), first_effort(scene)
-    with _interrupts() as interrupted, _Told(progress, scene.time.duration) as told:
-        job.told, job.interrupted = told, interrupted
-        if not wants_errors(scene):
-            job.record(effort, target)
-            return open_result(target)
-        climb = Climb(
-            asked(scene), mesh_is_free(scene), scene.time.controlled and scene.time.tolerance is None,
-            zones_are_free(scene), True,
-            job.sketch, _kept(target, job.record),
-        )  # fmt: skip
-        try:
-            final, errors = climb.reach(replace(effort, grading=job.survey(effort)) if asked(scene) else effort)
-        except KeyboardInterrupt:
-            if climb.estimate is not None:  # stopped in a finer run: the result before it stands, with its figure
-                stopped = climb.stopped()
-                _amend(target, scene, *stopped, climb, clock.process_time() - begin)
-            raise
-        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    job, target = Job(scene, criterion), _target(output, overwrite)
+    with claimed(_path(output)), _working(job, progress):
+        _run(job, target)
     return open_result(target)
+
+
+def resume(
+    source: str | Path,
+    output: str | Path | None = None,
+    *,
+    until: float | None = None,
+    settings: Sequence[str] = (),
+    start: float | None = None,
+    progress: bool | Callable[[Progress], None] = False,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Go on with a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
+
+    What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
+    times).  output: another file; None: the same.  until: s, a later end.  settings: changes such as
+    ``environment.fluid.current=[0.5, 0, 0]`` (currents, waves, and what moves and loads the ends) from `start` (s) on;
+    None: from the checkpoint; before it the run is computed anew, into another file.  criterion: as `run` was given.
+
+    Raises ResultError when there is nothing to go on with or the file is another program's, and else as `run`.
+    """
+    path = Path(source).expanduser().resolve()
+    target = path if output is None else Path(output).expanduser().resolve()
+    if target != path:
+        check_target(target, True)
+    with claimed(target):
+        left = remainder(path, until, settings, start)
+        if left.anew and target == path:
+            why = "a change before the checkpoint computes the run anew"
+            raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
+        job = Job(left.scene, criterion, left.changes)
+        with _working(job, progress):
+            _run(job, target, path, left)
+    return open_result(target)
+
+
+def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: Remainder | None = None) -> None:
+    """Compute a result, and its errors if they are wanted; source, left: what to go on with."""
+    scene, begin = job.scene, clock.process_time()
+    assert scene.time is not None
+    anew = left is None or left.anew
+    climb = left.climb if left is not None else None
+
+    def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if anew or source is None or isinstance(to, io.BytesIO):
+            return job.record(effort, to, kept())
+        return job.go_on(source, to)
+
+    def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
+            return job.go_on(to, to)
+        return job.record(effort, to, kept())
+
+    def kept() -> bytes:
+        return freeze(climb) if climb is not None else b""
+
+    effort = first_effort(scene) if left is None else left.effort
+    if not wants_errors(scene):
+        first(effort, target)
+        return
+    compute = _kept(target, first, later)
+    try:
+        if climb is not None:
+            climb.sketch, climb.result = job.sketch, compute
+            final, errors = climb.go_on()
+        else:
+            steps_are_free = scene.time.controlled and scene.time.tolerance is None
+            climb = Climb(
+                asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
+            )
+            if left is None and asked(scene):
+                effort = replace(effort, grading=job.survey(effort))
+            final, errors = climb.reach(effort)
+    except KeyboardInterrupt:
+        if climb is not None and climb.estimate is not None:
+            # stopped in a finer run: the result before it stands, with its figure
+            final, errors = climb.stopped()
+            _amend(target, scene, final, errors, climb, clock.process_time() - begin, done=False)
+        raise
+    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+
+
+@contextmanager
+def _working(job: Job, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
+    """Hear of interrupts, and tell of the progress, until a run is done."""
+    assert job.scene.time is not None
+    with _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
+        job.told, job.interrupted = told, interrupted
+        yield
 
 
 def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
@@ -105,42 +183,40 @@ def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = 
     if scene.solver == "shooting":
         from hybrid.arbitrate import static_shooting
 
-        return static_shooting(scene, output, overwrite)
+        with claimed(_path(output)):
+            return static_shooting(scene, output, overwrite)
     job, begin = Job(scene, None), clock.process_time()
     target, effort = _target(output, overwrite), first_effort(scene)
-    if not wants_errors(scene):
-        job.record_rest(effort, target)
-        return open_result(target)
-    climb = Climb(
-        asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest,
-        _kept(target, job.record_rest),
-    )  # fmt: skip
-    final, errors = climb.reach(effort)
-    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    with claimed(_path(output)):
+        if not wants_errors(scene):
+            job.record_rest(effort, target)
+            return open_result(target)
+        compute = _kept(target, job.record_rest, job.record_rest)
+        climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
+        final, errors = climb.reach(effort)
+        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
     return open_result(target)
 
 
-def _kept(
-    target: Path | io.BytesIO, record: Callable[[Effort, Path | io.BytesIO], Sketch]
-) -> Callable[[Effort], Sketch]:
+def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], Sketch]:
     """Record results one after the other: a finer one takes the place of that before it when it is complete."""
     done = False
 
     def compute(effort: Effort) -> Sketch:
         nonlocal done
         if not done:
-            found, done = record(effort, target), True
+            found, done = first(effort, target), True
             return found
         if isinstance(target, io.BytesIO):
             new = io.BytesIO()
-            found = record(effort, new)
+            found = later(effort, new)
             target.seek(0)
             target.truncate()
             target.write(new.getvalue())
             return found
-        beside = target.with_name(f".{target.name}.{os.getpid()}.finer")
+        beside = target.with_name(f".{target.name}.finer")
         try:
-            found = record(effort, beside)
+            found = later(effort, beside)
             os.replace(beside, target)
         finally:
             for left in (beside, beside.with_suffix(".snapshot.npz")):
@@ -151,9 +227,13 @@ def _kept(
 
 
 def _amend(
-    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float
-) -> None:
-    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file."""
+    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float,
+    done: bool = True,
+) -> None:  # fmt: skip
+    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file.
+
+    done: nothing is left to go on with; else the file keeps what a finer result goes on from.
+    """
     effort = final.effort
     attributes: dict[str, str | float | int] = {
         "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
@@ -175,7 +255,7 @@ def _amend(
                 if kind == "model" and final.model_error:
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
-    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()))
+    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()), done)
 
 
 UNITS_OF_ERRORS = {
@@ -220,6 +300,10 @@ class _Told:
             self._last = now
             zones = motion.model.zones
             self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
+
+
+def _path(output: str | Path | None) -> Path | None:
+    return None if output is None else Path(output).expanduser().resolve()
 
 
 def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:

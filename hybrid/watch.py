@@ -67,7 +67,7 @@ class Watch:
     """The watches of one run or one static solve."""
 
     def __init__(self, recorder: Recorder | Notebook, model: Model) -> None:
-        self._recorder, self._model = recorder, model
+        self.recorder, self._model = recorder, model
         self._bend = self._twist = UNRESOLVED
         self._strain = STRETCHED
         self._slack = model.slack_floor
@@ -91,7 +91,7 @@ class Watch:
 
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
-        self._recorder.event(t, s, s, kind, text)
+        self.recorder.event(t, s, s, kind, text)
 
     def equilibrium(self, found: Equilibrium) -> None:
         """What a static solution leaves open."""
@@ -102,7 +102,7 @@ class Watch:
         if self._model.line.bits & FRICTION and not found.rubbed:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
-            self._recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
+            self.recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
         model = self._model
         line, sea, ends = model.line, model.sea.values, model.ends.values
         if line.bits & PLANAR and not is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
@@ -115,7 +115,7 @@ class Watch:
                 else "an end moment is not conservative"
             )
             text = f"the stability of this equilibrium is not judged, because {why}"
-            self._recorder.event(0.0, 0.0, self._model.length, "not judged", text)
+            self.recorder.event(0.0, 0.0, self._model.length, "not judged", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""
@@ -201,7 +201,7 @@ class Watch:
                 f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
                 f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
             )
-            self._recorder.event(t, s, s, "coarse step", text)
+            self.recorder.event(t, s, s, "coarse step", text)
 
     def torque(self, t: float, turn: float, torque: float) -> None:
         """A torque that zones which move do not carry, because a catenary lies between the ends."""
@@ -210,7 +210,7 @@ class Watch:
                 f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
                 f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
             )
-            self._recorder.event(t, 0.0, self._model.length, "torque left out", text)
+            self.recorder.event(t, 0.0, self._model.length, "torque left out", text)
             self._left_out = True
 
     def strain(self, t: float, state: State) -> None:

@@ -306,6 +306,11 @@ class Zoning:
             self.joints = self.joints.on(target)
         return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
 
+    def settle_joints(self, state: State) -> None:
+        """Take what joints carry off the line, for another line to be put in its place."""
+        if self.joints is not None:
+            self.joints.unload(self.model.line, np.zeros_like(state.r))
+
     def _carried(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Remapped:
         """The state on the new nodes, with the twist that the cable has had since its ends lost each other."""
         manager, cable = self.manager, self.model.cable

@@ -21,10 +21,7 @@ HEAD = """\
 # Validation
 
 Every figure below was measured by the test named beside it, in one session of
-
-    pytest tests/validation -m "not bench" --write-validation
-
-which wrote this page.  A tolerance is one of three kinds: *round-off*; *discretisation*, an order
+`pytest tests/validation -m "not bench" --write-validation`, which wrote this page.  A tolerance is one of three kinds: *round-off*; *discretisation*, an order
 and a bound, where an order that is too high fails as well; *published*, the digits printed in the
 source.  The problems, their exact solutions and the reasons for the tolerances are in
 tests/problems.py.  SI units.

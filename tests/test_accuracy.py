@@ -332,12 +332,12 @@ def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
 
     record, count = Job.record, []
 
-    def failing(self, effort, target):
+    def failing(self, effort, target, climb):
         count.append(effort)
         if len(count) > 1:
             target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
             raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
-        return record(self, effort, target)
+        return record(self, effort, target, climb)
 
     monkeypatch.setattr(Job, "record", failing)
     result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
@@ -394,11 +394,11 @@ def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
 
     record, count = Job.record, []
 
-    def stopping(self, effort, target):
+    def stopping(self, effort, target, climb):
         count.append(effort)
         if len(count) > 1:
             raise KeyboardInterrupt
-        return record(self, effort, target)
+        return record(self, effort, target, climb)
 
     monkeypatch.setattr(Job, "record", stopping)
     with pytest.raises(KeyboardInterrupt):

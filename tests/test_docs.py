@@ -48,7 +48,16 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(clone)
     found = list(commands())
-    assert {arguments[0] for arguments in found} == {"run", "plan", "static", "plot", "report", "schema", "trade"}
+    assert {arguments[0] for arguments in found} == {
+        "run",
+        "plan",
+        "static",
+        "plot",
+        "report",
+        "export",
+        "schema",
+        "trade",
+    }
     for arguments in found:
         with pytest.raises(SystemExit) as left:
             main(arguments)
@@ -88,6 +97,8 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
         r"python3 -m venv \S+ && \. \S+/bin/activate && pip install -e \"\.\[dev\]\" && hybrid run \S+ --plot\n", first
     )
     assert second == "pytest\n"
+    later = [line for block in blocks(README, "bash")[2:] for line in block.splitlines()]
+    assert all(line.startswith("hybrid ") for line in later), "test_readme_commands_run runs these and no others"
     script = (ROOT / ".ci" / "run").read_text(encoding="utf-8")
     assert "first=$(block 1)" in script and "second=$(block 2)" in script
     assert "pip install" not in script
@@ -119,16 +130,22 @@ def test_pages_name_no_place_but_their_own(page: Path) -> None:
     assert not re.search(r"/work/|/tmp/|/home/|https?://", page.read_text(encoding="utf-8"))
 
 
-def test_scene_reference_is_fresh() -> None:
-    make = runpy.run_path(str(ROOT / "docs" / "make_scene_reference.py"))
-    page = (ROOT / "docs" / "scene.md").read_text(encoding="utf-8")
-    assert page == make["page"](), "run: python docs/make_scene_reference.py"
+@pytest.mark.parametrize(("name", "script"), [("scene", "scene_reference"), ("examples", "examples_page")])
+def test_generated_pages_are_fresh(name: str, script: str) -> None:
+    make = runpy.run_path(str(ROOT / "docs" / f"make_{script}.py"))
+    page = (ROOT / "docs" / f"{name}.md").read_text(encoding="utf-8")
+    assert page == make["page"](), f"run: python docs/make_{script}.py"
+
+
+def test_trade_page_begins_as_its_script_says() -> None:
+    head = runpy.run_path(str(ROOT / "docs" / "make_trade.py"))["HEAD"]
+    assert (ROOT / "docs" / "trade.md").read_text(encoding="utf-8").startswith(head)
 
 
 def test_cited_files_exist() -> None:
     """Paths in backticks or code, such as `hybrid/physics/loads.py`."""
     for page in PAGES:
-        text = page.read_text(encoding="utf-8")
+        text = re.sub(r"^```diff\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):
             assert (ROOT / name).exists() or name == "docs/validation.md", f"{page.name} names {name}"
 

@@ -291,3 +291,19 @@ def test_an_end_moment_must_be_normal_to_the_plane() -> None:
     what["ends"]["end"]["moment"] = [0.5, 0, 0]
     with pytest.raises(SceneError, match="moment"):
         scene(what)
+
+
+def test_a_load_that_is_let_go_in_a_plane_is_let_go_in_space() -> None:
+    """The accelerations after it are found by the march in space, which steps in the plane had left their work in."""
+    what = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "free", "force": {"value": [0.03, 0, 0], "until": 0.5}},
+        },
+        "initial": {"kind": "straight", "direction": [0.6, 0, -0.8]},
+        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 0.7, "step": 0.01},
+        "output": {"every": 0.1, "points": 11, "errors": False},
+    }  # fmt: skip
+    flat, deep = (hybrid.run(scene(what, dimension=k)) for k in (2, 3))
+    assert np.abs(flat.position - deep.position).max() < SAME

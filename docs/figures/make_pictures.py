@@ -8,6 +8,7 @@ The pages are those of `hybrid plot`, stored as palettes to keep the repository 
 from __future__ import annotations
 
 import io
+import re
 import runpy
 import sys
 from pathlib import Path
@@ -28,14 +29,24 @@ def shrink(page: bytes, file: Path) -> None:
     Image.open(io.BytesIO(page)).convert("RGB").quantize(COLOURS, **look).save(file, optimize=True)
 
 
+def first_scene() -> hybrid.Scene:
+    """The scene of docs/index.md."""
+    page = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    found = re.search(r"^```yaml\n(.*?)^```$", page, re.DOTALL | re.MULTILINE)
+    assert found is not None
+    return hybrid.parse_scene(found[1], "docs/index.md")
+
+
 def main(names: list[str]) -> None:
-    for scene in sorted(EXAMPLES.glob("*.yaml")):
-        if names and scene.stem not in names:
+    scenes = {path.stem: hybrid.load_scene(path) for path in sorted(EXAMPLES.glob("*.yaml"))}
+    scenes["first"] = first_scene()
+    for name, scene in scenes.items():
+        if names and name not in names:
             continue
         page = io.BytesIO()
-        figure = hybrid.plot(hybrid.run(hybrid.load_scene(scene)))
+        figure = hybrid.plot(hybrid.run(scene))
         figure.savefig(page, dpi=150)
-        shrink(page.getvalue(), PICTURES / f"{scene.stem}.png")
+        shrink(page.getvalue(), PICTURES / f"{name}.png")
     script = EXAMPLES / "08_python_api.py"
     if not names or script.stem in names:
         picture = PICTURES / f"{script.stem}.png"

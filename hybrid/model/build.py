@@ -71,6 +71,10 @@ class Model:
     follows_error: bool = False  # whether the error of leaving bending out is followed
     corrected: bool = False  # whether results are corrected for it
 
+    def __getstate__(self) -> dict[str, object]:
+        """For a checkpoint: without the states that a run may start from."""
+        return vars(self) | {"start": blank_state(0), "other_starts": ()}
+
     @property
     def cells(self) -> int:
         return int(self.line.h.size)

@@ -69,7 +69,7 @@ class EndConditions:
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
         self.breaks = sorted({x.until for x in loads if np.isfinite(x.until)})
-        self._loads, self._motions = tuple(loads), motions
+        self._loads, self.motions = tuple(loads), motions
         self._given = (frame.copy(), np.zeros((2, 3)))  # frames and their spins without motion
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
@@ -91,12 +91,22 @@ class EndConditions:
         self._growing_until = max((x.ramp or 0.0 for x in self._acting), default=0.0)
         self._grown = False
 
+    def go_on_from(self, old: EndConditions, t: float) -> None:
+        """Take the place of other conditions at t (s): tangents that are being turned in go on."""
+        self._turns, self._bring_in = dict(old._turns), old._bring_in
+        ramped = {(x.what, x.end): x.ramp for x in old._loads}
+        self._loads = tuple(
+            x._replace(ramp=ramped.get((x.what, x.end), x.ramp)) if x.ramp is None else x for x in self._loads
+        )
+        self.set_loads(t)
+        self.at(t)
+
     def at(self, t: float) -> Ends:
         """Positions, frames and loads at t; the arrays returned are overwritten by the next call.
 
         t = infinity asks for what is given when everything has grown and turned in (motions stand at 0).
         """
-        for k, motion in self._motions.items():
+        for k, motion in self.motions.items():
             position, velocity, frame, spin = motion.at(t if np.isfinite(t) else 0.0)
             self.values.position[k] = position
             self.velocity[k] = velocity
@@ -119,7 +129,7 @@ class EndConditions:
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""
-        if not self._motions:
+        if not self.motions:
             return np.zeros((2, 3))
         self.at(t + 0.5 * dt)
         after = self.velocity.copy()
@@ -157,7 +167,7 @@ class EndConditions:
     def _turn(self, t: float) -> None:
         part, rate = rise(t, self._bring_in)
         for k, (axis, angle) in self._turns.items():
-            if k not in self._motions:
+            if k not in self.motions:
                 self.values.frame[k], self.values.spin[k] = self._given[0][k], self._given[1][k]
             if part < 1.0:
                 back = _rotation(axis, -angle * (1.0 - part))

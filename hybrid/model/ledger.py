@@ -192,7 +192,7 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, correct
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = getattr(end, "motion", None) is not None
         entries.append(Entry(f"ends.{name}: {end.kind}{', moving' if moving else ''}", True, f"ends.{name}"))
-        if not line.spin[cell] and (end.kind in ("clamped", "guided") or getattr(end, "moment", None) is not None):
+        if not line.spin[cell] and (hasattr(end, "tangent") or getattr(end, "moment", None) is not None):
             entries.append(
                 Entry(
                     f"moment and tangent at ends.{name}",

@@ -15,7 +15,7 @@ from hybrid.model.sea import Surroundings
 from hybrid.model.state import Floats, Line, Sea
 from hybrid.physics.loads import BODIES, DRAG, FLOW, SURFACE
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Points, Scene, Straight
+from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Pinned, Points, Scene, Straight
 
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
@@ -278,4 +278,4 @@ def _end_conditions(
         motion = getattr(end, "motion", None)
         if motion is not None:
             motions[k] = EndMotion(motion, getattr(end, "position", None), base, around.elevation)
-    return EndConditions([e.kind in ("pinned", "clamped") for e in pair], position, frame, loads, motions)
+    return EndConditions([isinstance(e, Pinned | Clamped) for e in pair], position, frame, loads, motions)

@@ -125,6 +125,19 @@ class MoorDyn:
     PER_HAND = 2  # steps between two hand-overs of the ends' motion; more jerk the ends (1 % of tension at 5 ms)
     RELAXATION = 120.0  # s of simulated time, at most, for the search for the rest
 
+    def deck(self, line: Line, elements: int, dt: float) -> str:
+        """Its input file for a line between two driven points, with steps of at most `dt`, s."""
+        types = "TypeName Diam Mass/m EA BA/-zeta EI Cd Ca CdAx CaAx\n"
+        types += "(name) (m) (kg/m) (N) (N-s/-) (N-m^2) (-) (-) (-) (-)\n"
+        types += (
+            f"line {line.diameter} {line.mass} {line.ea} 0 {line.ei} {line.drag[0]} {line.added} {line.drag[1]} 0.0"
+        )
+        lines = "ID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (name) (#) (#) (m) (-) (-)\n"
+        lines += f"1 line 1 2 {line.length} {elements} -"
+        options = "0 writeLog\n1 disableOutput\n1 disableOutTime\nRK4 tScheme\n0.0 FrictionCoefficient\n"
+        options += f"{self.RELAXATION} TmaxIC"
+        return _deck(line, dt, (0, 1), types=types, lines=lines, rho="rho", options=options, outputs="FairTen1")
+
     def march(self, line: Line, guest: Guest, times: list[float]) -> Answer:
         import moordyn  # type: ignore[import-not-found]
 
@@ -134,16 +147,7 @@ class MoorDyn:
             dt = min(dt, self.BEND * l * l / math.sqrt(line.ei / line.mass))
         hands = even(times, self.PER_HAND * dt)
         dt = (times[1] - times[0]) / hands / self.PER_HAND
-        types = "TypeName Diam Mass/m EA BA/-zeta EI Cd Ca CdAx CaAx\n"
-        types += "(name) (m) (kg/m) (N) (N-s/-) (N-m^2) (-) (-) (-) (-)\n"
-        types += (
-            f"line {line.diameter} {line.mass} {line.ea} 0 {line.ei} {line.drag[0]} {line.added} {line.drag[1]} 0.0"
-        )
-        lines = "ID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (name) (#) (#) (m) (-) (-)\n"
-        lines += f"1 line 1 2 {line.length} {guest.elements} -"
-        options = "0 writeLog\n1 disableOutput\n1 disableOutTime\nRK4 tScheme\n0.0 FrictionCoefficient\n"
-        options += f"{self.RELAXATION} TmaxIC"
-        text = _deck(line, dt, (0, 1), types=types, lines=lines, rho="rho", options=options, outputs="FairTen1")
+        text = self.deck(line, guest.elements, dt)
         steps = 0
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "line.txt"

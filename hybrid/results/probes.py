@@ -19,8 +19,8 @@ from hybrid.model.mesh import Zone
 from hybrid.model.state import Ends, Floats, Line, Sea, State
 from hybrid.physics.loads import SEABED
 from hybrid.physics.seabed import stored
+from hybrid.results.format import Field
 from hybrid.results.grid import Grid
-from hybrid.results.record import Field
 from hybrid.results.touchdown import Touchdown, contact_pressure, touchdown
 from hybrid.solve.corrector import Shift
 from hybrid.solve.observe import observe
@@ -358,7 +358,7 @@ class Observer:
             if (not p.needs or p.needs in has or (corrected and name in CORRECTED)) and (only is None or name in only)
         }
         self._errors, self._corrected = errors, corrected
-        self._first_energy: float | None = None
+        self.first_energy: float | None = None  # J, at the first output
         self._with_work = with_work
         size = {"s": s.size, "xyz": 3, "edge": 2}
         fields = [
@@ -426,10 +426,10 @@ class Observer:
             out |= dict(zip(self._criteria, ratios(self.grid.s), strict=True))
         if self._with_work:
             energy = float(sum(out[name] for name in out if name.startswith("energy/")))  # type: ignore[misc]
-            if self._first_energy is None:
-                self._first_energy = energy
+            if self.first_energy is None:
+                self.first_energy = energy
             out |= {f"work/{name}": float(x) for name, x in zip(POWERS, work, strict=True)}
-            out["work/scheme"] = energy - self._first_energy - float(work.sum())
+            out["work/scheme"] = energy - self.first_energy - float(work.sum())
         return out
 
 

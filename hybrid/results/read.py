@@ -14,6 +14,8 @@ Layout, format 1 (`record` writes it)::
     /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
     /events/{criterion,value,threshold,energy}
     /scene                          the scene, as YAML text
+    /changes                        scenes that held from some time on, as JSON; only where there are any
+    /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
 
 A table grows by whole rows and its dimension scale grows last, so the length of the
 scale says how many rows are complete; a reader beside a running writer, or after a
@@ -29,17 +31,22 @@ import io
 import time
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
 
+if TYPE_CHECKING:
+    import xarray
+
 FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
+TEXTS = ("scene", "changes")
+HIDDEN = ("checkpoint",)  # what is for the program alone
 ALIASES = {"times": "t", "moment": "bending_moment"}
 
 # The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
@@ -169,7 +176,9 @@ class Result:
         groups: set[str] = set()
 
         def visit(name: str, item: Any) -> None:
-            if isinstance(item, h5py.Dataset) and name != "scene":
+            if name.split("/")[0] in HIDDEN:
+                return
+            if isinstance(item, h5py.Dataset) and name not in TEXTS:
                 self._dims[name] = tuple(d.label for d in item.dims)
                 self.units[name] = _text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
@@ -257,6 +266,13 @@ class Result:
         """Names of the dimensions of an array, such as ("t", "s", "xyz")."""
         return self._dims[self._known(name)]
 
+    def label(self, name: str) -> dict[str, str]:
+        """`units`, `description` and `frame` of an array, as the file has them; empty where it has none."""
+        if not self._file:
+            raise ResultError("the result is closed; open the file again")
+        attrs = self._file[self._known(name)].attrs
+        return {key: _text(attrs.get(key, "")) for key in ("units", "description", "frame")}
+
     def describe(self, name: str) -> str:
         """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
         if name in self._groups:
@@ -265,10 +281,9 @@ class Result:
                 units.setdefault(self.units[f"{name}/{key}"], []).append(key)
             return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
         name = self._known(name)
-        attrs = self._file[name].attrs
-        unit, frame = _text(attrs.get("units", "")), _text(attrs.get("frame", ""))
+        unit, description, frame = self.label(name).values()
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
-        return f"{head}: {_text(attrs.get('description', ''))}" + (f" ({frame} frame)" if frame else "")
+        return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
     def at(self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None) -> dict[str, Any]:
         """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
@@ -286,7 +301,28 @@ class Result:
             answer[name] = array
         return answer
 
+    def to_xarray(
+        self,
+        *,
+        names: Sequence[str] | None = None,
+        times: tuple[float | None, float | None] | None = None,
+        at: Any = None,
+    ) -> xarray.Dataset:
+        """Everything as one Dataset of xarray: over t and s, with units; a slash in a name becomes an underscore.
+
+        names: fields or groups, None for all; times: from and to, s; at: arc lengths, m, in place of the output grid.
+        """
+        from hybrid.results.labelled import dataset
+        from hybrid.results.part import part_of
+
+        return dataset(part_of(self, names, times, at))
+
     # ---- what else was written ----------------------------------------------------------------
+
+    @property
+    def file(self) -> Path | None:
+        """The file it was read from; None for a result in memory."""
+        return self._source if isinstance(self._source, Path) else None
 
     @property
     def events(self) -> list[Event]:
@@ -299,6 +335,11 @@ class Result:
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
         return _text(self._file["scene"][()])
+
+    @property
+    def changes_text(self) -> str:
+        """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
+        return _text(self._file["changes"][()]) if "changes" in self._file else ""
 
     @property
     def title(self) -> str:
@@ -355,6 +396,14 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     """
     source = io.BytesIO(source) if isinstance(source, bytes) else source
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
+
+
+@contextmanager
+def opened(source: Path) -> Iterator[h5py.File]:
+    """The HDF5 file of a result, for what is not in a `Result`.  ResultError as of `open_result`."""
+    with _open_file(source) as file:
+        _check_format(file, source)
+        yield file
 
 
 def is_result(path: Path) -> bool:

@@ -16,12 +16,8 @@ from __future__ import annotations
 
 import io
 import os
-import platform
-import shutil
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from datetime import UTC, datetime
-from importlib.metadata import PackageNotFoundError, version
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from math import isfinite, nan
 from pathlib import Path
 from time import monotonic
@@ -32,61 +28,37 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.results.read import FORMAT, FORMAT_VERSION, is_result
+from hybrid.results.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint
+from hybrid.results.format import (
+    BLOCK,
+    EVENTS,
+    Field,
+    annotate,
+    attach,
+    check_names,
+    checked,
+    create_scales,
+    create_table,
+    cut,
+    set_status,
+    tables_of,
+    write_attributes,
+    write_texts,
+)
+from hybrid.results.read import is_result
+from hybrid.results.room import ask_for_room
 
-# Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
-_CHUNK_BYTES = 16384
-# Rows of the step log held back before they are written: 1 ms of writing then costs 2 us a step.
-_BLOCK = 512
-# Outputs are held back at most this long (s): a reader hardly notices, a kill loses no more, and
-# a run that saves a thousand times a second spends 1 % of its time here instead of half.
-_PAUSE = 0.2
-# Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
-_KIND, _TEXT = "S32", "S512"
+# Outputs are held back at most this long (s), and so many times as long as writing takes: a reader hardly notices, a
+# kill loses no more, and a run that saves a thousand times a second spends 2 % of its time here instead of half.
+_PAUSE, _PART = 0.2, 50.0
 # The v110 file format is the oldest that has SWMR, so the most other programs can read it.
 _LIBVER = ("v110", "v110")
+AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 _STATUS = ("running", "complete", "interrupted", "failed")
-_RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events"}
 
 
-@dataclass(frozen=True)
-class Field:
-    """One recorded quantity.
-
-    `shape` and `dims` are those at one output time, without t: (ns, 3) and ("s", "xyz").
-    A name with a slash (``energy/kinetic``) goes into a group.  `frame` is "inertial",
-    "body" or empty.  `dtype` is float64, int64 or S<n> (UTF-8 text of n bytes at most).
-    """
-
-    name: str
-    unit: str
-    description: str
-    shape: tuple[int, ...] = ()
-    dims: tuple[str, ...] = ()
-    frame: str = ""
-    nan_ok: bool = False
-    dtype: str = "float64"
-
-
-_TIME = Field("t", "s", "output times")
-_ZONES = (
-    Field("t", "s", "time of the first output with these zones"),
-    Field("output", "", "number of that output, from 0", dtype="int64"),
-    Field("kind", "", "kind of the zone", dtype=_KIND),
-    Field("s_a", "m", "begin of the zone, unstretched arc length"),
-    Field("s_b", "m", "end of the zone, unstretched arc length"),
-)
-_EVENTS = (
-    Field("t", "s", "time of the event"),
-    Field("s_a", "m", "begin of the stretch concerned, unstretched arc length"),
-    Field("s_b", "m", "end of the stretch concerned, unstretched arc length"),
-    Field("kind", "", "kind of the event", dtype=_KIND),
-    Field("text", "", "what happened and why", dtype=_TEXT),
-    Field("criterion", "", "of a change of zones: the criterion that asks, or held the rod longest", dtype=_KIND),
-    Field("value", "", "what that criterion has there: its ratio", nan_ok=True),
-    Field("threshold", "", "above which it asks, or below which it lets go", nan_ok=True),
-    Field("energy", "J", "energy that all changes of zones at this moment put in, on the first of them", nan_ok=True),
-)
+# Files that HDF5 could not write: it cannot close them either, and letting go of one ends the process.
+ABANDONED: list[Any] = []
 
 
 class _Table:
@@ -102,6 +74,19 @@ class _Table:
         for k in range(1, len(self.fields)):
             self._write_column(k)
 
+    @property
+    def room(self) -> int:
+        """Bytes that writing the waiting rows may take: of every dataset, its last chunk and those that follow."""
+        rows = len(self.rows)
+        return sum(
+            x.dtype.itemsize * int(np.prod(x.shape[1:], dtype=int)) * (rows + x.chunks[0]) for x in self.datasets
+        )
+
+    @property
+    def scale(self) -> str:
+        """Name of the first dataset, which says how many rows are complete."""
+        return self.datasets[0].name.lstrip("/")
+
     def commit(self) -> None:
         """Write the scale, which tells readers that the rows are complete."""
         self._write_column(0)
@@ -114,7 +99,7 @@ class _Table:
         field, data = self.fields[k], self.datasets[k]
         values = [row[k] for row in self.rows]
         if field.dtype.startswith("S"):
-            column = np.array([_cut(v, int(field.dtype[1:])) for v in values], dtype=data.dtype)
+            column = np.array([cut(v, int(field.dtype[1:])) for v in values], dtype=data.dtype)
         else:
             column = np.array(values, dtype=field.dtype)
         data.resize(self.count + len(values), axis=0)
@@ -126,11 +111,12 @@ class Recorder:
 
     target: path, or a BytesIO for a result in memory.  grid_s: (ns,) output arc lengths, m,
     unstretched.  fields: what `save` brings.  step_fields: what `log` brings, time first.
-    attributes: more root attributes, `title` among them.  scene_text: the scene as YAML.
+    attributes: more root attributes, `title` among them.  texts: "scene" as YAML, and others.
     fixed: quantities that do not depend on time, with their values; one whose only dimension
     is its own name becomes a dimension scale (the arc lengths of some probes, say).
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
+    climb: bytes for whoever goes on with the run, of what was found before it; None: nobody can, it has no checkpoints.
     """
 
     def __init__(
@@ -141,43 +127,79 @@ class Recorder:
         fields: Sequence[Field],
         step_fields: Sequence[Field],
         attributes: Mapping[str, str | float | int],
-        scene_text: str,
+        texts: Mapping[str, str],
         fixed: Sequence[tuple[Field, np.ndarray]] = (),
         outputs: int | None = None,
         overwrite: bool = False,
+        climb: bytes | None = None,
     ) -> None:
-        _check_names(fields, step_fields, fixed)
+        check_names(fields, step_fields, fixed)
+        tables = tables_of(fields, step_fields)
+
+        def fill(file: h5py.File) -> None:
+            write_attributes(file, attributes)
+            write_texts(file, texts)
+            create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
+            for group, columns in tables.items():
+                create_table(file, group, columns, outputs if group in ("/", "zones") else None)
+            if climb is not None:
+                create_slots(file, climb)
+
+        path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
+        if isinstance(target, io.BytesIO):
+            file = h5py.File(target, "w", libver=_LIBVER)
+            fill(file)
+        else:
+            assert path is not None
+            check_target(path, overwrite)
+            file = _created(path, fill)
+        self._write_to(file, path, tables)
+
+    @classmethod
+    def again(
+        cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
+        texts: Mapping[str, str],
+    ) -> Recorder:  # fmt: skip
+        """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
+
+        ResultError if the file holds other fields, or cannot be written.
+        """
+        self, tables = cls.__new__(cls), tables_of(fields, step_fields)
+        missing = [f.name for group, columns in tables.items() for f in columns if f"{group}/{f.name}" not in source]
+        if missing:
+            raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
+
+        ours = {f.name for f in fields}
+        later = {x for x in names_in(source, "errors") if x not in ours}  # known only when all is done
+
+        def fill(new: Path) -> None:
+            ask_for_room(new, Path(source.filename).stat().st_size, "")
+            copied(source, new, _LIBVER, at.rows, later)
+            with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
+                set_status(file, "running", "")
+                write_texts(file, texts)
+                for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
+                    del file.attrs[name]
+
+        self._write_to(_created(path.expanduser().resolve(), None, fill), path, tables)
+        for table, count in zip(self._all, at.rows.values(), strict=True):
+            table.count = count
+        self._zones, self._number, self.last = list(at.zones), at.number + 1, float(self._file["t"][-1])
+        return self
+
+    def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
+        self._file, self.path = file, path
+        self._all = tuple(_Table(columns, [file[f"{g}/{f.name}"] for f in columns]) for g, columns in tables.items())
+        self._outputs, self._steps, self._zone_rows, self._events = self._all
+        fields, step_fields = tables["/"][1:], tables["steps"]
         self._names = {f.name for f in fields}
         self._step_names = [f.name for f in step_fields]
         self._finite_steps = [k for k, f in enumerate(step_fields) if not f.nan_ok]
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
-        self._flushed = -np.inf  # when the file was last brought up to date, s of the clock
-        self.closed = False
-        tables: tuple[tuple[str, Sequence[Field], int | None], ...] = (
-            ("/", (_TIME, *fields), outputs),
-            ("steps", step_fields, None),
-            ("zones", _ZONES, outputs),
-            ("events", _EVENTS, None),
-        )
-
-        def fill(file: h5py.File) -> None:
-            _write_attributes(file, attributes)
-            file.create_dataset("scene", data=scene_text, dtype=h5py.string_dtype())
-            _create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
-            for table in tables:
-                _create_table(file, *table)
-
-        self.path: Path | None = None
-        if isinstance(target, io.BytesIO):
-            self._file = h5py.File(target, "w", libver=_LIBVER)
-            fill(self._file)
-        else:
-            self.path = Path(target).expanduser().resolve()
-            self._file = _create_file(self.path, fill, overwrite)
-        self._outputs, self._steps, self._zone_rows, self._events = (
-            _Table(columns, [self._file[f"{group}/{f.name}"] for f in columns]) for group, columns, _ in tables
-        )
+        self._number = 0  # of the next checkpoint
+        self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
+        self.closed = self._broken = False
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then.
@@ -189,7 +211,7 @@ class Recorder:
         if values.keys() != self._names:
             wrong = ", ".join(sorted(values.keys() ^ self._names))
             raise ResultError(f"the recorder was promised other fields; missing or unknown: {wrong}")
-        row = [t, *(_checked(f, np.asarray(values[f.name]), t) for f in self._outputs.fields[1:])]
+        row = [t, *(checked(f, np.asarray(values[f.name]), t) for f in self._outputs.fields[1:])]
         now = [(str(kind), float(a), float(b)) for kind, a, b in zones]
         if not all(isfinite(a) and isfinite(b) for _, a, b in now):
             raise ResultError(f"a zone is not finite at t = {t:.9g} s: {now}")
@@ -198,8 +220,11 @@ class Recorder:
             self._zones = now
         self._outputs.rows.append(row)
         self.last = float(t)
-        if monotonic() - self._flushed > _PAUSE:
-            self.flush()
+
+    @property
+    def due(self) -> bool:
+        """Whether outputs have been held back long enough."""
+        return monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
 
     def log(self, values: Mapping[str, float | int]) -> None:
         """Append a row to the log of the steps; written with the next output or block."""
@@ -208,8 +233,8 @@ class Recorder:
             if not isfinite(row[k]):
                 raise ResultError(f"'{self._step_names[k]}' of the step log is not finite: {row}")
         self._steps.rows += [row] if row else []
-        if len(self._steps.rows) >= _BLOCK:
-            self.flush()
+        if len(self._steps.rows) >= BLOCK:  # alone: outputs are written together with their checkpoint
+            self._write([self._steps])
 
     def event(
         self,
@@ -229,23 +254,44 @@ class Recorder:
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
         self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
 
-    def flush(self) -> None:
-        """Write what is held back, for readers to see."""
-        others = [table for table in (self._events, self._zone_rows, self._steps) if table.rows]
+    def flush(
+        self, program: str = "", asks: bool = False, frozen: Callable[[], tuple[bytes, bytes]] | None = None
+    ) -> None:
+        """Write what is held back, for readers to see; frozen: makes effort and state from which `program`
+        goes on, with a criterion of the user's if it `asks`."""
+        begin = monotonic()
+        point = None
+        if frozen is not None:
+            rows = {table.scale: table.count + len(table.rows) for table in self._all}
+            point = Checkpoint(self._number, self.last, program, asks, rows, self._zones or [], *frozen())
+        self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
+        self._number += point is not None
+        self._flushed = monotonic()
+        self._took = self._flushed - begin
+
+    def _write(self, tables: Sequence[_Table], point: Checkpoint | None = None) -> None:
+        waiting = [table for table in tables if table.rows]
+        if self.path is not None:
+            need = sum(table.room for table in waiting) + (len(point.state) if point is not None else 0)
+            ask_for_room(self.path, need, f", then `hybrid resume {self.path}`" if point is not None else "")
         try:
-            for table in (*others, self._outputs):
+            for table in waiting:
                 table.write()
+            if point is not None:
+                write_checkpoint(self._file, point)
             # HDF5 may write in any order between two flushes.  So: the data, then the scales that
             # say it is there, and t last, which says that the zones of the output are there too.
             self._file.flush()
+            others = [table for table in waiting if table is not self._outputs]
             for table in others:
                 table.commit()
             if others:
                 self._file.flush()
-            self._outputs.commit()
-            self._file.flush()
-            self._flushed = monotonic()
-        except OSError as error:
+            if self._outputs in waiting:
+                self._outputs.commit()
+                self._file.flush()
+        except (OSError, RuntimeError) as error:  # HDF5 raises either
+            self._broken = True
             advice = f"    detail:   {error}\n    try:      free some disk space"
             raise ResultError(f"{self.path} cannot be written\n{advice}") from error
 
@@ -256,12 +302,20 @@ class Recorder:
         if status not in _STATUS:
             raise ValueError(f"status {status!r} is none of {', '.join(_STATUS)}")
         self.closed = True
+        if self._broken:
+            ABANDONED.append((self._file, self._all))
+            return
         try:
             self.flush()
-            for name, text in (("status", status), ("message", message)):
-                self._file.attrs.modify(name, _fixed(text, self._file.attrs.get_id(name).dtype))
+        except ResultError as error:
+            status, message = "failed", str(error)
+            raise
         finally:
-            self._file.close()
+            if self._broken:
+                ABANDONED.append((self._file, self._all))
+            else:
+                set_status(self._file, status, message)
+                self._file.close()
 
     def __enter__(self) -> Recorder:
         return self
@@ -270,7 +324,8 @@ class Recorder:
         if kind is None:
             self.close()
         elif issubclass(kind, Exception):
-            self.close("failed", str(error) or kind.__name__)
+            with suppress(ResultError):  # what cannot be written now, either, is not the news
+                self.close("failed", str(error) or kind.__name__)
         else:  # Ctrl-C, or a SystemExit made of a signal
             self.close("interrupted", "stopped from outside")
 
@@ -280,27 +335,31 @@ def amend(
     fields: Sequence[tuple[Field, np.ndarray]],
     attributes: Mapping[str, str | float | int],
     events: Sequence[tuple[str, str]] = (),
+    done: bool = True,
 ) -> None:
     """Add to a complete result what is known only afterwards.
 
-    fields: quantities over the output times, (nt, ...), with their values; events: kind and text, of all the cable.
+    fields: quantities over the output times, (nt, ...), with their values; events: kind and text, of all the cable;
+    done: whether nothing is left to go on with.
     """
     where = target if isinstance(target, io.BytesIO) else target.expanduser().resolve()
     new: Path | io.BytesIO = where
     try:
         if isinstance(where, Path):  # beside it, and then in its place: somebody may be reading
             new = where.with_name(f".{where.name}.{os.getpid()}.new")
-            shutil.copyfile(where, new)
+            ask_for_room(where, where.stat().st_size, "")
+            with h5py.File(where, "r", locking="best-effort") as old:
+                copied(old, new, _LIBVER, None, without={CLIMB} if done else ())
         with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
             for name, value in attributes.items():
                 file.attrs[name] = value
             for field, values in fields:
-                _checked(field, values[0], None)
+                checked(field, values[0], None)
                 data = file.create_dataset(field.name, data=values)
-                _annotate(data, field.unit, field.description, field.frame)
-                _attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
+                annotate(data, field.unit, field.description, field.frame)
+                attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
             if events:
-                table = _Table(_EVENTS, [file[f"events/{f.name}"] for f in _EVENTS])
+                table = _Table(EVENTS, [file[f"events/{f.name}"] for f in EVENTS])
                 table.count = len(file["events/t"])
                 table.rows = [(0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan) for event in events]
                 table.write()
@@ -328,16 +387,20 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
 
 
-def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
+def _created(
+    path: Path, fill: Callable[[h5py.File], None] | None, make: Callable[[Path], None] | None = None
+) -> h5py.File:
     """Make the file under another name, move it into place whole, and open it to readers.
 
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
-    check_target(path, overwrite)
     new = path.with_name(f".{path.name}.{os.getpid()}.new")
     try:
-        with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:
-            fill(file)
+        if make is not None:
+            make(new)
+        if fill is not None:
+            with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:
+                fill(file)
         os.replace(new, path)
         file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort")
         file.swmr_mode = True
@@ -347,122 +410,3 @@ def _create_file(path: Path, fill: Any, overwrite: bool) -> h5py.File:
     finally:
         new.unlink(missing_ok=True)
     return file
-
-
-def _write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int]) -> None:
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-    file.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
-    file.attrs["version_python"] = platform.python_version()
-    for package in ("hybrid-cable", "numpy", "h5py", "numba"):
-        try:
-            file.attrs[f"version_{package}"] = version(package)
-        except PackageNotFoundError:  # run from a checkout that was not installed
-            file.attrs[f"version_{package}"] = "unknown"
-    for name, text, width in (("status", "running", 32), ("message", "", 2048)):
-        dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
-        file.attrs.create(name, _fixed(text, dtype), dtype=dtype)
-    for name, value in attributes.items():
-        if name in file.attrs:
-            raise ResultError(f"the attribute '{name}' is written by the recorder itself")
-        file.attrs[name] = value
-
-
-def _create_scales(
-    file: h5py.File, grid_s: np.ndarray, fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
-) -> None:
-    """The datasets that do not grow: dimension scales first, then the fixed quantities."""
-    if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
-        raise ResultError("the output grid must be increasing finite arc lengths")
-    scales: dict[str, tuple[Field, np.ndarray]] = {
-        "s": (Field("s", "m", "unstretched arc length from the start, of the output grid"), grid_s)
-    }
-    scales |= {f.name: (f, _checked(f, np.asarray(v), None)) for f, v in fixed if f.dims == (f.name,)}
-    for field in (*fields, *(f for f, _ in fixed)):
-        for dim, size in zip(field.dims, field.shape, strict=True):
-            if dim == "xyz":
-                axes = np.array([b"x", b"y", b"z"])
-                scales.setdefault(dim, (Field("xyz", "", "axes of the inertial frame, z up", dtype="S1"), axes))
-            index = Field(dim, "", "index", dtype="int64")
-            known = scales.setdefault(dim, (index, np.arange(size)))[1]
-            if len(known) != size:
-                raise ResultError(f"field '{field.name}' has {size} along {dim}, others have {len(known)}")
-    for name, (field, values) in scales.items():
-        data = file.create_dataset(name, data=values)
-        _annotate(data, field.unit, field.description, field.frame)
-        data.make_scale(name)
-        data.dims[0].label = name
-    for field, values in fixed:
-        if field.name not in scales:
-            array = _checked(field, np.asarray(values, dtype=field.dtype), None)
-            data = file.create_dataset(field.name, data=array)
-            _annotate(data, field.unit, field.description, field.frame)
-            _attach(data, field.dims, [file[d] for d in field.dims])
-
-
-def _create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int | None) -> None:
-    """Datasets that grow along their first dimension, whose scale is the first of them."""
-    parent = file.require_group(group)
-    for k, field in enumerate(fields):
-        is_text = field.dtype.startswith("S")
-        dtype = h5py.string_dtype("utf-8", int(field.dtype[1:])) if is_text else np.dtype(field.dtype)
-        size = int(dtype.itemsize * np.prod(field.shape, dtype=int))
-        chunk = max(1, min(_CHUNK_BYTES // max(size, 1), _BLOCK, rows or _BLOCK))
-        data = parent.create_dataset(
-            field.name, (0, *field.shape), dtype, maxshape=(None, *field.shape), chunks=(chunk, *field.shape)
-        )
-        _annotate(data, field.unit, field.description, field.frame)
-        if k == 0:
-            scale = data
-            scale.make_scale(field.name)
-            data.dims[0].label = data.name.lstrip("/")
-        else:
-            _attach(data, (scale.name.lstrip("/"), *field.dims), [scale, *(file[d] for d in field.dims)])
-
-
-def _attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Dataset]) -> None:
-    for k, (dim, scale) in enumerate(zip(dims, scales, strict=True)):
-        data.dims[k].label = dim
-        data.dims[k].attach_scale(scale)
-
-
-def _annotate(data: h5py.Dataset, unit: str, description: str, frame: str = "") -> None:
-    data.attrs["units"], data.attrs["description"] = unit, description  # "units": what netCDF programs look for
-    if frame:
-        data.attrs["frame"] = frame
-
-
-def _check_names(
-    fields: Sequence[Field], step_fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
-) -> None:
-    both = [*fields, *(f for f, _ in fixed)]
-    for names in ([f.name for f in both], [f.name for f in step_fields]):
-        if len(set(names)) < len(names):
-            raise ResultError(f"fields given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
-    for field in both:
-        if field.name.split("/")[0] in _RESERVED:
-            raise ResultError(f"the name '{field.name}' is taken by the recorder itself")
-        if len(field.shape) != len(field.dims):
-            raise ResultError(f"field '{field.name}' has shape {field.shape} but dims {field.dims}")
-    for field in step_fields:
-        if field.shape:
-            raise ResultError(f"field '{field.name}' of the step log must be a number, not of shape {field.shape}")
-
-
-def _checked(field: Field, values: np.ndarray, t: float | None) -> np.ndarray:
-    """The values, or ResultError when their shape is wrong or one of them is not finite."""
-    if values.shape != field.shape:
-        raise ResultError(f"field '{field.name}' has shape {values.shape}, expected {field.shape}")
-    if not (field.nan_ok or values.dtype.kind != "f" or np.isfinite(values).all()):
-        bad = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0]
-        at = f" at t = {float(t):.9g} s" if t is not None else ""
-        raise ResultError(f"field '{field.name}' is not finite{at} (first at index {tuple(int(k) for k in bad)})")
-    return values
-
-
-def _fixed(text: str, dtype: np.dtype) -> np.ndarray:
-    return np.array(_cut(text, dtype.itemsize), dtype=dtype)
-
-
-def _cut(text: str, width: int) -> bytes:
-    """UTF-8 of at most `width` bytes, cut between characters."""
-    return str(text).encode()[:width].decode("utf-8", "ignore").encode()

@@ -69,6 +69,8 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
     return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
 
 
+# Work arrays by name, and those of them that hold nothing from one step to the next.
+WORKSPACE, SCRATCH = ("W", "X", "x", "report", "rows", "gaps"), ("W", "X", "x", "rows")
 OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
 
 
@@ -82,11 +84,20 @@ class Stepper:
         self.line = line
         self.reach, self.scale = REACH * length, tension_scale
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        n = line.h.size
+        n, self.keep = line.h.size, keep
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n, keep)
         self.u = np.zeros((n + 1, 3))
         self.push: Push | None = None  # out of the plane, of a planar motion that is watched
         self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but what every step writes before it reads it, which is most of it."""
+        return {name: x for name, x in vars(self).items() if name not in SCRATCH}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        vars(self).update(state)
+        made = dict(zip(WORKSPACE, workspace(self.line.h.size, self.keep), strict=True))
+        vars(self).update({name: made[name] for name in SCRATCH})
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
@@ -137,7 +148,7 @@ class Stepper:
         e1 = np.diff(state.v, axis=0)
         across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
         gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
-        self.u[:] = 0.0
+        self.u[:], self.X[:] = 0.0, 0.0  # steps in a plane leave in X what the march in space takes for nought
         self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
         held = ends._replace(position=state.r[[0, -1]])
         if self.line.bits & WAVES:

@@ -56,8 +56,7 @@ HEAD = """\
 # Extremes
 
 Where each model holds, degrades and refuses.  Every line below was computed, and this page written, by
-
-    pytest tests/extremes -m "not bench" --write-extremes
+`pytest tests/extremes -m "not bench" --write-extremes`.
 
 *Right*: within the tolerance of the truth, by the figure that comes nearest to it.  *Warned*: not within it, and the
 result says so in an event.  *Refused*: a scene that is refused or a computation that stops, with its true cause.

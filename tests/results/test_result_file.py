@@ -16,8 +16,9 @@ import pytest
 
 import hybrid
 from hybrid.errors import ResultError
+from hybrid.results.format import Field
 from hybrid.results.read import Event, Result, Zone, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.record import Recorder
 
 S = np.linspace(0.0, 2.0, 5)
 FIELDS = (
@@ -44,7 +45,7 @@ def recorder(target: object, **more: object) -> Recorder:
         "fields": FIELDS,
         "step_fields": STEPS,
         "attributes": {"title": "Tëst", "seed": 7},
-        "scene_text": "title: Tëst\n",
+        "texts": {"scene": "title: Tëst\n"},
     }
     return Recorder(target, **(given | more))  # type: ignore[arg-type]
 
@@ -395,8 +396,11 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
     assert set(modules.split()) - {"hybrid"} == {
         "hybrid.errors",
         "hybrid.results",
+        "hybrid.results.checkpoint",
+        "hybrid.results.format",
         "hybrid.results.read",
         "hybrid.results.record",
+        "hybrid.results.room",
     }
 
 

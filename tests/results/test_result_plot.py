@@ -19,8 +19,9 @@ from matplotlib.figure import Figure
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.results import look, panels, plot, views, zoneplot
+from hybrid.results.format import Field
 from hybrid.results.read import Result, open_result
-from hybrid.results.record import Field, Recorder
+from hybrid.results.record import Recorder
 
 MIXED = [("catenary", 0.0, 75.0), ("rod", 75.0, 100.0)]
 
@@ -63,7 +64,7 @@ def made(
         fields.append(Field("touchdown_position", "m", "d", (2, 3), ("edge", "xyz"), "inertial", nan_ok=True))
     memory = io.BytesIO()
     recorder = Recorder(
-        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, scene_text="",
+        memory, grid_s=s, fields=fields, step_fields=[], attributes={"title": title}, texts={},
         fixed=fixed, outputs=nt,
     )  # fmt: skip
     for t in np.linspace(0.0, 10.0, nt):

@@ -1,0 +1,235 @@
+"""The text of a MoorDyn deck as tables: rows that know their line, cells that know what they should be.
+
+A deck is a row of sections, each begun by a line of dashes with a title.  A table has a row of column names and one of
+units, which MoorDyn skips without reading them; then a row for each thing.  What follows !, # or % is a comment.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from hybrid.errors import Complaint, SceneError
+
+# Titles by which MoorDyn 1 and 2 know a section, and older words for the same.
+TITLES: dict[str, tuple[str, ...]] = {
+    "line types": ("LINE TYPES", "LINE DICTIONARY"),
+    "rod types": ("ROD TYPES", "ROD DICTIONARY"),
+    "bodies": ("BODIES", "BODY LIST", "BODY PROPERTIES"),
+    "rods": ("RODS", "ROD LIST", "ROD PROPERTIES"),
+    "points": (
+        "POINTS", "POINT LIST", "POINT PROPERTIES", "CONNECTIONS", "CONNECTION LIST", "CONNECTION PROPERTIES",
+        "NODES", "NODE LIST", "NODE PROPERTIES",
+    ),
+    "lines": ("LINES", "LINE LIST", "LINE PROPERTIES"),
+    "syrope": ("SYROPE IC",),
+    "failure": ("FAILURE", "FAILURES"),
+    "control": ("CONTROL", "CONTROLS"),
+    "external loads": ("EXTERNAL LOADS",),
+    "options": ("OPTIONS", "SOLVER OPTIONS"),
+    "outputs": ("OUTPUTS", "OUTPUT"),
+}  # fmt: skip
+_SECTIONS = {title: name for name, titles in TITLES.items() for title in titles}
+_ENDS = ("", "NEED THIS LINE", "END")
+_TABLES = tuple(name for name in TITLES if name not in ("options", "outputs"))
+_NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
+# MoorDyn 1 of OpenFAST says before a table how many rows it has: "3  NLines  - number of lines".
+_COUNT = re.compile(r"\s*\d+\s+N(types|connects|conns|points|lines)\b", re.IGNORECASE)
+SHOWN = 70  # characters of a row that a complaint or a note shows
+# No quantity of a cable in SI units is larger, and none that must not vanish is smaller than its inverse; squares of
+# what is accepted are then finite, too.
+LARGEST = 1e15
+# Of a row of names or units fewer cells are numbers; with three or more it is one of the data.
+FEW_NUMBERS = 3
+
+
+@dataclass(frozen=True)
+class Row:
+    """A row of a table: its line in the deck (from 1), its text without comment, its cells."""
+
+    line: int
+    text: str
+    cells: tuple[str, ...]
+
+    @property
+    def shown(self) -> str:
+        return show(self.text)
+
+
+@dataclass
+class Section:
+    """A section of the deck: its title's line, the names of its columns as written, its rows."""
+
+    name: str
+    title: str
+    line: int
+    names: Row | None = None
+    rows: list[Row] = field(default_factory=list)
+
+
+def show(text: str) -> str:
+    """Text on one line, printable, and not too long."""
+    clean = " ".join("".join(c if c.isprintable() else " " for c in text).split())
+    return clean if len(clean) <= SHOWN else clean[: SHOWN - 4] + " ..."
+
+
+class Source:
+    """A deck as sections, and the complaints about it so far."""
+
+    def __init__(self, text: str, file: str) -> None:
+        self.file = file
+        self.complaints: list[Complaint] = []
+        self.fortran: list[Row] = []  # rows with an exponent that only Fortran reads
+        self.sections: dict[str, Section] = {}
+        self.unknown: list[Section] = []
+        self.lines = text.replace("\r\n", "\n").replace("\r", "\n").split("\n")
+        self._cut()
+
+    def complain(self, where: str, value: str, expected: str, fix: str, line: int | None) -> None:
+        self.complaints.append(Complaint(where, show(value) or "nothing", expected, fix, line))
+
+    def refuse(self) -> None:
+        """SceneError with every complaint, if there is one."""
+        if self.complaints:
+            once = list(dict.fromkeys(self.complaints))
+            raise SceneError(sorted(once, key=lambda c: (c.line is None, c.line or 0)), self.file)
+
+    def rows(self, name: str) -> list[Row]:
+        section = self.sections.get(name)
+        return section.rows if section is not None else []
+
+    def columns(self, row: Row, least: int, most: int, names: Sequence[tuple[str, ...]]) -> bool:
+        """Whether a row has `least` to `most` cells; complains if not."""
+        n = len(row.cells)
+        if least <= n <= most:
+            return True
+        counted = f"{least}" if least == most else f"{least} to {most}"
+        order = " ".join(each[0] for each in names[:least])
+        fix = "put ! before a remark" if n > most else "write 0 where there is nothing, - where there is no word"
+        self.complain(f"{n} columns", row.text, f"{counted} columns: {order}", fix, row.line)
+        return False
+
+    # --- cells ---------------------------------------------------------------------------------
+
+    def number(self, row: Row, cell: str, what: str, least: float | None = None, above: float | None = None) -> float:
+        """A cell as a finite number, not below `least`, greater than `above`; NaN after a complaint."""
+        value = number(cell)
+        bounds = f", >= {least:g}" if least is not None else f", > {above:g}" if above is not None else ""
+        if value is None:
+            fix = "write it with a point: " + cell.replace(",", ".") if number(cell.replace(",", ".")) else ""
+            if cell.lower().lstrip("+-") in ("nan", "inf", "infinity"):
+                fix = "the program that wrote the deck may have failed there"
+            self.complain(what, cell, f"a finite number{bounds}", fix or "check the columns of this row", row.line)
+            return math.nan
+        if "d" in cell.lower():
+            self.fortran.append(row)
+        if abs(value) > LARGEST:
+            self.complain(what, cell, f"a number of at most {LARGEST:g} in size", "check the unit", row.line)
+            return math.nan
+        if (least is not None and value < least) or (above is not None and value <= above + 1.0 / LARGEST):
+            self.complain(what, cell, f"a number{bounds}", "check the sign, and the columns of this row", row.line)
+            return math.nan
+        return value
+
+    def whole(self, row: Row, cell: str, what: str, least: int) -> int:
+        """A cell as a whole number, not below `least`; `least` after a complaint."""
+        if cell.isascii() and cell.isdigit() and len(cell) < 9 and int(cell) >= least:
+            return int(cell)
+        self.complain(what, cell, f"a whole number, >= {least}", "check the columns of this row", row.line)
+        return least
+
+    # --- sections ------------------------------------------------------------------------------
+
+    def _cut(self) -> None:
+        current: Section | None = None
+        for n, text in enumerate(self.lines, start=1):
+            if "---" in text:
+                current = self._begin(text, n)
+            elif current is not None and text.strip():
+                current.rows.append(Row(n, text, tuple(text.split())))
+        for section in (*self.sections.values(), *self.unknown):
+            self._strip(section)
+
+    def _begin(self, text: str, line: int) -> Section | None:
+        title = show(text.strip(" \t-=:*").rstrip(" \t-=:*"))
+        words = " ".join(title.upper().split())
+        name = _SECTIONS.get(words) or _SECTIONS.get(re.split(r"\s*[-(\[:,!#%]|\s{2,}", words)[0])
+        if name is None:
+            if not self.sections or words in _ENDS:
+                return None
+            self.unknown.append(Section("", title, line))
+            return self.unknown[-1]
+        if name in self.sections:
+            first = self.sections[name].line
+            expected = f"each section once; this one began in line {first}, and MoorDyn reads only the first"
+            self.complain(title, text, expected, "put its rows together", line)
+            return None
+        self.sections[name] = Section(name, title, line)
+        return self.sections[name]
+
+    def _strip(self, section: Section) -> None:
+        """Take away names, units and comments."""
+        rows = section.rows
+        if section.name in _TABLES:
+            if rows and _COUNT.match(rows[0].text):
+                rows = rows[1:]
+            head, rows = rows[:2], rows[2:]
+            for row in head:
+                cells = _uncommented(row).cells
+                if sum(number(cell) is not None for cell in cells) >= FEW_NUMBERS:
+                    expected = "a row of column names and a row of units; MoorDyn skips two rows without reading them"
+                    self.complain(section.title, row.text, expected, "write both rows under the title", row.line)
+            section.names = head[0] if head else None
+        section.rows = [clean for clean in map(_uncommented, rows) if clean.cells]
+
+
+def _uncommented(row: Row) -> Row:
+    text = re.split(r"[!#%]", row.text, maxsplit=1)[0]
+    return Row(row.line, text, tuple(text.split()))
+
+
+def number(cell: str) -> float | None:
+    """The finite number that a cell says, Fortran's 1.0D+8 included; None if it says none."""
+    if not _NUMBER.fullmatch(cell) or not cell.isascii():
+        return None
+    value = float(cell.lower().replace("d", "e"))
+    return value if math.isfinite(value) else None
+
+
+def read_source(path: str | Path) -> Source:
+    """The sections of a deck; SceneError if it cannot be read."""
+    try:
+        raw = Path(path).read_bytes()
+    except (OSError, ValueError):
+        expected = "a MoorDyn input file that exists and can be read"
+        raise SceneError([Complaint("deck", show(str(path)), expected, "check the name and the folder")]) from None
+    try:
+        text = raw.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        text = raw.decode("latin-1")  # m³ and ° of older editors; they stand in comments and units
+    return Source(text, str(path))
+
+
+def simple(name: str) -> str:
+    """The name of a column without case and signs: BA/-zeta is bazeta."""
+    return re.sub(r"[^a-z0-9]", "", name.lower())
+
+
+def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]], least: int) -> None:
+    """Complain of columns named otherwise than MoorDyn reads them; by place, whatever their names.
+
+    columns: the names that are usual for each place, in `simple` form, the first to be told; `least` must be there.
+    """
+    names = source.sections[section].names
+    if names is None or not least <= len(names.cells) <= len(columns):
+        return  # names of several words, or a row of another kind: nothing can be said
+    where = {name: i for i, usual in enumerate(columns) for name in usual}
+    for i, cell in enumerate(names.cells):
+        j = where.get(simple(cell))
+        if j is not None and j != i:
+            expected = f"{columns[i][0]} in column {i + 1}: MoorDyn reads columns by place, not by name"
+            order = " ".join(usual[0] for usual in columns[: len(names.cells)])
+            source.complain(f"column {i + 1}", cell, expected, f"write the columns in the order {order}", names.line)

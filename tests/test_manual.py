@@ -1,0 +1,138 @@
+"""The manual as a site: it is built without a warning, asks no other host for anything, and leaves out no message."""
+
+from __future__ import annotations
+
+import ast
+import re
+import runpy
+import subprocess
+import sys
+import unicodedata
+import xml.etree.ElementTree as xml
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
+from hybrid.scene.checks import CHECKS
+
+ROOT = Path(__file__).parents[1]
+DOCS = ROOT / "docs"
+EQUATIONS: dict[str, Any] = runpy.run_path(str(DOCS / "manual" / "equations.py"))
+
+
+# --- every message has an entry --------------------------------------------------------------------
+
+
+def kinds_in_code() -> set[str]:
+    """Kinds of events that the sources name where they write one: `event(..., kind, text)`, `note`, `event=`."""
+    found = set()
+    for file in (ROOT / "hybrid").rglob("*.py"):
+        if file.is_relative_to(ROOT / "hybrid" / "scene"):
+            continue  # has no events; its notes are of another kind
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.Call):
+                name = node.func.attr if isinstance(node.func, ast.Attribute) else getattr(node.func, "id", "")
+                place = {"event": 3, "note": 2}.get(name)
+                given = [] if place is None else node.args[place : place + 1]
+                given += [k.value for k in node.keywords if k.arg == "event"]
+                if name == "append" and node.args and isinstance(node.args[0], ast.Tuple):  # notes of the error figure
+                    given += node.args[0].elts[:1] if "_notes" in ast.unparse(node.func) else []
+                found |= {x.value for x in given if isinstance(x, ast.Constant) and isinstance(x.value, str)}
+    return {kind for kind in found if re.fullmatch(r"[a-z]+( [a-z]+)*", kind)}
+
+
+def entries() -> list[str]:
+    """What stands in the headings of docs/troubleshooting.md."""
+    text = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    heads = re.findall(r"^#### (.*)\n(.*)", text, re.MULTILINE)
+    assert all(body.strip() for _, body in heads), "an entry without a word"
+    return [name for head, _ in heads for name in re.findall(r"`([^`]+)`", head)]
+
+
+def test_every_kind_of_event_is_explained() -> None:
+    kinds = kinds_in_code()
+    assert len(kinds) > 20 and "coarse step" in kinds and "accuracy missed" in kinds, "found where they are written"
+    missing = (kinds | set(EVENTS_BY_WEIGHT) | set(ZONE_EVENTS)) - set(entries())
+    assert not missing, f"docs/troubleshooting.md says nothing of {sorted(missing)}"
+
+
+def test_every_outcome_is_explained_in_its_words() -> None:
+    text = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    named = entries()
+    for outcome in set(Outcome) - {Outcome.OK}:
+        assert outcome.name.lower() in named, outcome
+        begin = re.split(r"[;:,(]", outcome.cause)[0].strip()
+        assert begin.lower() in text.lower(), f"the words of {outcome.name} are not on the page: {begin}"
+
+
+def test_nothing_is_explained_that_cannot_be_said() -> None:
+    known = kinds_in_code() | set(EVENTS_BY_WEIGHT) | set(ZONE_EVENTS) | {x.name.lower() for x in Outcome}
+    assert set(entries()) <= known
+
+
+def test_every_family_of_refusals_is_explained() -> None:
+    text = (DOCS / "troubleshooting.md").read_text(encoding="utf-8")
+    named = re.findall(r"<!-- (\w+) -->", text)
+    assert sorted(named) == sorted(check.__name__ for check in CHECKS)
+
+
+def test_every_public_name_is_on_the_page() -> None:
+    text = (DOCS / "api.md").read_text(encoding="utf-8")
+    assert sorted(re.findall(r"^::: hybrid\.(\w+)$", text, re.MULTILINE)) == sorted(hybrid.__all__)
+
+
+# --- equations -------------------------------------------------------------------------------------
+
+
+def test_an_equation_is_set() -> None:
+    math = EQUATIONS["math"]
+    assert math("c_k") == "<msub><mi>c</mi><mrow><mi>k</mi></mrow></msub>"
+    assert math("(a + b)/c²") == (
+        "<mfrac><mrow><mi>a</mi><mo>+</mo><mi>b</mi></mrow>"
+        "<mrow><msup><mi>c</mi><mrow><mi>2</mi></mrow></msup></mrow></mfrac>"
+    )
+    assert "<mover" in math("v̇") and "<mo>˙</mo>" in math("v̇")
+    assert math("x_{i+1}").count("<mo>+</mo>") == 1
+
+
+def test_all_equations_are_well_formed_and_leave_nothing_unset() -> None:
+    text = (DOCS / "theory.md").read_text(encoding="utf-8")
+    found = EQUATIONS["NUMBERED"].findall(text)
+    assert len(found) > 40
+    for number, line in found:
+        block = EQUATIONS["equation"](number, line).replace("&nbsp;", " ")
+        words = "".join(xml.fromstring(block).itertext())
+        assert not re.search(r"[_{}^`\\]", words), f"({number}) {words}"
+        assert words.count("(") == words.count(")") and words.count("[") == words.count("]"), number
+        letters = re.sub(r"[^A-Za-z]", "", unicodedata.normalize("NFD", line.replace("ᵀ", "T")))
+        assert re.sub(r"[^A-Za-z]", "", words.replace(f"({number})", "")) == letters, number
+
+
+def test_prose_keeps_what_is_no_equation() -> None:
+    page = EQUATIONS["page"]
+    text = "`a_b` and [x](a_b.md) and s_tether\n\n```python\nr_i = 1  # (T1)\n```\n"
+    assert page(text, "theory.md") == text
+    assert page("as r_i by (T3a), k^p", "theory.md") == "as r<sub>i</sub> by [(T3a)](theory.md#T3a), k<sup>p</sup>"
+
+
+# --- the site --------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_the_site_is_built_strictly_and_asks_no_other_host(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(tmp_path / "site")]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr
+    pages = sorted((tmp_path / "site").rglob("*.html"))
+    assert len(pages) > 12
+    asks = r"<(?:script|img|iframe|source)\b[^>]*\bsrc=\"(?:https?:)?//|<link\b[^>]*\bhref=\"(?:https?:)?//"
+    for page in pages:
+        assert not re.search(asks, page.read_text(encoding="utf-8")), page
+    for sheet in (tmp_path / "site").rglob("*.css"):
+        assert not re.search(r"url\([\"']?(?:https?:)?//|@import", sheet.read_text(encoding="utf-8")), sheet
+    assert "<math" in (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
+    api = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
+    assert all(f'id="hybrid.{name}"' in api for name in hybrid.__all__)
