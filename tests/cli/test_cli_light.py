@@ -81,4 +81,3 @@ def test_version_and_help() -> None:
     assert call()[0] == call("-h")[0]
     for line in ("Compute the motion of a cable", "Exit codes: 0 done"):
         assert line in call("--help")[0]
-    assert "resume" not in call("--help")[0]

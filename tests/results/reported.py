@@ -73,7 +73,7 @@ def reported(
     memory = io.BytesIO()
     recorder = Recorder(
         memory, grid_s=s, fields=fields, step_fields=log if steps and outputs > 1 else [], attributes=attributes,
-        scene_text=scene, fixed=fixed, outputs=outputs,
+        texts={"scene": scene}, fixed=fixed, outputs=outputs,
     )  # fmt: skip
     for t in np.linspace(0.0, DURATION, outputs) if outputs > 1 else np.zeros(outputs):
         wave = np.sin(0.2 * np.pi * t)
