@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybrid.results.plot import plot_summary as plot
     from hybrid.results.read import Result
     from hybrid.results.read import open_result as open
+    from hybrid.results.report import write_report as report
     from hybrid.results.zoneplot import plot_zones
     from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
@@ -47,6 +48,7 @@ _HOME = {
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.results.plot", "plot_summary"),
     "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
+    "report": ("hybrid.results.report", "write_report"),
     "resume": ("hybrid.simulate", "resume"),
     "run": ("hybrid.simulate", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
@@ -72,6 +74,7 @@ __all__ = [
     "plan",
     "plot",
     "plot_zones",
+    "report",
     "resume",
     "run",
     "scene_text",

@@ -1,4 +1,4 @@
-"""The command line: hybrid run | resume | static | plan | plot | export | trade | import | schema.
+"""The command line: hybrid run | resume | static | plan | plot | report | export | trade | import | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the live line, notes and errors to the error stream.
@@ -199,13 +199,19 @@ def plot(
         Any, typer.Option(metavar="S,S,..", parser=_numbers, help="Arc lengths to follow over time (m).")
     ] = None,
     zones: Annotated[bool, _flag("--zones", help="Draw zones along s over time instead.")] = False,
+    film: Annotated[bool, _flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Draw a result: shapes, profiles along the cable, histories; or its zones over time."""
-    if zones and (times or history):
-        raise typer.BadParameter("--times and --history choose what a page without --zones shows")
+    """Draw a result: shapes, profiles along the cable, histories; its zones over time; or a film."""
+    if (zones or film) and (times or history):
+        raise typer.BadParameter("--times and --history choose what a page without --zones or --animate shows")
+    if zones and film:
+        raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
     with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
+        if film:
+            _film(say, opened, result, output)
+            return
         if zones:
             picture = output or result.with_suffix(".zones.png")
             hybrid.plot_zones(opened, picture)
@@ -214,6 +220,22 @@ def plot(
         n = len(opened.times)
         over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
         say.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)
+
+
+@app.command()
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to report.", show_default=False)],
+    output: Annotated[Path | None, _output("Page; else RUN.html, beside it.")] = None,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Write one HTML file that explains a result: what to know first, moving pictures, events, energy, the scene."""
+    with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
+        from hybrid.results.facts import facts_of
+
+        page = hybrid.report(opened, output or result.with_suffix(".html"))
+        size, facts = page.stat().st_size, [fact._asdict() for fact in facts_of(opened)] if as_json else []
+        say.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
 
 
 @app.command()
@@ -423,6 +445,19 @@ def _ended(
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:
     say.source, say.settings = str(path), settings or []
     return hybrid.load_scene(path, say.settings)
+
+
+def _film(say: Voice, result: Result, source: Path, output: Path | None) -> None:
+    """Make a film, as mp4 where this machine can."""
+    from hybrid.results.animate import animate, ffmpeg
+
+    suffix = ".mp4" if output or ffmpeg() else ".gif"
+    if suffix == ".gif":
+        say.note('note: there is no ffmpeg for mp4, so it is a gif; pip install "hybrid-cable[video]" brings one')
+    film = animate(result, output or source.with_suffix(suffix))
+    size = film.path.stat().st_size
+    facts = {"status": result.status, "size": size} | {k: v for k, v in film._asdict().items() if k != "path"}
+    say.done(f"{film.text}, {size / 1e6:.1f} MB", film.path, **facts)
 
 
 def _draw(result: Result, picture: Path, **chosen: Any) -> Path:

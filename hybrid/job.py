@@ -27,6 +27,7 @@ from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.effort import Effort, mesh_is_free, wants_errors
 from hybrid.model.grade import Grading
 from hybrid.model.plan import output_times
+from hybrid.model.properties import allowed_radius, weakest_bending
 from hybrid.model.state import Floats
 from hybrid.motion import Motion
 from hybrid.physics.loads import SEABED, SURFACE
@@ -368,7 +369,7 @@ def _recorder(
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
-    fixed = _surroundings(model)
+    fixed = [*_surroundings(model), *_limits(scene, observer)]
     if scene.output.history:
         points = np.array(scene.output.history)
         fixed.append(
@@ -415,6 +416,19 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
             f"as long as a catenary zone ends there; for its moment, and near resonance, say always_rod: [{stretch}]"
         )
         yield s, text
+
+
+def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
+    """What reports hold bends and torques against: the bend radius allowed, and of rods the bending stiffness."""
+    s = observer.grid.s
+    out: list[tuple[Field, np.ndarray]] = []
+    if any(x.min_bend_radius for x in scene.cable.sections):
+        field = Field("min_bend_radius", "m", "smallest bend radius allowed; NaN: none", (s.size,), ("s",), nan_ok=True)
+        out.append((field, allowed_radius(scene, s)))
+    if any(field.name == "torque" for field in observer.fields):
+        text = "bending stiffness, the smaller one where there are two"
+        out.append((Field("bending_stiffness", "N m^2", text, (s.size,), ("s",)), weakest_bending(scene, s)))
+    return out
 
 
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:

@@ -48,7 +48,16 @@ def clone(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
     monkeypatch.chdir(clone)
     found = list(commands())
-    assert {arguments[0] for arguments in found} == {"run", "plan", "static", "plot", "export", "schema", "trade"}
+    assert {arguments[0] for arguments in found} == {
+        "run",
+        "plan",
+        "static",
+        "plot",
+        "report",
+        "export",
+        "schema",
+        "trade",
+    }
     for arguments in found:
         with pytest.raises(SystemExit) as left:
             main(arguments)

@@ -14,9 +14,9 @@ POISSON = 0.3
 
 
 def merged_sections(sections: Sequence[Section]) -> list[Section]:
-    """Neighbouring sections that differ in nothing but length are one section."""
+    """Neighbouring sections that differ in nothing but length, and in what only reports ask for, are one section."""
     merged: list[Section] = []
-    for section in sections:
+    for section in (x.model_copy(update={"min_bend_radius": None}) for x in sections):
         if merged and merged[-1].model_copy(update={"length": section.length}) == section:
             merged[-1] = section.model_copy(update={"length": merged[-1].length + section.length})
         else:
@@ -36,6 +36,25 @@ def bending_stiffness(section: Section) -> tuple[float, float]:
     if b is None:
         return 0.0, 0.0
     return b if isinstance(b, tuple) else (b, b)
+
+
+def allowed_radius(scene: Scene, s: np.ndarray) -> np.ndarray:
+    """Smallest bend radius allowed (ns,) m at arc lengths s (m); NaN where none is given; the larger one at a seam."""
+    return _along(scene, s, [x.min_bend_radius or np.nan for x in scene.cable.sections], np.fmax)
+
+
+def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
+    """The smaller bending stiffness (ns,) N m^2 at arc lengths s (m); at a seam that of the weaker section."""
+    return _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
+
+
+def _along(scene: Scene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:
+    """A number per section at arc lengths s (ns,); where two sections meet, what `choose` makes of both."""
+    ends = np.cumsum([x.length for x in scene.cable.sections])[:-1]
+    near = 1e-9 * scene.length  # a seam that adding up lengths has shifted is still a seam
+    values = np.array(of_section, float)
+    left, right = (values[np.searchsorted(ends, s + shift)] for shift in (-near, near))
+    return np.asarray(choose(left, right))
 
 
 def rotary_inertia(section: Section) -> tuple[float, float]:

@@ -27,7 +27,7 @@ _TAIL = struct.Struct("<12sQI")  # a name, the bytes before it, and their sum
 _NAME = b"hybrid-crc32"
 # Bytes that are summed before a file is opened, in half a second or less; to read a longer one twice would be felt.
 _SUMMED = 500_000_000
-# Bytes that the file of a writer who ran out of room lacks at most, what one flush writes: it is good as far as it goes.
+# Bytes that the file of a writer who ran out of room lacks at most: what one flush writes; the rest is good.
 _LACKING = 1 << 24
 _PIECE = 1 << 20  # bytes read at a time
 

@@ -24,11 +24,14 @@ KIND_COLOURS = {
     "corrected": "#009E73",
 }  # kinds that are not named here are drawn in ink
 SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
+WATER, LEVEL = "#EFF6FA", "#4A90C2"
+DOUBT = "#D55E00"  # of estimated errors
+POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 SMALL, NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
 ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
 _NAMES |= {"contact": "contact force"} | {x: f"position {x}" for x in "xyz"}
-_NEWS = (
+NEWS = (
     "not judged",
     "turned in",
     "friction left out",
@@ -142,7 +145,7 @@ def _head_and_foot(figure: Figure, result: Result, facts: list[str]) -> float:
     events.sort(key=lambda e: (weight_of_event(e.kind), e.t))
     if not events:
         return 0.0
-    kinds = [e.kind for e in events if e.kind not in _NEWS]
+    kinds = [e.kind for e in events if e.kind not in NEWS]
     names = ", ".join(k + f" (× {kinds.count(k)})" * (kinds.count(k) > 1) for k in dict.fromkeys(kinds))
     note = "; ".join(dict.fromkeys(e.text for e in (events[:1] if kinds else events)))
     note = (f"Warning: {names}; at t = {events[0].t:.4g} s: " if kinds else "Note: ") + note

@@ -16,11 +16,15 @@ from hybrid.errors import ResultError
 from hybrid.results.look import (
     BED,
     BODY,
+    DOUBT,
     GREY,
     INK,
     KIND_COLOURS,
+    LEVEL,
+    POINT_COLOURS,
     SAND,
     SMALL,
+    WATER,
     ZERO,
     earlier_grey,
     mark,
@@ -47,9 +51,7 @@ from hybrid.results.views import (
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-_DOUBT = "#D55E00"  # of estimated errors
-_RANGE, _WATER, _LEVEL = "#E8E8E8", "#EFF6FA", "#4A90C2"
-_POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
+_RANGE = "#E8E8E8"
 AXES = ("x", "y", "z")
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
 
@@ -68,7 +70,7 @@ def plot_shape(
 
     view = view_named(view) if isinstance(view, str) else view or views_of(result)[0]
     position, last, s = result.position, result.position[-1], result.s
-    _draw_sea(ax, view, result)
+    draw_sea(ax, view, result)
     earlier = telling_times(result) if times is None else np.asarray(times, dtype=float)
     outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
     strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
@@ -81,22 +83,22 @@ def plot_shape(
     zones = whole_zones(result.zones[-1]) or [Zone("cable", float(s[0]), float(s[-1]))]
     for zone in zones:
         inside = s[(s > zone.s_a) & (s < zone.s_b)]
-        piece = _along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
+        piece = place_along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
         ax.plot(*view.project(piece), color=KIND_COLOURS.get(zone.kind, INK), lw=2.0, zorder=3, label=zone.kind)
     joints = np.array([z.s_b for z in zones[:-1]])
     if len(joints):
-        ax.plot(*view.project(_along(joints, s, last)), zorder=5, **mark("o", "white"), label="joint")
+        ax.plot(*view.project(place_along(joints, s, last)), zorder=5, **mark("o", "white"), label="joint")
     for k, marker in ((0, "s"), (-1, "^")):
         ax.plot(*view.project(last[[k]]), zorder=4, **mark(marker), label="end" if k else "start")
     if "attached" in result:
-        bodies = view.project(_along(result["attached"], s, last))
+        bodies = view.project(place_along(result["attached"], s, last))
         ax.plot(*bodies, zorder=3.5, **mark("o", BODY) | {"markersize": 8}, label="float, clump, body")
     if "touchdown_position" in result:
         away = np.abs(result["touchdown"][-1] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own marks
         places = view.project(result["touchdown_position"][-1][away])  # NaN, of a cable that hangs, is not away
         ax.plot(*places, zorder=5, **mark("v", BED), label="touchdown" if away.any() else "_")
     for k, point in enumerate(points):
-        ax.plot(*view.project(_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
+        ax.plot(*view.project(place_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
     wider, taller = magnification(view, result)
     factors = zip((view.across_label.split(",")[0], view.up_label), (wider, taller), strict=True)
     stretch = "".join(f", {name} × {factor:g}" for name, factor in factors if factor > 1.0)
@@ -215,10 +217,10 @@ def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, name: 
     low, high = values - error, values + error
     if name in ("curvature", "bending_moment"):
         low = np.maximum(low, 0.0)
-    ax.fill_between(x, low, high, color=_DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
+    ax.fill_between(x, low, high, color=DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
 
 
-def _along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
+def place_along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
 
 
@@ -233,7 +235,7 @@ def _at(result: Result, output: int) -> str:
     return f" at t = {result.times[output]:.5g} s" if len(result.times) > 1 else ""
 
 
-def _draw_sea(ax: Axes, view: View, result: Result) -> None:
+def draw_sea(ax: Axes, view: View, result: Result) -> None:
     """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
     from matplotlib.patches import Polygon
 
@@ -243,7 +245,7 @@ def _draw_sea(ax: Axes, view: View, result: Result) -> None:
     top = int(np.argmax(view.project(result.position[-1])[1]))
     aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
     wet = "surface" in result and view.upright
-    planes = [(float(result["surface"]), 0.0, _WATER, _LEVEL, "still water", 2)] if wet else []
+    planes = [(float(result["surface"]), 0.0, WATER, LEVEL, "still water", 2)] if wet else []
     planes += [(*bed, SAND, BED, "seabed", -3)] if bed else []
     for n, (height, rise, fill, line, name, lift) in enumerate(planes):
         z, at = height + rise * x, box[0, aside]
@@ -258,4 +260,4 @@ def _draw_sea(ax: Axes, view: View, result: Result) -> None:
 
 def _point(k: int) -> dict[str, Any]:
     width = max(1.8 - 0.5 * k, 0.8)  # later curves are thinner, so that coinciding ones all show
-    return {"color": _POINT_COLOURS[k % len(_POINT_COLOURS)], "linewidth": width, "marker": "o", "markersize": 3}
+    return {"color": POINT_COLOURS[k % len(POINT_COLOURS)], "linewidth": width, "marker": "o", "markersize": 3}

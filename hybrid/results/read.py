@@ -26,6 +26,7 @@ from __future__ import annotations
 
 import atexit
 import difflib
+import html
 import io
 import time
 import weakref
@@ -381,6 +382,18 @@ class Result:
         if len(t) and self.zones[-1]:
             text += f"last zones {_joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
+
+    def _repr_html_(self) -> str:
+        """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
+        try:
+            from hybrid.results.card import card
+
+            return card(self)
+        except Exception:  # a cell must never fail because its result is closed, empty or odd
+            try:
+                return f"<pre>{html.escape(repr(self))}</pre>"
+            except Exception:
+                return "<pre>a result that can no longer be read</pre>"
 
 
 def open_result(source: str | Path | bytes | io.BytesIO) -> Result:

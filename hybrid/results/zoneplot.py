@@ -144,7 +144,7 @@ def plot_zone_map(ax: Axes, result: Result, cells: Cells | None = None) -> dict[
         norm = _bends(factor * values, least) if kind == "rod" else _pulls(factor * values)
         images[kind] = ax.pcolorfast(cells.t, cells.s, factor * values, cmap=colours, norm=norm)
         images[kind].set_label(f"{kind}: {SHOWN[kind]} ({unit})")
-    if lines := _outlines(cells):
+    if lines := outlines(cells):
         ax.add_collection(LineCollection(lines, color=INK, linewidth=0.8, zorder=2, label="zone boundary"))
     attached = result["attached"].tolist() if "attached" in result else []
     for k, s in enumerate(attached):
@@ -209,7 +209,7 @@ def _pulls(values: np.ma.MaskedArray) -> Normalize:
     return Normalize(low, max(high, low + least))
 
 
-def _outlines(cells: Cells) -> list[np.ndarray]:
+def outlines(cells: Cells) -> list[np.ndarray]:
     """Lines (2, 2) of t and s between cells of different kinds, each as long as it goes."""
     lines = []
     for kind, across, along in ((cells.kind, cells.s, cells.t), (cells.kind.T, cells.t, cells.s)):

@@ -125,6 +125,11 @@ class Section(Table):
     torsional_stiffness: NonNegative | None = Field(
         default=None, description="torsional stiffness GJ; absent: bending stiffness / 1.3 [N m^2]"
     )
+    min_bend_radius: Positive | None = Field(
+        default=None,
+        description="smallest bend radius allowed; changes nothing that is computed: reports say how near the cable "
+        "comes to it; absent: none [m]",
+    )
     rotary_inertia: OneOrTwo | None = Field(
         default=None,
         description="rotary inertia per length: transverse, or [transverse, polar]; "

@@ -58,6 +58,7 @@ cable:
       bending_stiffness: [1.0, 2.0]
       torsional_stiffness: 1.5
       rotary_inertia: [1.0e-4, 2.0e-4]
+      min_bend_radius: 0.3
       intrinsic_curvature: [0.1, 0.0, 0.0]
       drag: {normal: 1.2, tangential: 0.01}
       added_mass: {normal: 1.0, tangential: 0.1}

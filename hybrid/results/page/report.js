@@ -1,0 +1,339 @@
+"use strict";
+// The page's own script: unpacks the numbers and plotly, draws figures as they come into view, moves the cable.
+(async () => {
+  const byId = (id) => document.getElementById(id);
+  const index = JSON.parse(byId("index").textContent);
+  const still = matchMedia("(prefers-reduced-motion: reduce)").matches;
+  const touch = matchMedia("(pointer: coarse)").matches;
+  window.report = { ready: false, frame: 0 };  // what a test, or a console, may look at
+
+  // ---- unpacking -------------------------------------------------------------------------------
+
+  const unpacked = async (id) => {
+    const text = atob(byId(id).textContent.trim());
+    const bytes = new Uint8Array(text.length);
+    for (let k = 0; k < text.length; k++) bytes[k] = text.charCodeAt(k);
+    const stream = new Blob([bytes]).stream().pipeThrough(new DecompressionStream("gzip"));
+    return new Response(stream).arrayBuffer();
+  };
+
+  const problem = (text) => {
+    for (const box of document.querySelectorAll(".plot")) {
+      const line = document.createElement("p");
+      line.className = "problem";
+      line.textContent = text;
+      box.append(line);
+    }
+  };
+
+  let numbers;
+  try {
+    performance.mark("text");
+    numbers = await unpacked("data");
+    const script = document.createElement("script");
+    script.textContent = new TextDecoder().decode(await unpacked("plotly"));
+    performance.mark("unpacked");
+    document.head.append(script);
+    performance.mark("plotly");
+    for (const id of ["data", "plotly"]) byId(id).textContent = "";  // their memory is wanted elsewhere
+    if (!window.Plotly) throw new Error("plotly did not start");
+  } catch (error) {
+    problem("Pictures need a browser of 2023 or later (DecompressionStream): " + error.message);
+    return;
+  }
+  const { Plotly } = window;
+
+  const TYPES = { f4: Float32Array, u1: Uint8Array };
+  const flat = (ref) => {
+    const size = ref.shape.reduce((a, b) => a * b, 1);
+    return new TYPES[ref.type](numbers, ref.$at, size);
+  };
+  const row = (ref, k) => flat(ref).subarray(k * ref.shape[1], (k + 1) * ref.shape[1]);
+  const revived = (x) => {
+    if (Array.isArray(x)) return x.map(revived);
+    if (x === null || typeof x !== "object") return x;
+    if (x.$at !== undefined) {
+      const values = x.log ? flat(x).map((v) => (v > 0 ? Math.log10(v) : v === 0 ? -99 : NaN)) : flat(x);
+      if (x.shape.length === 1) return values;
+      return Array.from({ length: x.shape[0] }, (_, k) => values.subarray(k * x.shape[1], (k + 1) * x.shape[1]));
+    }
+    return Object.fromEntries(Object.entries(x).map(([key, value]) => [key, revived(value)]));
+  };
+
+  // plotly's own button to upload a picture to its servers is switched off: nothing leaves this page.
+  const config = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "", responsive: true, displayModeBar: touch ? false : "hover",
+    modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
+
+  // ---- the cable -------------------------------------------------------------------------------
+
+  const scene = index.scene;
+  const times = scene ? scene.times : [];
+  const state = { frame: 0, t: times[0], playing: false, colour: 0, stretched: false, picked: null };
+  const box3d = byId("cable-plot");
+  let space = null;  // numbers of the traces that move
+
+  const hasWebGL = () => {
+    try {
+      const canvas = document.createElement("canvas");
+      return Boolean(canvas.getContext("webgl2") || canvas.getContext("webgl"));
+    } catch { return false; }
+  };
+
+  const line = () => {
+    const colour = scene.colours[state.colour];
+    if (!colour) return { color: scene.ink, width: 7 };
+    let color = row(colour.values, state.frame);
+    let [low, high] = [colour.low, colour.high];
+    if (colour.log) {
+      color = color.map((v) => Math.log10(Math.max(v, low)));
+      [low, high] = [Math.log10(low), Math.log10(high)];
+    }
+    return { color, cmin: low, cmax: high, colorscale: colour.scale, width: 7, showscale: false };
+  };
+
+  const shape = (k) => ({ x: row(scene.x, k), y: row(scene.y, k), z: row(scene.z, k) });
+  const placeOf = (s) => {  // on the shape shown, between points
+    const grid = flat(scene.s), at = shape(state.frame);
+    let k = 1;
+    while (k < grid.length - 1 && grid[k] < s) k++;
+    const p = grid.length > 1 ? Math.min(Math.max((s - grid[k - 1]) / (grid[k] - grid[k - 1]), 0), 1) : 0;
+    const between = (v) => [grid.length > 1 ? v[k - 1] * (1 - p) + v[k] * p : v[0]];
+    return { x: between(at.x), y: between(at.y), z: between(at.z) };
+  };
+
+  const marks = () => {  // all of them, and the place that was asked for
+    const at = state.picked === null ? { x: [NaN], y: [NaN], z: [NaN] } : placeOf(state.picked);
+    const all = (axis) => [...scene.marks.flatMap((mark) => [...row(mark[axis], state.frame)]), ...at[axis]];
+    return { x: all("x"), y: all("y"), z: all("z") };
+  };
+
+  const view = () => {
+    // Axes: the size of the box as drawn, so large that its projection fills the panel.
+    const size = scene.box.map(([a, b], k) => (b - a) * (state.stretched ? scene.factors[k] : 1));
+    const [x, y, z] = scene.box.map(([a, b]) => b - a);
+    const eye = z < 0.25 * Math.min(x, y) ? [-0.35, -1, 1.3] : x >= y ? [0.32, -1, 0.26] : [1, -0.32, 0.26];
+    const long = Math.hypot(...eye), d = eye.map((v) => v / long);
+    const flatLong = Math.hypot(d[0], d[1]);
+    const right = [-d[1] / flatLong, d[0] / flatLong, 0];
+    const up = [d[1] * right[2] - d[2] * right[1], d[2] * right[0] - d[0] * right[2], d[0] * right[1] - d[1] * right[0]];
+    const reach = (axis) => size.reduce((sum, v, k) => sum + Math.abs(axis[k]) * v, 0);
+    const panel = box3d.clientWidth / box3d.clientHeight;
+    const scale = Math.min((SEEN * panel * 0.84) / reach(right), (SEEN * 0.8) / reach(up));
+    const camera = { eye: { x: 2 * d[0], y: 2 * d[1], z: 2 * d[2] }, up: { x: 0, y: 0, z: 1 },
+      center: { x: 0, y: 0, z: -0.03 }, projection: { type: "orthographic" } };
+    return { camera, aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale } };
+  };
+  const SEEN = 2.0;  // height of the panel in units of aspectratio, measured: plotly scales orthographic views by it
+
+  const sceneLayout = () => {
+    const largest = Math.max(...scene.box.map(([a, b]) => b - a));
+    const axis = (k) => {
+      const drawn = (scene.box[k][1] - scene.box[k][0]) * (state.stretched ? scene.factors[k] : 1);
+      return { title: { text: "" }, tickprefix: "xyz"[k] + " = ", showtickprefix: "first", ticksuffix: " m",
+        showticksuffix: "last", range: scene.box[k], backgroundcolor: "#ffffff",
+        gridcolor: "#e4e4e4", linecolor: "#bdbdbd", zeroline: false, showspikes: false, showbackground: false,
+        tickfont: { size: 11, color: "#5f5f5f" }, tickangle: 0, nticks: drawn < 0.3 * largest ? 2 : touch ? 4 : 7 };
+    };
+    const { camera, aspectratio } = view();
+    return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", aspectratio, camera, dragmode: "turntable" };
+  };
+
+  const say3d = () => {
+    const parts = [];
+    if (state.stretched) {
+      const factors = scene.factors.map((f, k) => (f > 1.005 ? "xyz"[k] + " × " + Number(f.toPrecision(2)) : "")).filter(Boolean);
+      parts.push(factors.length ? "Axes stretched: " + factors.join(", ") + "." : "Nothing to stretch: no direction is thin.");
+    }
+    for (const text of scene.far) parts.push("Not drawn, being far: " + text + ".");
+    byId("cable-said").textContent = parts.join(" ");
+    const legend = byId("cable-legend");
+    legend.textContent = "";
+    const colour = scene.colours[state.colour];
+    if (colour && colour.legend) for (const [name, shade] of colour.legend) legend.append(swatch(name, shade));
+    else if (colour) legend.append(ramp(colour.label, colour.scale.map((c) => c[1]), colour.low, colour.high, "", colour.log));
+    for (const plane of scene.planes) if (plane.x) legend.append(swatch(plane.text, plane.line));
+    for (const mark of scene.marks.slice(2)) legend.append(swatch(mark.name, mark.colour));
+    legend.append(swatch("first shape", "#b5b5b5"));
+  };
+  const swatch = (name, colour) => {
+    const item = document.createElement("span"), patch = document.createElement("i");
+    patch.style.background = colour;
+    item.append(patch, name);
+    return item;
+  };
+  const ramp = (name, shades, low, high, unit, log) => {
+    const item = document.createElement("span"), strip = document.createElement("span");
+    item.className = "bar";
+    strip.className = "ramp";
+    strip.style.background = "linear-gradient(to right," + shades.join(",") + ")";
+    const text = (v) => Number(v.toPrecision(3)).toString();
+    const lowest = document.createElement("span");
+    lowest.textContent = (log ? "≤ " : "") + text(low);
+    item.append(name, lowest, strip, text(high) + " " + unit + (log ? " (log.)" : ""));
+    return item;
+  };
+
+  const drawCable = async () => {
+    if (!hasWebGL()) {
+      byId("cable-said").textContent = "This browser has no WebGL: the cable is shown still.";
+      return;
+    }
+    const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: "#b5b5b5", width: 2 }, hoverinfo: "skip" }];
+    space = { cable: 1, marks: 2 };
+    traces.push({ type: "scatter3d", mode: "lines", ...shape(0), line: line(), customdata: flat(scene.s),
+      hovertemplate: "s = %{customdata:.4g} m<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
+    const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
+    traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
+      marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => m.colour), "#c00000"],
+        size: [...each((m) => 2 * m.size), 28], line: { color: [...each(() => scene.ink), "#c00000"], width: 1 }, opacity: 1 },
+      hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
+    for (const plane of scene.planes) if (plane.x) {
+      traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: [0, 0], j: [1, 2], k: [2, 3], color: plane.fill,
+        opacity: plane.solid, hoverinfo: "skip", lighting: { ambient: 1, diffuse: 0, specular: 0 } });
+      traces.push({ type: "scatter3d", mode: "lines", x: [...plane.x, plane.x[0]], y: [...plane.y, plane.y[0]],
+        z: [...plane.z, plane.z[0]], line: { color: plane.line, width: 2 }, hoverinfo: "skip" });
+    }
+    box3d.querySelector("svg")?.remove();
+    await Plotly.newPlot(box3d, traces, { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
+      font: { family: "system-ui, sans-serif", color: scene.ink }, paper_bgcolor: "#ffffff" }, config);
+    let width = box3d.clientWidth;
+    new ResizeObserver(() => {
+      if (box3d.clientWidth === width) return;  // it also calls at the start
+      width = box3d.clientWidth;
+      Plotly.relayout(box3d, { "scene.aspectratio": view().aspectratio });
+    }).observe(box3d);
+  };
+
+  const moveCable = () => {
+    if (!space) return;
+    const both = [shape(state.frame), marks()];
+    const update = { x: both.map((m) => m.x), y: both.map((m) => m.y), z: both.map((m) => m.z) };
+    if (scene.colours.length) update["line.color"] = [line().color, undefined];  // undefined: as it is
+    Plotly.restyle(box3d, update, [space.cable, space.marks]);
+  };
+  const recolour = () => space && Plotly.restyle(box3d, { line: [line()] }, [space.cable]);
+
+  // ---- graphs ----------------------------------------------------------------------------------
+
+  const graphs = new Map();  // element -> its figure, once drawn
+  const seen = new Set();
+  const cursor = () => ({ type: "line", xref: "x", yref: "paper", x0: state.t, x1: state.t, y0: 0, y1: 1,
+    line: { color: "#555555", width: 1, dash: "dot" } });
+
+  const drawGraph = async (element, figure) => {
+    if (graphs.has(element)) return;
+    graphs.set(element, figure);
+    const layout = figure.layout;
+    layout.dragmode = touch ? false : "zoom";  // a finger scrolls the page
+    if (element.clientWidth < 500) layout.legend.font.size = 11;
+    if (figure.cursor && times.length > 1) layout.shapes = [cursor()];
+    const data = revived(figure.data);
+    for (const trace of data) if (trace.type === "heatmap") trace.zsmooth = false;
+    await Plotly.newPlot(element, data, layout, config);
+    if (figure.cursor) element.on("plotly_click", (event) => go(event.points[0].x));
+    if (figure.now) follow(element, figure);
+  };
+  const follow = (element, figure) => {
+    if (figure.now) Plotly.restyle(element, { y: [row(figure.now.frames, state.frame)] }, [figure.now.trace]);
+    else if (figure.cursor) Plotly.relayout(element, { "shapes[0].x0": state.t, "shapes[0].x1": state.t });
+  };
+
+  // ---- time ------------------------------------------------------------------------------------
+
+  const slider = byId("time"), said = byId("now"), button = byId("play"), pace = byId("pace");
+  const nearest = (t) => {
+    let low = 0, high = times.length - 1;
+    while (high - low > 1) { const k = (low + high) >> 1; if (times[k] <= t) low = k; else high = k; }
+    return t - times[low] < times[high] - t ? low : high;
+  };
+  const sayTime = () => {
+    if (!slider) return;
+    slider.value = String(state.frame);
+    said.textContent = "t = " + state.t.toFixed(places) + " s";
+    slider.setAttribute("aria-valuetext", said.textContent);
+  };
+  const show = (frame) => {
+    state.frame = window.report.frame = frame;
+    state.t = times[frame];
+    sayTime();
+    if (box3d) moveCable();
+    for (const element of seen) if (graphs.has(element)) follow(element, graphs.get(element));
+  };
+  const go = (t) => { stop(); show(nearest(t)); };
+  const pause = times.length > 1 ? (times.at(-1) - times[0]) / (times.length - 1) : 1;
+  const places = Math.min(Math.max(1 - Math.floor(Math.log10(pause) + 1e-9), 0), 6);
+
+  let last = 0;
+  const tick = (now) => {
+    if (!state.playing) return;
+    const t = state.clock + (Math.min(now - last, 1000) / 1000) * Number(pace.value);
+    last = now;
+    if (t >= times.at(-1)) { show(times.length - 1); stop(); return; }
+    state.clock = t;
+    const frame = nearest(t);
+    if (frame !== state.frame) show(frame);
+    requestAnimationFrame(tick);
+  };
+  const stop = () => { state.playing = false; if (button) { button.textContent = "Play"; button.setAttribute("aria-pressed", "false"); } };
+  const play = () => {
+    if (state.frame === times.length - 1) show(0);
+    state.playing = true;
+    state.clock = state.t;
+    button.textContent = "Pause";
+    button.setAttribute("aria-pressed", "true");
+    last = performance.now();
+    requestAnimationFrame(tick);
+  };
+  const jump = (t, s) => {
+    state.picked = Number.isFinite(s) ? s : null;
+    go(t);
+    byId("cable").scrollIntoView({ behavior: still ? "auto" : "smooth" });
+  };
+
+  // ---- beginning -------------------------------------------------------------------------------
+
+  if (slider) {
+    slider.max = String(times.length - 1);
+    slider.addEventListener("input", () => { stop(); show(Number(slider.value)); });
+    button.addEventListener("click", () => (state.playing ? stop() : play()));
+  }
+  for (const group of document.querySelectorAll(".switch")) {
+    group.addEventListener("click", (event) => {
+      const chosen = event.target.closest("button");
+      if (!chosen) return;
+      for (const other of group.children) other.setAttribute("aria-pressed", String(other === chosen));
+      if (group.id === "colour") { state.colour = Number(chosen.value); recolour(); }
+      else {
+        state.stretched = chosen.value === "stretched";
+        if (space) Plotly.relayout(box3d, { scene: sceneLayout() });
+      }
+      say3d();
+    });
+  }
+  for (const target of document.querySelectorAll("[data-t]")) {
+    const act = () => jump(Number(target.dataset.t), Number(target.dataset.s ?? NaN));
+    target.addEventListener("click", act);
+    if (target.tagName === "TR") target.addEventListener("keydown", (event) => { if (event.key === "Enter") act(); });
+  }
+  for (const place of document.querySelectorAll("[data-bars]")) {
+    for (const bar of index.figures[Number(place.dataset.bars)].bars) {
+      place.append(ramp(bar.label, bar.shades, bar.low, bar.high, bar.unit, bar.log));
+    }
+  }
+  sayTime();
+  if (box3d && scene) { say3d(); await drawCable(); }
+  const places2d = [...document.querySelectorAll(".plot[data-figure]")];
+  const figureOf = (element) => index.figures[Number(element.dataset.figure)];
+  const watcher = new IntersectionObserver((entries) => {
+    for (const entry of entries) {
+      if (!entry.isIntersecting) { seen.delete(entry.target); continue; }
+      seen.add(entry.target);
+      if (graphs.has(entry.target)) follow(entry.target, figureOf(entry.target));
+      else drawGraph(entry.target, figureOf(entry.target));
+    }
+  }, { rootMargin: "300px" });
+  for (const element of places2d) watcher.observe(element);
+  addEventListener("beforeprint", () => places2d.forEach((element) => drawGraph(element, figureOf(element))));
+  performance.mark("ready");
+  window.report.ready = true;
+})();
