@@ -5,6 +5,8 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
+from importlib import import_module
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -16,7 +18,8 @@ from peers.moordyn_touchdown import silence
 import hybrid
 from hybrid.scene.moordyn import options as taken
 
-moordyn = pytest.importorskip("moordyn")
+moordyn: Any = import_module("moordyn") if find_spec("moordyn") else None
+pytestmark = pytest.mark.skipif(moordyn is None, reason="MoorDyn is not installed")
 
 # A line between two points that are moved, upright; z from -50 to -30.
 DECK = """\
