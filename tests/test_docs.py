@@ -57,6 +57,8 @@ def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsy
         "export",
         "schema",
         "trade",
+        "resume",
+        "import",
     }
     for arguments in found:
         with pytest.raises(SystemExit) as left:
