@@ -218,3 +218,5 @@ def test_accuracy_of_zones_that_move_against_a_rod():
             f"{name}: rod over adaptive {cost['rod'] / cost['adaptive']:.2f}, "
             f"rod in space over adaptive {cost['rod in space'] / cost['adaptive']:.2f}"
         )
+        # the ratios that docs/accuracy.md states are 0.24 to 1.24; a factor of two off and the page is wrong
+        assert 0.1 < cost["rod"] / cost["adaptive"] < 2.5

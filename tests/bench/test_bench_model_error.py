@@ -241,7 +241,7 @@ def test_model_error_correct_adaptive():
                     "output": scene.output.model_copy(update={"errors": None}),
                 }
             )
-            said, rod = [], None
+            said, apart, rod = [], [], None
             for update in ({"always_rod": ((0.0, scene.length),)}, {}, {"correct": True}):
                 begin = time.process_time()
                 result = hybrid.run(scene.model_copy(update={"model": scene.model.model_copy(update=update)}))
@@ -252,4 +252,6 @@ def test_model_error_correct_adaptive():
                 far = np.linalg.norm(result["position"] - rod["position"], axis=2).max() / (tolerance * scene.length)
                 share = np.mean([sum(z.s_b - z.s_a for z in x if z.kind == "rod") for x in result.zones]) / scene.length
                 said.append(f"{far:.3f}, rod {share:.2f}, {took:.2f} s")
+                apart.append(far)
             print(f"{name:16s} {tolerance:g}: plain {said[0]}; corrected {said[1]}")
+            assert max(apart) < 1.5, "zones that move are further from the rod than their tolerance allows"
