@@ -394,7 +394,8 @@ class Climb:
             text = (
                 "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
             )
-            self._notes.append(("error uncertain", f"{text}; the error may be larger; leave time.step out"))
+            fix = "ask for a smaller error" if self.steps_are_free else "leave time.step out"
+            self._notes.append(("error uncertain", f"{text}; the error may be larger; {fix}"))
         self.estimate, self.coarse = estimate, None
         return True
 
@@ -462,7 +463,7 @@ class Climb:
         main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
         free = {"mesh": self.mesh_is_free, "time step": self.steps_are_free, "model": self.zones_are_free}[main]
         fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
-        try_ = f"leave {fixed} out" if not free else "ask for less, or compare with model: rod"
+        try_ = "ask for less" + ", or compare with model: rod" * (verdict.model > 0.0) if free else f"leave {fixed} out"
         if main == "model" and not free:
             try_ = "model: adaptive, or rod"
         text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"

@@ -89,6 +89,7 @@ EVENTS_BY_WEIGHT = (
     "accuracy missed",
     "no error figure",
     "error uncertain",
+    "pull between outputs",
     "slack",
     "unstable",
     "out of plane",

@@ -18,7 +18,7 @@ from dataclasses import asdict
 from functools import cached_property
 from math import ceil, floor, log10
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 from rich.console import Console
 from rich.control import Control
@@ -175,11 +175,11 @@ class Voice:
 
     @cached_property
     def _out(self) -> Console:
-        return Console(highlight=False, markup=False, emoji=False)
+        return Console(highlight=False, markup=False, emoji=False, width=_width(sys.stdout))
 
     @cached_property
     def _err(self) -> Console:
-        return Console(stderr=True, highlight=False, markup=False, emoji=False)
+        return Console(stderr=True, highlight=False, markup=False, emoji=False, width=_width(sys.stderr))
 
     def json(self, event: str, **facts: Any) -> None:
         """A line for programs; nothing for people."""
@@ -333,6 +333,11 @@ class Voice:
         self.json("error", kind=kind, message=text, **facts)
         for line in text.splitlines():
             self._err.print(line, style="" if line.startswith(" ") else "bold red", soft_wrap=not self._err.is_terminal)
+
+
+def _width(stream: TextIO) -> int | None:
+    """Columns to write for a file or a pipe, where nobody's window ends; None: those of the terminal."""
+    return None if stream.isatty() or "COLUMNS" in os.environ else 200
 
 
 def _listed(names: list[str]) -> str:

@@ -109,11 +109,13 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
             if whole
             else ""
         )
-        sizes = (f"{_short(errors[f'{kind}_{what}'])} {unit}" for kind in kinds)
+        sizes = (f"{_short(errors[f'{kind}_{what}'], total)} {unit}" for kind in kinds)
         table.add_row("position" if what == "position" else "pull at ends", *sizes, share)
     if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
         names = [f"errors/{kind}/bending_moment" for kind in kinds]
-        sizes = (f"{_short(float(result[name].max()))} N m" if name in result else "" for name in names)
+        found = {name: float(result[name].max()) for name in names if name in result}
+        most = max(found.values())
+        sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
         peak = float(result["bending_moment"].max()) if "bending_moment" in result else 0.0
         table.add_row("moment", *sizes, f"of {_short(peak)} N m" if peak else "no rod, no moment: model: rod")
     asked = result.attributes.get("accuracy_asked")
@@ -125,8 +127,9 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     return Group(table, f"asked {asked}: {verdict}")
 
 
-def _short(x: float) -> str:
-    """Two digits, without an exponent where that is as short."""
+def _short(x: float, beside: float = 0.0) -> str:
+    """Two digits, without an exponent where that is as short; round-off beside another number is nothing."""
+    x = 0.0 if abs(x) < 1e-9 * beside else x
     return f"{float(f'{x:.2g}'):.6g}" if 1e-4 <= abs(x) < 1e6 or x == 0.0 else f"{x:.1e}"
 
 

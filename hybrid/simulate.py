@@ -20,6 +20,7 @@ import numpy as np
 
 from hybrid.accuracy import Climb, Errors, Sketch, summary
 from hybrid.adapt.manager import UserCriterion
+from hybrid.between import unseen_pulls
 from hybrid.errors import ResultError, SceneError
 from hybrid.freeze import freeze
 from hybrid.job import Job
@@ -257,7 +258,9 @@ def _amend(
                 if kind == "model" and final.model_error:
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
-    amend(target, fields, attributes, list(dict(reversed(climb.notes)).items()), done)
+    with open_result(target) as result:
+        unseen = unseen_pulls(result, errors.fields.get("total", {})) if climb.moves and errors is not None else []
+    amend(target, fields, attributes, [*dict(reversed(climb.notes)).items(), *unseen], done)
 
 
 UNITS_OF_ERRORS = {

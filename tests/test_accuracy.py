@@ -449,3 +449,12 @@ def test_a_model_error_that_cannot_be_true_is_not_counted():
     estimate.take_model(made_up((), 40.0, 0.1, 0.5, 50))
     assert estimate.errors.largest("model", "position") == 0.0
     assert [kind for kind, _ in estimate.notes] == ["error beyond estimate"]
+
+
+def test_a_pull_that_outputs_do_not_show_is_said():
+    """A pendulum's pull swings between outputs that come once a period: the curve through them is a straight line."""
+    rare = hybrid.run(swinging(accuracy="1%", output={"every": 0.6, "points": 5}, time={"duration": 6.0}))
+    often = hybrid.run(swinging(accuracy="1%", output={"every": 0.02, "points": 5}, time={"duration": 6.0}))
+    assert [e.kind for e in often.events if e.kind == "pull between outputs"] == []
+    said = [e.text for e in rare.events if e.kind == "pull between outputs"]
+    assert len(said) == 2 and all("leaves the curve" in x and "output.every: 0.06" in x for x in said)

@@ -128,6 +128,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "watch": ("errors", "physics", "model", "solve", "results"),
     "flat": ("errors", "scene", "model", "solve"),
     "freeze": ("errors", "compiled", ""),
+    "between": ("errors", "results/read"),
     "remainder": ("errors", "freeze", "accuracy", "scene", "model", "results"),
     "motion": (
         "errors",
@@ -164,6 +165,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     ),
     "simulate": (
         "errors",
+        "between",
         "freeze",
         "remainder",
         "accuracy",
@@ -207,13 +209,14 @@ ONLY = {
         "simulate",
         "ladder",
         "rungs",
+        "between",
         "remainder",
         "peers",
         "arbitrate",
         "scene/motion",
         "scene/record",
     ),
-    "scipy": ("model", "solve", "adapt", "results", "peers", "scene/motion", "scene/record"),
+    "scipy": ("between", "model", "solve", "adapt", "results", "peers", "scene/motion", "scene/record"),
     "numba": ("compiled",),
     "h5py": ("results/record", "results/format", "results/checkpoint", "results/read", "results/part", "results/vtk"),
     "matplotlib": (

@@ -18,6 +18,8 @@ from hybrid.results.views import STILL, free_edges
 
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
+# Of the largest tension: a torque that asks for less of it is no torque that throws loops.
+PART_OF_TENSION = 1e-4
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
     "Proc. Inst. Mech. Eng. 34, 1883; for cables F. Rosenthal, J. Appl. Mech. 43, 1976)"
@@ -176,8 +178,11 @@ def _bend(result: Result) -> Fact:
         text = f"{amount(1.0 / most, 'm')} {place(result, s)}{moment(result, t)}{inside}"
         text += f"{_doubt_of_radius(result, i, k)}."
         place_of = (t, s)
+    unknown = _bends_left_out(result)
+    text += unknown
     if limit is None:
-        return Fact("bend", title, f"{text} No allowed radius given.", "plain", values, *place_of)
+        weight = "note" if unknown else "plain"
+        return Fact("bend", title, f"{text} No allowed radius given.", weight, values, *place_of)
     ratio = curvature * limit  # above 1: too tight; NaN where nothing is allowed or forbidden
     if np.isnan(ratio).all():
         return Fact("bend", title, f"{text} No allowed radius given.", "plain", values, *place_of)
@@ -191,8 +196,20 @@ def _bend(result: Result) -> Fact:
         there = f": {amount(values['radius_there'], 'm')} {place(result, s)}{moment(result, t)}"
         said = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
         return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
+    if unknown:
+        said = f"Allowed are {amount(allowed, 'm')}; whether that holds there is not known."
+        return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
     said = f"Allowed are {amount(allowed, 'm')}: {short(100 * worst, 3)} % of that bend is used."
     return Fact("bend", title, f"{text} {said}", "plain", values, t, s)
+
+
+def _bends_left_out(result: Result) -> str:
+    """Where a bend was left out, so that no radius is known; empty where none was."""
+    found = [e for e in result.events if e.kind in ("point left out", "clamp left out")]
+    if not found:
+        return ""
+    where = ", ".join(dict.fromkeys(f"s = {x:.4g} m" for e in found for x in (e.s_a, e.s_b)))
+    return f" Not known at {where}, where the bend at a point load or clamp is left out: say always_rod there."
 
 
 def _recorded(result: Result, name: str) -> np.ndarray | None:
@@ -253,7 +270,7 @@ def _hockling(result: Result) -> Fact:
     stiffness, tension = result["bending_stiffness"], result.tension
     needed = np.divide(torque**2, 4.0 * stiffness, out=np.zeros_like(torque), where=stiffness > 0.0)
     scale = NOTHING * float(np.abs(tension).max())
-    if float(needed.max()) <= scale:
+    if float(needed.max()) <= PART_OF_TENSION * float(np.abs(tension).max()):
         i, k = _at(torque, int(np.abs(torque).argmax()))
         text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, is far too small for loops."
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}

@@ -299,7 +299,7 @@ def _lines(lines: Iterable[int]) -> str:
 
 
 def _number(x: float) -> str:
-    return repr(float(x))
+    return f"{x:.12g}"  # products of a deck's numbers carry round-off that nobody wants to read
 
 
 def _flow(data: Any) -> str:
