@@ -14,6 +14,7 @@ import io
 import pickle
 from collections.abc import Mapping
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,9 @@ NUMPY = {
     *((f"numpy.{core}.numeric", "_frombuffer") for core in ("core", "_core")),
 }  # fmt: skip
 
+# What has a part in the numbers of a file, of results; and what has none, of the rest.
+WRITES = tuple(f"results/{x}" for x in ("checkpoint", "format", "grid", "probes", "record", "touchdown"))
+SHOWS = ("cli", "live", "said", "ladder", "rungs", "machine")
 NOTHING: Mapping[str, object] = {}
 
 
@@ -36,8 +40,10 @@ NOTHING: Mapping[str, object] = {}
 def program() -> str:
     """Which program this is, for bytes that only the same one may read: version, and a hash of all that computes."""
     digest, package = hashlib.sha256(kernel_hash().encode()), Path(__file__).parent
-    for room in ROOMS:
-        for file in sorted(package.glob(f"{room}/*.py")) or [package / f"{room}.py"]:
+    digest.update(f"scipy {version('scipy')} h5py {version('h5py')}".encode())
+    for file in sorted(package.rglob("*.py")):
+        room = file.relative_to(package).with_suffix("").as_posix()
+        if not room.startswith("peers/") and (not room.startswith("results/") or room in WRITES) and room not in SHOWS:
             digest.update(file.read_bytes())
     return f"{hybrid.__version__} {digest.hexdigest()[:16]}"
 
@@ -66,7 +72,8 @@ def thaw(data: bytes, outside: Mapping[str, object] = NOTHING) -> Any:
             room = module.removeprefix("hybrid.").split(".")[0] if module.startswith("hybrid.") else ""
             if (module, name) in NUMPY or (room in ROOMS and name.isidentifier()):
                 found = getattr(importlib.import_module(module), name)
-                if isinstance(found, type) or (module, name) in NUMPY:
+                ours = isinstance(found, type) and found.__module__ == module  # not what the room has imported
+                if ours or (module, name) in NUMPY:
                     return found
             raise pickle.UnpicklingError(f"{module}.{name} is no part of a run")
 

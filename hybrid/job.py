@@ -33,7 +33,7 @@ from hybrid.motion import Motion
 from hybrid.physics.loads import SEABED, SURFACE
 from hybrid.remainder import Phase, changes_text
 from hybrid.rest import equilibrium_of, zones_and_rest
-from hybrid.results.checkpoint import Checkpoint, read_checkpoint
+from hybrid.results.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.results.format import Field
 from hybrid.results.notebook import Notebook
 from hybrid.results.probes import Observer, output_points
@@ -92,6 +92,7 @@ class Job:
         outputs = output_times(self.scene)
         keeps = climb if isinstance(target, Path) else None
         recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps, self._texts)
+        recorder.files = self._files
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones held", HELD)
         with recorder:
@@ -102,7 +103,7 @@ class Job:
             self._finish(motion, outputs)
         return self._seen(motion, target, clock.process_time() - begin)
 
-    def go_on(self, source: Path, target: Path) -> Sketch:
+    def go_on(self, source: Path, target: Path, climb: bytes = b"") -> Sketch:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
         with opened(source) as file:
@@ -112,9 +113,10 @@ class Job:
             motion = self._thawed(point, source)
             s = output_points(self.scene.output.points, motion.model.length)
             observer = self._observer(motion.model, motion.zoning, s)
-            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts)
+            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts, climb)
         now = self.changes[motion.changes - 1].scene if motion.changes else self.scene
         motion.rejoin(now, observer, recorder, target)
+        recorder.files = self._files
         with recorder:
             self._finish(motion, output_times(self.scene))
         return self._seen(motion, target, clock.process_time() - begin)
@@ -124,12 +126,22 @@ class Job:
         """What the file says of the scene, and of what changes."""
         return {"scene": scene_text(self.scene), "changes": changes_text(self.changes)}
 
+    @property
+    def _files(self) -> dict[str, str]:
+        """Digests of the motion files, by path: a run that goes on needs the same."""
+        ends = [end for x in (self.scene, *(x.scene for x in self.changes)) for end in (x.ends.start, x.ends.end)]
+        paths = {motion.file for end in ends if (motion := getattr(end, "motion", None)) is not None and motion.file}
+        return {path: digest_of(Path(path)) for path in sorted(paths)}
+
     def goes_on(self, source: Path, effort: Effort) -> bool:
         """Whether a file holds a run with this effort that was cut off."""
         if not is_result(source):
             return False
         with opened(source) as file:
             point = read_checkpoint(file)
+        with open_result(source) as result:
+            if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
+                return False
         return point is not None and point.program == program() and point.effort == freeze(thaw(freeze(effort)))
 
     def _thawed(self, point: Checkpoint, source: Path) -> Motion:
@@ -137,11 +149,23 @@ class Job:
         if point.asks and self.criterion is None:
             advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
             raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
+        now = self._files
+        changed = [path for path, digest in point.files.items() if now.get(path) != digest]
+        if changed:
+            detail = f"{', '.join(changed)}: other than when the run began"
+            raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
         effort = thaw(point.effort)
         outside: dict[str, object] = {"recorder": None, "criterion": self.criterion}
+        before = None
         for n, scene in enumerate((self.scene, *(x.scene for x in self.changes))):
-            outside |= {f"motion {n} {k}": x for k, x in build(scene, effort).ends.motions.items()}
-        motion: Motion = thaw(point.state, outside)
+            ends = build(scene, effort).ends
+            if before is not None:
+                ends.take_frames(before)
+            outside |= {f"motion {n} {k}": x for k, x in ends.motions.items()}
+            before = ends
+        motion = thaw(point.state, outside)
+        if not isinstance(motion, Motion):
+            raise ResultError(f"{source} has a checkpoint that is no run\n    try:      run its scene again")
         was = motion.model.ends.values.position.copy()
         motion.model.ends.at(motion.t)
         if not np.array_equal(was, motion.model.ends.values.position):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -69,14 +70,17 @@ def remainder(
         said = f"{path} was computed by hybrid-cable {wrote}" + " in another state" * (wrote == this)
         why = f"this is {this}, whose numbers may differ: a run goes on with the program that began it"
         raise ResultError(f"{said}\n    detail:   {why}\n    try:      that version, or run its scene again")
-    effort: Effort = thaw(point.effort)
+    effort = thaw(point.effort)
+    before = thaw(climb) if climb else None
+    if not (isinstance(effort, Effort) and isinstance(before, Climb | None)):
+        raise ResultError(f"{path} has a checkpoint that is no run\n    try:      run its scene again")
+    if start is not None and not settings:
+        raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
-        if start is not None:
-            raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
         if status == "complete" and not climb:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return Remainder(scene, changes, effort, thaw(climb) if climb else None, False, point.t)
+        return Remainder(scene, changes, effort, before, False, point.t)
     if until is not None:
         scene, changes = _longer(scene, changes, until, point.t)
     anew = False
@@ -85,6 +89,8 @@ def remainder(
         last = changes[-1] if changes else Phase(0.0, scene)
         changed = parse_scene(scene_text(last.scene), overrides=settings)
         end = changed.require_time().duration
+        if until is not None and end != until:
+            raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
         _check(last, changed, effort, begin, end)
         if end != scene.require_time().duration:
             scene, changes = _longer(scene, changes, end, point.t)
@@ -102,9 +108,13 @@ def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, bytes, Checkpoint
         climb, point = climb_of(file), read_checkpoint(file)
         with open_result(path) as result:
             scene = parse_scene(result.scene_text)
-            told = json.loads(result.changes_text or "[]")
-            changes = tuple(Phase(x["t"], parse_scene(x["scene"])) for x in told)
             status = result.status
+            try:
+                told = json.loads(result.changes_text or "[]")
+                changes = tuple(Phase(float(x["t"]), parse_scene(x["scene"])) for x in told)
+            except (ValueError, TypeError, KeyError) as error:
+                advice = f"    detail:   {error}\n    try:      run its scene again"
+                raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
     if point is None:
         why = "it is an equilibrium, was kept in memory first, or ended before its first output"
         raise ResultError(
@@ -115,8 +125,13 @@ def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, bytes, Checkpoint
 
 def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float) -> tuple[Scene, tuple[Phase, ...]]:
     """The same until another time, with outputs as often as before."""
-    if not until >= reached:
-        raise _refused("until", f"{until:g} s", f"a time from {reached:g} s on, which is computed", "")
+    if not (until >= reached and math.isfinite(until)):
+        fix = "the file holds everything before: hybrid.open(path).at(t=...)"
+        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    later = [x.t for x in changes if x.t >= until]
+    if later:
+        fix = "a later end; a change that was asked for cannot be taken back"
+        raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
     every = output_interval(scene)
 
     def other(scene: Scene) -> Scene:
@@ -140,21 +155,25 @@ def _check(last: Phase, changed: Scene, effort: Effort, begin: float, end: float
     check_motions(changed)
     model = build(changed, effort)
     before, after = build(last.scene, effort).ends, model.ends
+    after.take_frames(before)
     for k, name in enumerate(("start", "end")):
-        if not before.values.held[k]:
-            continue
-        (x, v), (y, w) = (_place(ends, k, begin) for ends in (before, after))
-        apart, faster = (float(np.linalg.norm(a - b)) for a, b in ((x, y), (v, w)))
-        if apart > SAME_PLACE * model.length or faster > SAME_SPEED * model.length / model.time_scale:
-            given = f"one that jumps by {apart:.3g} m and {faster:.3g} m/s at t = {begin:g} s"
+        held = bool(before.values.held[k])
+        one, other = (_place(ends, k, begin) for ends in (before, after))
+        apart, faster, turned, spun = (float(np.linalg.norm(a - b)) for a, b in zip(one, other, strict=True))
+        jumps = held and (apart > SAME_PLACE * model.length or faster > SAME_SPEED * model.length / model.time_scale)
+        if jumps or turned > SAME_PLACE or spun > SAME_SPEED / model.time_scale:
+            sizes = ((apart, "m"), (faster, "m/s"), (turned, "rad"), (spun, "rad/s"))
+            by = ", ".join(f"{x:.3g} {unit}" for x, unit in sizes if x > 1e-9)
+            given = f"one that jumps by {by} at t = {begin:g} s"
             fix = "times count from the start of the run: travel {by, over, begin} starts from rest where the end is"
             expected = "a motion that goes on where the one before it is"
             raise _refused(f"ends.{name}.motion", given, expected, fix)
 
 
-def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
-    position = ends.at(t).position[k].copy()
-    return position, ends.velocity[k].copy()
+def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
+    """Position (3,) m, velocity (3,) m/s, frame (9,) and its spin (3,) rad/s of an end."""
+    now = ends.at(t)
+    return now.position[k].copy(), ends.velocity[k].copy(), now.frame[k].copy(), now.spin[k].copy()
 
 
 def _plain(scene: Scene) -> dict[str, Any]:

@@ -85,6 +85,8 @@ def run(
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     job, target = Job(scene, criterion), _target(output, overwrite)
     with claimed(_path(output)), _working(job, progress):
+        if isinstance(target, Path):
+            _beside(target).unlink(missing_ok=True)  # of a run that was cut off
         _run(job, target)
     return open_result(target)
 
@@ -135,11 +137,11 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
     def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
         if anew or source is None or isinstance(to, io.BytesIO):
             return job.record(effort, to, kept())
-        return job.go_on(source, to)
+        return job.go_on(source, to, kept())
 
     def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
         if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
-            return job.go_on(to, to)
+            return job.go_on(to, to, kept())
         return job.record(effort, to, kept())
 
     def kept() -> bytes:
@@ -217,7 +219,7 @@ def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[
             target.truncate()
             target.write(new.getvalue())
             return found
-        beside = target.with_name(f".{target.name}.finer")
+        beside = _beside(target)
         try:
             found = later(effort, beside)
             os.replace(beside, target)
@@ -307,16 +309,22 @@ class _Told:
             self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
 
 
+def _beside(target: Path) -> Path:
+    """Where a finer result is computed, until it is complete."""
+    return target.with_name(f".{target.name}.finer")
+
+
 def _path(output: str | Path | None) -> Path | None:
     return None if output is None else Path(output).expanduser().resolve()
 
 
 def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:
     """Where the result goes; ResultError, before anything is computed, if it cannot go there."""
-    if output is None:
+    path = _path(output)
+    if path is None:
         return io.BytesIO()
-    check_target(Path(output).expanduser().resolve(), overwrite)
-    return Path(output)
+    check_target(path, overwrite)
+    return path
 
 
 @contextmanager

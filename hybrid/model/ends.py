@@ -42,6 +42,8 @@ class Moves(Protocol):
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]: ...
 
+    def turn_from(self, frame: Floats) -> None: ...
+
 
 class EndLoad(NamedTuple):
     """A force (N) or moment (N m) on end 0 or 1 that acts until a time (s).
@@ -93,6 +95,7 @@ class EndConditions:
 
     def go_on_from(self, old: EndConditions, t: float) -> None:
         """Take the place of other conditions at t (s): tangents that are being turned in go on."""
+        self.take_frames(old)
         self._turns, self._bring_in = dict(old._turns), old._bring_in
         ramped = {(x.what, x.end): x.ramp for x in old._loads}
         self._loads = tuple(
@@ -100,6 +103,13 @@ class EndConditions:
         )
         self.set_loads(t)
         self.at(t)
+
+    def take_frames(self, old: EndConditions) -> None:
+        """Stand at rest as other conditions do: what no scene says of a frame hangs on the shape it started from."""
+        self._given = (old._given[0].copy(), self._given[1])
+        self.values.frame[:] = old._given[0]
+        for k, motion in self.motions.items():
+            motion.turn_from(old._given[0][k].reshape(3, 3))
 
     def at(self, t: float) -> Ends:
         """Positions, frames and loads at t; the arrays returned are overwritten by the next call.

@@ -14,6 +14,7 @@ import hashlib
 import json
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
+from glob import escape
 from itertools import pairwise
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -34,7 +35,8 @@ _BLOCK = 1 << 22  # bytes that are copied at a time
 class Checkpoint(NamedTuple):
     """What a run goes on from.
 
-    number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; rows: of every
+    number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; files:
+    digests of the files that it reads, by path; rows: of every
     table of the file that belong to it; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it
     is computed and where it is.
     """
@@ -43,6 +45,7 @@ class Checkpoint(NamedTuple):
     t: float
     program: str
     asks: bool
+    files: dict[str, str]
     rows: dict[str, int]
     zones: list[tuple[str, float, float]]
     effort: bytes
@@ -52,11 +55,14 @@ class Checkpoint(NamedTuple):
 def create_slots(file: h5py.File, climb: bytes) -> None:
     """Make room for checkpoints in a new file; climb: what was found before the run, b"" if nothing."""
     for name in SLOTS:
-        file.create_dataset(name, (0,), "u1", maxshape=(None,), chunks=(_CHUNK,))
+        file.create_dataset(name, (0,), "u1", maxshape=(None,), chunks=(_CHUNK,)).make_scale(name)
+    write_climb(file, climb)
+
+
+def write_climb(file: h5py.File, climb: bytes) -> None:
+    """Write what was found before the run.  A dataset is a scale of itself: programs look for dimensions."""
     if climb:
-        file.create_dataset(CLIMB, data=np.frombuffer(climb, "u1"))
-    for name in (*SLOTS, CLIMB) if climb else SLOTS:
-        file[name].make_scale(name)  # of itself: programs that look for dimensions find one
+        file.create_dataset(CLIMB, data=np.frombuffer(climb, "u1")).make_scale(CLIMB)
 
 
 def write_checkpoint(file: h5py.File, point: Checkpoint) -> None:
@@ -65,7 +71,7 @@ def write_checkpoint(file: h5py.File, point: Checkpoint) -> None:
     parts = (head, point.effort, point.state)
     body = b"".join([*(len(x).to_bytes(8, "little") for x in parts), *parts])
     data = _MAGIC + hashlib.blake2b(body, digest_size=_DIGEST).digest() + body
-    slot = file[SLOTS[point.number % 2]]
+    slot = file[SLOTS[int(point.number) % 2]]
     if slot.shape[0] < len(data):
         slot.resize(len(data), axis=0)
     slot[: len(data)] = np.frombuffer(data, "u1")
@@ -99,13 +105,21 @@ def _parsed(data: bytes) -> Checkpoint | None:
         return None
     cuts = [24, *(24 + sum(sizes[: k + 1]) for k in range(3))]
     head, effort, state = (body[i:j] for i, j in pairwise(cuts))
-    found = json.loads(head)
-    return Checkpoint(**found | {"zones": [tuple(z) for z in found["zones"]], "effort": effort, "state": state})
+    try:
+        found = json.loads(head)
+        point = Checkpoint(**found | {"zones": [tuple(z) for z in found["zones"]], "effort": effort, "state": state})
+    except (ValueError, TypeError, KeyError, AttributeError):
+        return None
+    good = isinstance(point.number, int) and isinstance(point.t, float) and isinstance(point.program, str)
+    good = good and isinstance(point.files, dict) and isinstance(point.rows, dict)
+    return point if good and all(isinstance(x, int) and x >= 0 for x in point.rows.values()) else None
 
 
 def _has_rows(file: h5py.File, point: Checkpoint) -> bool:
     for scale, count in point.rows.items():
-        data = file[scale]
+        data = file.get(scale)
+        if not isinstance(data, h5py.Dataset):
+            return False
         if file.swmr_mode:
             data.refresh()
         if data.shape[0] < count:
@@ -176,6 +190,14 @@ def _word(value: Any) -> str:
     return value.decode() if isinstance(value, bytes) else str(value)
 
 
+def digest_of(path: Path) -> str:
+    """Digest of a file's content; "" if it is not there."""
+    try:
+        return hashlib.blake2b(path.read_bytes(), digest_size=_DIGEST).hexdigest()
+    except OSError:
+        return ""
+
+
 @contextmanager
 def claimed(path: Path | None) -> Iterator[None]:
     """Hold a result for writing, against other processes, until the end; ResultError if one holds it."""
@@ -193,7 +215,7 @@ def claimed(path: Path | None) -> Iterator[None]:
         advice = "a folder you may write to, with free space"
         raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
     try:
-        for left in path.parent.glob(f".{path.name}.*.new"):  # of a process that was killed
+        for left in path.parent.glob(f".{escape(path.name)}.[0-9]*.new"):  # of a process that was killed
             left.unlink(missing_ok=True)
         yield
     finally:

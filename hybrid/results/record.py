@@ -29,7 +29,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import LEFT_OUT, ResultError
-from hybrid.results.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint
+from hybrid.results.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint, write_climb
 from hybrid.results.format import (
     BLOCK,
     CACHE,
@@ -163,7 +163,7 @@ class Recorder:
     @classmethod
     def again(
         cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
-        texts: Mapping[str, str],
+        texts: Mapping[str, str], climb: bytes,
     ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
@@ -175,7 +175,7 @@ class Recorder:
             raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
 
         ours = {f.name for f in fields}
-        later = {x for x in names_in(source, "errors") if x not in ours}  # known only when all is done
+        later = {x for x in names_in(source, "errors") if x not in ours} | {CLIMB}  # known only when all is done
 
         def fill(new: Path) -> None:
             ask_for_room(new, Path(source.filename).stat().st_size, "")
@@ -183,6 +183,7 @@ class Recorder:
             with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
                 set_status(file, "running", "")
                 write_texts(file, texts)
+                write_climb(file, climb)
                 for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
                     del file.attrs[name]
 
@@ -204,6 +205,7 @@ class Recorder:
         self._zones: list[tuple[str, float, float]] | None = None
         self.last = -np.inf  # time of the last output, s
         self._number = 0  # of the next checkpoint
+        self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
         self._happened: Counter[str] = Counter()  # events by kind
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
         self.closed = self._broken = False
@@ -281,7 +283,9 @@ class Recorder:
         point = None
         if frozen is not None:
             rows = {table.scale: table.count + len(table.rows) for table in self._all}
-            point = Checkpoint(self._number, self.last, program, asks, rows, self._zones or [], *frozen())
+            point = Checkpoint(
+                self._number, self.last, program, asks, dict(self.files), rows, self._zones or [], *frozen()
+            )
         self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
         self._number += point is not None
         self._flushed = monotonic()

@@ -100,6 +100,10 @@ class EndMotion:
         frame, spin = self._rotation(t) if self._rotates else (self._frame, self._still)
         return position, velocity, frame, spin
 
+    def turn_from(self, frame: ArrayLike) -> None:
+        """Turn another frame (3, 3) from now on."""
+        self._frame = None if self._frame is None else _constant(frame)
+
     def _translation(self, t: float) -> tuple[Array, Array]:
         if self._shift_spline is not None:
             t = min(t, self._last)

@@ -127,6 +127,9 @@ def test_there_is_nothing_left_of_a_complete_run(whole):
     ("more", "match"),
     [
         ({"until": 1.0}, "until"),
+        ({"until": float("inf")}, "until"),
+        ({"until": 3.0, "start": 2.5}, "from"),
+        ({"until": 3.0, "settings": ["time.duration=4"]}, "say it once"),
         ({"start": 1.0}, r"(?s)from.*--set"),
         ({"settings": ["cable.sections[0].mass=2.0"]}, "from|sections"),
         ({"settings": ["cable.sections[0].mass=2.0"], "until": 3.0}, r"(?s)sections.*run the changed scene"),
@@ -214,10 +217,16 @@ def test_an_end_that_moves_otherwise_is_noticed(tmp_path, monkeypatch):
     }
     path = stopped(tmp_path / "run.h5", monkeypatch, swinging(ends=ends))
     csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{2 * b:.9f},0,0\n" for a, b in zip(t, way, strict=True)))
-    with pytest.raises(hybrid.ResultError, match="motion file changed"):
+    with pytest.raises(hybrid.ResultError, match=r"motion\.csv: other than when the run began"):
+        hybrid.resume(path)
+    # a change beyond the checkpoint is one as well
+    kept = way.copy()
+    kept[-1] += 1e-6
+    csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{b:.9f},0,0\n" for a, b in zip(t, kept, strict=True)))
+    with pytest.raises(hybrid.ResultError, match="other than when the run began"):
         hybrid.resume(path)
     csv.unlink()
-    with pytest.raises(hybrid.SceneError, match=r"motion\.csv"):
+    with pytest.raises((hybrid.SceneError, hybrid.ResultError), match=r"motion\.csv"):
         hybrid.resume(path)
 
 
@@ -351,3 +360,98 @@ def test_a_file_of_a_newer_format_is_refused(whole):
     for attempt in (hybrid.open, hybrid.resume):
         with pytest.raises(hybrid.ResultError, match="result format 2; this program reads format 1"):
             attempt(whole)
+
+
+# ---- what an adversary found -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "more", [{"until": 8.0}, {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 4.5}]
+)
+def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, monkeypatch):
+    """The climb of the run before it is not that of the run that goes on."""
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5", "dimension=null"])
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, progress=stopping).close()
+    begun = stopped(tmp_path / "begun.h5", monkeypatch, scene, stopping.heard - 10)
+    (tmp_path / "run.h5").write_bytes(begun.read_bytes())
+    hybrid.resume(begun, tmp_path / "whole.h5", **more).close()
+    stopping = Stopping(monkeypatch)
+    hybrid.resume(begun, tmp_path / "counted.h5", progress=stopping, **more).close()
+    steps = stopping.heard
+    stopping.left = steps - 5  # in the result, after the runs to compare with
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(tmp_path / "run.h5", progress=stopping, **more)
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_finer_result_of_another_scene_is_not_taken(tmp_path):
+    """What a killed run has left beside its file is of that run."""
+    file, settings = "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"]
+    scene = hybrid.load_scene(EXAMPLES / file, settings)
+    other = hybrid.load_scene(EXAMPLES / file, [*settings, "title=other", "output.points=51"])
+    left = tmp_path / ".run.h5.finer"
+    hybrid.run(scene, tmp_path / "run.h5").close()
+    left.write_bytes((tmp_path / "run.h5").read_bytes())
+    with hybrid.run(other, tmp_path / "run.h5") as result:
+        assert result.title == "other" and len(result.s) == 51
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.parametrize("setting", ["ends.end.motion.pitch.amplitude=-60", "ends.end.motion=null"])
+def test_an_end_that_would_turn_at_once_is_refused(setting, tmp_path):
+    data = {
+        "cable": {"sections": [{"length": 2.0, "mass": 1.0, "bending_stiffness": 5.0, "torsional_stiffness": 5.0}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {
+                "kind": "guided", "tangent": [1, 0, 0], "force": [20, 0, 0],
+                "motion": {"pitch": {"amplitude": 20, "period": 4}, "ramp": 1},
+            },
+        },
+        "environment": {"gravity": 0.0}, "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod",
+        "mesh": {"cells": 10}, "time": {"duration": 1.0, "step": 0.02},
+        "output": {"every": 0.1, "points": 5, "errors": False},
+    }  # fmt: skip
+    hybrid.run(hybrid.validate_scene(data), tmp_path / "run.h5").close()
+    with pytest.raises(hybrid.SceneError, match=r"(?s)jumps by.*rad"):
+        hybrid.resume(tmp_path / "run.h5", until=2.0, settings=[setting])
+
+
+def test_an_end_before_a_change_is_refused(tmp_path, monkeypatch, whole):
+    more = {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 2.6, "until": 3.0}
+    stopping = Stopping(monkeypatch)
+    stopping.left = 20
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(whole, progress=stopping, **more)
+    with pytest.raises(hybrid.SceneError, match=r"after the change at 2\.6 s"):
+        hybrid.resume(whole, until=2.5)
+
+
+def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
+    """Its digest is right, and what it says is not."""
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    with h5py.File(path) as file:
+        point = checkpoint.read_checkpoint(file)
+    odd = [
+        {"effort": freeze.freeze([1.0])}, {"state": freeze.freeze(point.rows)}, {"rows": {"nowhere": 3}},
+        {"rows": {"t": -1}}, {"number": 0.0}, {"t": "now"},
+    ]  # fmt: skip
+    for wrong in odd:
+        with h5py.File(path, "r+") as file:
+            for name in checkpoint.SLOTS:  # both, so that there is none to fall back on
+                file[name][:] = 0
+            checkpoint.write_checkpoint(file, point._replace(**({"number": 0} | wrong)))
+        with pytest.raises(hybrid.ResultError, match="checkpoint"):
+            hybrid.resume(path)
+
+
+def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"])
+    hybrid.run(scene, "~/run.h5").close()
+    (tmp_path / "link.h5").symlink_to("run.h5")
+    hybrid.run(scene, tmp_path / "link.h5").close()
+    assert (tmp_path / "link.h5").is_symlink()
+    assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "link.h5"}
