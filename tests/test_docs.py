@@ -211,3 +211,11 @@ def test_example_has_a_header_and_a_picture(example: Path) -> None:
 
 def test_every_picture_is_small() -> None:
     assert all(picture.stat().st_size <= 150_000 for picture in PICTURES.iterdir())
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
+def test_no_figure_is_still_to_come(page: Path) -> None:
+    """A cell, or a line of a block, that is one word in capitals is a place kept for a number."""
+    text = page.read_text(encoding="utf-8")
+    kept = re.findall(r"^\|?(?:.*\|)? *([A-Z]{4,}(?:_[A-Z]+)*) *(?:\|.*)?$", text, re.MULTILINE)
+    assert not [x for x in kept if x not in ("MISSED",)], kept
