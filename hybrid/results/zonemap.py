@@ -95,7 +95,7 @@ def _lines(result: Result, store: Store, cells: Any) -> list[Spec]:
     for n, edge in enumerate(free_edges(result)):
         s = result["touchdown"][:, edge]
         k = outline(np.where(np.isfinite(s), s, np.nanmean(s)))
-        casing = _line(store, result.times[k], s[k], "touchdown (white)", INK, 3.5) | {"showlegend": n == 0}
+        casing = _line(store, result.times[k], s[k], "touchdown (white, dark edges)", INK, 3.5) | {"showlegend": n == 0}
         data += [casing, _line(store, result.times[k], s[k], "", "#FFFFFF", 1.8) | {"showlegend": False}]
     return data
 
