@@ -287,7 +287,9 @@ class Recorder:
                 self._number, self.last, program, asks, dict(self.files), rows, self._zones or [], *frozen()
             )
         self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
-        self._number += point is not None
+        if point is not None:
+            self._number += 1
+            os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
         self._flushed = monotonic()
         self._took = self._flushed - begin
 
