@@ -27,7 +27,7 @@ Place = tuple[str | int, ...]
 
 # No length, time, mass, force or stiffness of a cable is larger in SI units; products of several such numbers, and
 # their squares, are still far from where a double overflows (1e308).
-LARGEST_NUMBER = 1e18
+LARGEST_NUMBER = 1e20
 # What cannot be negative is nothing or at least this: smaller numbers are slips, and what is divided by them overflows.
 SMALLEST_NUMBER = 1e-30
 # No mesh and no output needs more; numpy and JSON stop at 2^63.
