@@ -367,7 +367,7 @@ def main(arguments: list[str] | None = None) -> None:
 @contextmanager
 def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
     """The voice of one command; errors become words and exit codes."""
-    from hybrid.errors import ComputationError, ResultError, SceneError
+    from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
     from hybrid.live import Voice
 
     voice, code = Voice(as_json, quiet), 0
@@ -383,6 +383,9 @@ def _speaking(as_json: bool, quiet: bool) -> Iterator[Voice]:
     except ComputationError as error:
         voice.failed(error)
         code = FAILED
+    except ResultHeld as error:
+        voice.error("result", str(error))
+        code = REFUSED
     except ResultError as error:
         voice.error("result", str(error), file=voice.written)
         code = FAILED if voice.written else REFUSED

@@ -58,6 +58,10 @@ class ResultError(HybridError):
     """A result file cannot be written, opened or understood."""
 
 
+class ResultHeld(ResultError):
+    """Another process is writing the result file."""
+
+
 class Outcome(IntEnum):
     """How one time step (or one static solve) ended."""
 
@@ -118,7 +122,7 @@ EVENTS_BY_WEIGHT = (
 # Kinds of events of zones that change: they tell of the run as it should be.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 # All kinds that call nothing into question: those, and what was asked for while the run was on its way.
-NEWS = (*ZONE_EVENTS, "loads change")
+EXPECTED = (*ZONE_EVENTS, "loads change")
 # Kind of the event that says how many of another kind (its criterion) were too many to write (its value).
 LEFT_OUT = EVENTS_BY_WEIGHT[-1]
 

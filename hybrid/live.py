@@ -26,7 +26,7 @@ from rich.segment import ControlType
 from rich.text import Text
 
 import hybrid
-from hybrid.errors import NEWS, weight_of_event
+from hybrid.errors import EXPECTED, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
@@ -289,7 +289,7 @@ class Voice:
             kinds.setdefault(event.kind, []).append(event)
         for found in kinds.values():
             self.json("note", **found[0]._asdict(), count=len(found))
-        news = [found for kind, found in kinds.items() if kind not in NEWS]
+        news = [found for kind, found in kinds.items() if kind not in EXPECTED]
         for found in news[:KINDS_SHOWN]:
             more = f" ({len(found) - 1} more like this)" if len(found) > 1 else ""
             self.note(f"note: t = {found[0].t:.4g} s: {found[0].text}{more}")

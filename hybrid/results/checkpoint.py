@@ -23,7 +23,7 @@ import h5py
 import numpy as np
 from filelock import FileLock, Timeout
 
-from hybrid.errors import ResultError
+from hybrid.errors import ResultError, ResultHeld
 
 SLOTS, CLIMB = ("checkpoint/slot_0", "checkpoint/slot_1"), "checkpoint/climb"
 _MAGIC = b"hybrid checkpoint 1\n"
@@ -35,10 +35,10 @@ _BLOCK = 1 << 22  # bytes that are copied at a time
 class Checkpoint(NamedTuple):
     """What a run goes on from.
 
-    number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; files:
-    digests of the files that it reads, by path; rows: of every
-    table of the file that belong to it; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it
-    is computed and where it is.
+    number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; files: digests of
+    the files that it reads, by path; rows: of every table of the file that belong to it; happened: events by kind,
+    those not written included; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it is computed and
+    where it is.
     """
 
     number: int
@@ -47,6 +47,7 @@ class Checkpoint(NamedTuple):
     asks: bool
     files: dict[str, str]
     rows: dict[str, int]
+    happened: dict[str, int]
     zones: list[tuple[str, float, float]]
     effort: bytes
     state: bytes
@@ -111,8 +112,9 @@ def _parsed(data: bytes) -> Checkpoint | None:
     except (ValueError, TypeError, KeyError, AttributeError):
         return None
     good = isinstance(point.number, int) and isinstance(point.t, float) and isinstance(point.program, str)
-    good = good and isinstance(point.files, dict) and isinstance(point.rows, dict)
-    return point if good and all(isinstance(x, int) and x >= 0 for x in point.rows.values()) else None
+    good = good and all(isinstance(x, dict) for x in (point.files, point.rows, point.happened))
+    counts = [*point.rows.values(), *point.happened.values()] if good else []
+    return point if good and all(isinstance(x, int) and x >= 0 for x in counts) else None
 
 
 def _has_rows(file: h5py.File, point: Checkpoint) -> bool:
@@ -210,7 +212,7 @@ def claimed(path: Path | None) -> Iterator[None]:
         lock.acquire()
     except Timeout:
         advice = "another name with -o, or wait until it has ended"
-        raise ResultError(f"{path} is being written by another process\n    try:      {advice}") from None
+        raise ResultHeld(f"{path} is being written by another process\n    try:      {advice}") from None
     except OSError as error:
         advice = "a folder you may write to, with free space"
         raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error

@@ -190,7 +190,7 @@ class Recorder:
         self._write_to(_created(path.expanduser().resolve(), None, fill), path, tables)
         for table, count in zip(self._all, at.rows.values(), strict=True):
             table.count = count
-        self._happened.update(x.decode() for x in self._file["events/kind"][: self._events.count])
+        self._happened.update(at.happened)
         self._zones, self._number, self.last = list(at.zones), at.number + 1, float(self._file["t"][-1])
         return self
 
@@ -284,7 +284,15 @@ class Recorder:
         if frozen is not None:
             rows = {table.scale: table.count + len(table.rows) for table in self._all}
             point = Checkpoint(
-                self._number, self.last, program, asks, dict(self.files), rows, self._zones or [], *frozen()
+                self._number,
+                self.last,
+                program,
+                asks,
+                dict(self.files),
+                rows,
+                dict(self._happened),
+                self._zones or [],
+                *frozen(),
             )
         self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
         if point is not None:

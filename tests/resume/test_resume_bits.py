@@ -8,6 +8,8 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
+from hybrid.errors import LEFT_OUT
+from hybrid.results import record
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the corrected catenary,
@@ -80,6 +82,17 @@ def test_what_the_user_asks_of_zones_is_given_again(tmp_path, monkeypatch):
         hybrid.run(scene, tmp_path / "run.h5", criterion=wish, progress=stopping)
     with pytest.raises(hybrid.ResultError, match="criterion"):
         hybrid.resume(tmp_path / "run.h5")
+
+
+def test_events_that_are_too_many_are_counted_on(tmp_path, monkeypatch):
+    """Of those that are not written the file says how many there were, also where the run was stopped in between."""
+    monkeypatch.setattr(record, "MOST_OF_A_KIND", 2)
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["time.duration=30"])
+    stopping = Stopping(monkeypatch)
+    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
+        assert [e.value for e in whole.events if e.kind == LEFT_OUT]
+    assert went_on(scene, tmp_path / "run.h5", stopping, [280]) == 1
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
 def test_into_another_file(tmp_path, monkeypatch):

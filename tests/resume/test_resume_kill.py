@@ -10,6 +10,8 @@ import pytest
 from bits import differences
 
 import hybrid
+from hybrid.results.checkpoint import read_checkpoint
+from hybrid.results.read import opened
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RUN = "import sys, hybrid; hybrid.run(hybrid.load_scene(sys.argv[1], sys.argv[3:]), sys.argv[2])"
@@ -56,12 +58,7 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
                 break
             with hybrid.open(path) as result:
                 went["opened"] += 1
-                if result.status == "complete":  # killed while its errors were estimated, or after
-                    went["outputs recomputed"] = max(went["outputs recomputed"], 0)
-                else:
-                    from hybrid.results.checkpoint import read_checkpoint
-                    from hybrid.results.read import opened
-
+                if result.status != "complete":  # else it was killed while its errors were estimated, or after
                     with opened(path) as file:
                         lost = int((result.times > read_checkpoint(file).t).sum())
                     went["outputs recomputed"] = max(went["outputs recomputed"], lost)

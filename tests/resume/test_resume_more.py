@@ -231,6 +231,8 @@ def test_an_end_that_moves_otherwise_is_noticed(tmp_path, monkeypatch):
 
 
 def test_two_processes_on_one_file(tmp_path, monkeypatch):
+    from hybrid.cli import main
+
     path = stopped(tmp_path / "run.h5", monkeypatch)
     script = f"""
         import time
@@ -247,6 +249,9 @@ def test_two_processes_on_one_file(tmp_path, monkeypatch):
             with pytest.raises(hybrid.ResultError, match="another process"):
                 attempt()
         assert path.read_bytes() == before
+        with pytest.raises(SystemExit) as left:
+            main(["resume", str(path)])
+        assert left.value.code == 1
         other.kill()
     hybrid.resume(path).close()  # a lock of a process that is gone does not hold
     assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
@@ -436,7 +441,7 @@ def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
         point = checkpoint.read_checkpoint(file)
     odd = [
         {"effort": freeze.freeze([1.0])}, {"state": freeze.freeze(point.rows)}, {"rows": {"nowhere": 3}},
-        {"rows": {"t": -1}}, {"number": 0.0}, {"t": "now"},
+        {"rows": {"t": -1}}, {"happened": {"merge": "often"}}, {"number": 0.0}, {"t": "now"},
     ]  # fmt: skip
     for wrong in odd:
         with h5py.File(path, "r+") as file:
