@@ -37,8 +37,8 @@ class Checkpoint(NamedTuple):
 
     number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; files: digests of
     the files that it reads, by path; rows: of every table of the file that belong to it; happened: events by kind,
-    those not written included; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it is computed and
-    where it is.
+    those not written included; zones: (kind, s_a, s_b) of the last output; effort, state: bytes, how finely it is
+    computed and where it is.
     """
 
     number: int
