@@ -16,9 +16,9 @@ from pathlib import Path
 
 import hybrid
 from hybrid.errors import HybridError
-from hybrid.ladder import ACCURACIES
-from hybrid.results.tradeplot import plot_trade
-from hybrid.rungs import Doing
+from hybrid.studies.runs import Doing
+from hybrid.studies.tradeoff import ACCURACIES
+from hybrid.view.tradeoff import plot_trade
 
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
@@ -63,8 +63,8 @@ print(table.recommendation)
 print(table.recommended, table.front(), table.rows)
 ```
 
-Other programs run in processes of their own (`hybrid/peers/` has an adapter for each): a uniform line between two
-points that are held or moved, in still water, on a level seabed. Their CPU time holds their search for the rest, too.
+Other programs run in processes of their own (`hybrid/studies/peers/` has an adapter for each): a uniform line between
+two points, held or moved, in still water, on a level seabed. Their CPU time includes their statics.
 
 The sections below are the pages that the program has written for example scenes, by `python docs/make_trade.py`.
 """

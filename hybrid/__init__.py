@@ -18,42 +18,42 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from hybrid.adapt.manager import Look
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
-    from hybrid.ladder import trade
+    from hybrid.exports.api import export
+    from hybrid.interop.moordyn import import_moordyn
     from hybrid.model.plan import plan
-    from hybrid.results.export import export
-    from hybrid.results.plot import plot_summary as plot
-    from hybrid.results.read import Result
-    from hybrid.results.read import open_result as open
-    from hybrid.results.report import write_report as report
-    from hybrid.results.zoneplot import plot_zones
-    from hybrid.scene.moordyn import import_moordyn
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
-    from hybrid.simulate import resume, run, static
+    from hybrid.simulation.api import resume, run, static
+    from hybrid.store.reader import Result
+    from hybrid.store.reader import open_result as open
+    from hybrid.studies.tradeoff import trade
+    from hybrid.view.plots import plot_summary as plot
+    from hybrid.view.report import write_report as report
+    from hybrid.view.zone_plot import plot_zones
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
     "Look": ("hybrid.adapt.manager", "Look"),
     "Outcome": ("hybrid.errors", "Outcome"),
-    "Result": ("hybrid.results.read", "Result"),
+    "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
-    "export": ("hybrid.results.export", "export"),
-    "import_moordyn": ("hybrid.scene.moordyn", "import_moordyn"),
+    "export": ("hybrid.exports.api", "export"),
+    "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
-    "open": ("hybrid.results.read", "open_result"),
+    "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
-    "plot": ("hybrid.results.plot", "plot_summary"),
-    "plot_zones": ("hybrid.results.zoneplot", "plot_zones"),
-    "report": ("hybrid.results.report", "write_report"),
-    "resume": ("hybrid.simulate", "resume"),
-    "run": ("hybrid.simulate", "run"),
+    "plot": ("hybrid.view.plots", "plot_summary"),
+    "plot_zones": ("hybrid.view.zone_plot", "plot_zones"),
+    "report": ("hybrid.view.report", "write_report"),
+    "resume": ("hybrid.simulation.api", "resume"),
+    "run": ("hybrid.simulation.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
-    "static": ("hybrid.simulate", "static"),
-    "trade": ("hybrid.ladder", "trade"),
+    "static": ("hybrid.simulation.api", "static"),
+    "trade": ("hybrid.studies.tradeoff", "trade"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
 }
 

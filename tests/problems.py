@@ -33,11 +33,11 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, j0
 
 from hybrid import Scene
 from hybrid.errors import Outcome
+from hybrid.kernels.assembly import SIZE, WIDTH, march, workspace
+from hybrid.kernels.state import Ends, State
 from hybrid.model.build import Model, build
-from hybrid.model.state import Ends, State
-from hybrid.solve.march import SIZE, WIDTH, march, workspace
 from hybrid.solve.statics import solve_statics
-from hybrid.solve.timestep import Stepper
+from hybrid.solve.stepper import Stepper
 
 Floats = NDArray[np.float64]
 Kick = Callable[[State, Model], None]

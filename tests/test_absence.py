@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.build import Model, build
-from hybrid.physics.loads import (
+from hybrid.kernels.loads import (
     ADDED_MASS,
     BODIES,
     DRAG,
@@ -28,6 +27,7 @@ from hybrid.physics.loads import (
     SURFACE,
     WAVES,
 )
+from hybrid.model.build import Model, build
 
 BARE = {"length": 2.0, "mass": 0.1}
 BENDS = BARE | {"bending_stiffness": 1.0e-2}

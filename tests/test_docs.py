@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 import hybrid
-from hybrid.cli import main
+from hybrid.cli.commands import main
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -145,7 +145,7 @@ def test_trade_page_begins_as_its_script_says() -> None:
 
 
 def test_cited_files_exist() -> None:
-    """Paths in backticks or code, such as `hybrid/physics/loads.py`."""
+    """Paths in backticks or code, such as `hybrid/kernels/loads.py`."""
     for page in PAGES:
         text = re.sub(r"^```diff\n.*?^```$", "", page.read_text(encoding="utf-8"), flags=re.DOTALL | re.MULTILINE)
         for name in re.findall(r"\b((?:hybrid|tests|docs|examples)/[\w/]+\.(?:py|md|yaml|png))", text):
@@ -164,20 +164,20 @@ def test_cited_equations_exist() -> None:
 
 # Every constant of docs/theory.md section 12 that stands alone in the code: module, name, value, as on the page.
 CONSTANTS = (
-    ("solve.step", "TOLERANCE", 1e-9, "10⁻⁹"),
-    ("solve.step", "ROUND_OFF", 1e-6, "10⁻⁶"),
-    ("solve.step", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
-    ("solve.step", "LARGEST_TURN", 0.7, "0.7 rad"),
-    ("solve.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
-    ("solve.timestep", "REACH", 0.1, "0.1 L"),
+    ("kernels.newton", "TOLERANCE", 1e-9, "10⁻⁹"),
+    ("kernels.newton", "ROUND_OFF", 1e-6, "10⁻⁶"),
+    ("kernels.newton", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
+    ("kernels.newton", "LARGEST_TURN", 0.7, "0.7 rad"),
+    ("kernels.newton", "LARGEST_STEP_TURN", 1.0, "1 rad"),
+    ("solve.stepper", "REACH", 0.1, "0.1 L"),
     ("solve.statics", "REACH", 0.1, "0.1 L"),
-    ("solve.timestep", "MOST_ITERATIONS", 20, "20 in motion"),
+    ("solve.stepper", "MOST_ITERATIONS", 20, "20 in motion"),
     ("solve.statics", "MOST_ITERATIONS", 40, "40 in statics"),
     ("solve.statics", "LOAD_STEPS", (1, 8, 64), "1, 8, 64 steps"),
     ("model.build", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
-    ("watch", "UNRESOLVED", 1.0, "1 rad per cell"),
-    ("solve.timestep", "HEAVY", 1e36, "10³⁶ 1/s²"),
-    ("motion", "HALVINGS", 10, "| halvings of a step | 10 |"),
+    ("simulation.diagnostics", "UNRESOLVED", 1.0, "1 rad per cell"),
+    ("solve.stepper", "HEAVY", 1e36, "10³⁶ 1/s²"),
+    ("simulation.transient", "HALVINGS", 10, "| halvings of a step | 10 |"),
     ("model.mesh", "DEFAULT_CELLS", 100, "| cells of a silent scene | 100 |"),
 )
 

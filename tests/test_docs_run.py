@@ -22,12 +22,12 @@ import pytest
 import typer
 from test_docs import PAGES, ROOT
 
-from hybrid.cli import UsageError, app, main
+from hybrid.cli.commands import UsageError, app, main
 
 MARK = re.compile(r"^<!-- not run in CI: *(.*?) *-->\n\Z", re.MULTILINE)
 # Pinned, so that nobody marks a block in passing: page, blocks that are not run.
 MARKED = {"index.md": 1, "trade.md": 1}
-# extend.md is tests/test_extend.py, export.md tests/results/test_export_page.py; of the README .ci/run runs the first two blocks, and test_docs.py the others.
+# extend.md is tests/test_extend.py, export.md tests/exports/test_export_page.py; of the README .ci/run runs the first two blocks, and test_docs.py the others.
 ELSEWHERE = {"extend.md", "export.md", "README.md"}
 
 
@@ -199,8 +199,8 @@ def collected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     folder = tmp_path_factory.mktemp("collected")
     (folder / "select_quoted.py").write_text(SELECT, encoding="utf-8")
     commands = [text for _, text in quoted("pytest")]
-    commands += [f"pytest tests/bench -m bench {text}" for _, text in quoted("-k")]
-    commands.append("pytest tests/bench -m bench -k no_such_test_anywhere")
+    commands += [f"pytest bench -m bench {text}" for _, text in quoted("-k")]
+    commands.append("pytest bench -m bench -k no_such_test_anywhere")
     here = os.environ | {
         "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "QUOTED": json.dumps(commands), "FOUND": str(folder / "found.json"),
     }  # fmt: skip
@@ -214,7 +214,7 @@ def collected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
 @pytest.mark.slow  # all tests are collected once more
 def test_quoted_tests_exist(collected: dict[str, Any]) -> None:
     selected = dict(collected["selected"])
-    assert selected.pop("pytest tests/bench -m bench -k no_such_test_anywhere") == 0, "or this test could not fail"
+    assert selected.pop("pytest bench -m bench -k no_such_test_anywhere") == 0, "or this test could not fail"
     for text, count in selected.items():
         words = shlex.split(text)[1:]
         assert {w for w in words if w.startswith("-")} <= KNOWN, text

@@ -28,7 +28,7 @@ from numpy.typing import NDArray
 from hybrid.errors import ComputationError
 from hybrid.model.build import build
 from hybrid.scene.schema import Scene
-from hybrid.solve.shooting import static
+from hybrid.shooting import static
 from hybrid.solve.statics import solve_statics
 
 Array = NDArray[np.float64]

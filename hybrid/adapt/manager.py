@@ -14,13 +14,13 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.adapt.blend import advance, shares
-from hybrid.adapt.criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, twist_of_rods, weigh
-from hybrid.adapt.plan import OFF, Rules, planned, reach, spread, tidied, wanted
-from hybrid.adapt.table import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
+from hybrid.kernels.criteria import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.stiffness_ramp import advance, shares
+from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, twist_of_rods, weigh
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material
-from hybrid.model.state import Ends, Floats, Line, Sea, State
 
 # The tension below which a stretch must be rod, in (EI w^2)^(1/3): there a cable bends under its weight as much as
 # its tension straightens it.

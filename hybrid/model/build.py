@@ -14,20 +14,20 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.effort import Effort, first_effort, mesh_is_free
+from hybrid.kernels.loads import FRICTION, SEABED
+from hybrid.kernels.state import Floats, Line, State, blank_state
 from hybrid.model.ends import EndConditions
-from hybrid.model.grade import Grading
+from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.layout import Layout
 from hybrid.model.ledger import Entry, followed, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
+from hybrid.model.mesh_grading import Grading
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.properties import merged_sections, tension_scale
+from hybrid.model.resolution import Effort, first_effort, mesh_is_free
 from hybrid.model.sea import Surroundings, rubs, surroundings
-from hybrid.model.start import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
-from hybrid.model.state import Floats, Line, State, blank_state
-from hybrid.physics.loads import FRICTION, SEABED
 from hybrid.scene.schema import (
     AdaptiveModel,
     CorrectedModel,

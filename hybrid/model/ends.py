@@ -7,7 +7,7 @@ from typing import Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.model.state import Ends, Floats
+from hybrid.kernels.state import Ends, Floats
 
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.state import Floats
 from hybrid.model.mesh import Zone
-from hybrid.model.state import Floats
 
 
 class Layout(NamedTuple):

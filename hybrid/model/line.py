@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from hybrid.kernels.loads import BODIES, ROTARY
+from hybrid.kernels.state import Floats, Line
 from hybrid.model.material import Material
-from hybrid.model.state import Floats, Line
-from hybrid.physics.loads import BODIES, ROTARY
 
 
 def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True) -> Line:

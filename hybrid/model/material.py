@@ -10,6 +10,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from hybrid.kernels.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
+from hybrid.kernels.state import Floats
 from hybrid.model.properties import (
     attachments_at,
     bending_stiffness,
@@ -20,8 +22,6 @@ from hybrid.model.properties import (
     rotary_inertia,
     torsional_stiffness,
 )
-from hybrid.model.state import Floats
-from hybrid.physics.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.scene.schema import Clamped, Guided, Scene, Section
 
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface

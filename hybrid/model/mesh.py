@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.state import Floats
+from hybrid.kernels.state import Floats
 
 MOST_CELLS = 1_000_000
 DEFAULT_CELLS = 100  # of a line whose scene says nothing: errors of a smooth sag near 1e-4 of the length

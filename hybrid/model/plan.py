@@ -7,11 +7,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.build import build
-from hybrid.model.effort import first_effort, wants_errors
-from hybrid.model.ledger import Entry
-from hybrid.model.mesh import Zone
-from hybrid.physics.loads import (
+from hybrid.kernels.loads import (
     ADDED_MASS,
     DRAG,
     FRICTION,
@@ -21,6 +17,10 @@ from hybrid.physics.loads import (
     SURFACE,
     WAVES,
 )
+from hybrid.model.build import build
+from hybrid.model.ledger import Entry
+from hybrid.model.mesh import Zone
+from hybrid.model.resolution import first_effort, wants_errors
 from hybrid.scene.schema import Scene
 
 
@@ -38,7 +38,7 @@ class Plan:
     seconds: float  # of processor time, from the measured cost per cell and iteration
 
 
-# Processor time per cell and Newton iteration (s), per step and per output, as tests/bench/test_bench_cost.py and
+# Processor time per cell and Newton iteration (s), per step and per output, as bench/test_bench_cost.py and
 # test_bench_parts.py print them on one core; a plan promises an order of magnitude, not more.
 COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
 FLAT_COST = {"rod": 0.15e-6, "catenary": 0.08e-6}  # in a plane, with the push that watches it
@@ -50,7 +50,7 @@ MORE = {
 }  # fmt: skip
 COST_STEP, COST_MANAGER, COST_OUTPUT = 25e-6, 15e-6, 0.3e-3
 USUAL_ITERATIONS = 2.2
-COST_ERRORS = 1.9  # times a run that a run with its coarser ones costs (tests/bench/test_bench_accuracy.py, share)
+COST_ERRORS = 1.9  # times a run that a run with its coarser ones costs (bench/test_bench_accuracy.py, share)
 COST_CORRECTOR = 0.3  # of the catenary's own, where the error of leaving bending out is followed
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 # Numbers that a result has per point and output, some twenty, and the largest file that still fits a disk.

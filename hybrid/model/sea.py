@@ -6,9 +6,9 @@ import math
 
 import numpy as np
 
+from hybrid.kernels.state import Floats, Sea, no_sea
 from hybrid.model.ends import rise
 from hybrid.model.properties import pressing
-from hybrid.model.state import Floats, Sea, no_sea
 from hybrid.scene.schema import (
     CurrentProfile,
     JonswapWaves,

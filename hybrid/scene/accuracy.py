@@ -8,7 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
-from hybrid.scene.table import Finding, Table, Words, refuse
+from hybrid.scene.base import Finding, Table, Words, refuse
 
 # Units in which a size may be given, what they measure, and how much of the SI unit they are.
 UNITS = {

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.table import (
+from hybrid.scene.base import (
     Finding,
     Kinds,
     NonNegative,

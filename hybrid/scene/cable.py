@@ -7,8 +7,7 @@ from typing import Annotated
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent, Waves
-from hybrid.scene.table import (
+from hybrid.scene.base import (
     Finding,
     NonNegative,
     NonNegativePair,
@@ -20,6 +19,7 @@ from hybrid.scene.table import (
     number_or_list,
     refuse,
 )
+from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent, Waves
 
 
 class Fluid(Table):

@@ -12,12 +12,7 @@ from typing import Any
 
 from hybrid.scene import sea_checks, start_checks
 from hybrid.scene.accuracy import Accuracy
-from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import Ends
-from hybrid.scene.plane import TYPED, plane_of
-from hybrid.scene.start_checks import SAME_LENGTH
-from hybrid.scene.table import Finding, Place
-from hybrid.scene.task import (
+from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryZone,
     CorrectedModel,
@@ -31,6 +26,11 @@ from hybrid.scene.task import (
     Time,
     ZonesModel,
 )
+from hybrid.scene.base import Finding, Place
+from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import Ends
+from hybrid.scene.plane import TYPED, plane_of
+from hybrid.scene.start_checks import SAME_LENGTH
 
 # Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
 FINEST_STEP = 1e-12

@@ -11,7 +11,7 @@ from typing import Annotated, Literal
 from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
-from hybrid.scene.table import (
+from hybrid.scene.base import (
     Direction,
     Finding,
     Kinds,

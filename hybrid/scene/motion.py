@@ -20,10 +20,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.base import Finding, dotted
 from hybrid.scene.cable import Environment
 from hybrid.scene.ends import SHIFTS, TURNS, Ends, Guided, Harmonic, Motion, Pinned, smooth_step
-from hybrid.scene.record import Record, RecordRefused, judge_record, read_record
-from hybrid.scene.table import Finding, dotted
+from hybrid.scene.motion_file import Record, RecordRefused, judge_record, read_record
 
 if TYPE_CHECKING:
     from hybrid.scene.schema import Scene

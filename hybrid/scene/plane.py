@@ -12,12 +12,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any, Literal
 
+from hybrid.scene.analysis import Initial, Points, Straight
+from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import SHIFTS, TURNS, Clamped, Ends, Guided, Motion, Triple
-from hybrid.scene.record import RecordRefused, read_record
+from hybrid.scene.motion_file import RecordRefused, read_record
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
-from hybrid.scene.table import Finding, Place, unit
-from hybrid.scene.task import Initial, Points, Straight
 
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
 # digits that people write.  A scene that does not insist is in a plane to round-off or not at all.

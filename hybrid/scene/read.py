@@ -14,13 +14,13 @@ from pydantic import TypeAdapter, ValidationError
 from ruamel.yaml import YAML
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.scene.analysis import usual_model
+from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Environment, Scene, Time
-from hybrid.scene.source import Node, Spot, Unreadable, from_data, from_text, override
-from hybrid.scene.table import Finding, Place, dotted
-from hybrid.scene.task import usual_model
-from hybrid.scene.words import explain
+from hybrid.scene.schema_messages import explain
+from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
 
 # Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
 # some seconds.

@@ -14,24 +14,7 @@ from pydantic import Field, model_validator
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.accuracy import Accuracy, AskedAccuracy
-from hybrid.scene.attachments import Attachment, Clump, Float, Modules
-from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
-from hybrid.scene.checks import contradictions
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned, Travel
-from hybrid.scene.sea import (
-    Current,
-    CurrentPoint,
-    CurrentProfile,
-    Friction,
-    JonswapWaves,
-    PowerLawCurrent,
-    RegularWaves,
-    Seabed,
-    UniformCurrent,
-    Waves,
-)
-from hybrid.scene.table import Table, Text, Vector, refuse
-from hybrid.scene.task import (
+from hybrid.scene.analysis import (
     AdaptiveModel,
     CatenaryModel,
     CatenaryZone,
@@ -49,6 +32,23 @@ from hybrid.scene.task import (
     Time,
     ZonesModel,
     usual_model,
+)
+from hybrid.scene.attachments import Attachment, Clump, Float, Modules
+from hybrid.scene.base import Table, Text, Vector, refuse
+from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
+from hybrid.scene.checks import contradictions
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned, Travel
+from hybrid.scene.sea import (
+    Current,
+    CurrentPoint,
+    CurrentProfile,
+    Friction,
+    JonswapWaves,
+    PowerLawCurrent,
+    RegularWaves,
+    Seabed,
+    UniformCurrent,
+    Waves,
 )
 
 __all__ = [

@@ -12,7 +12,7 @@ from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
 
-from hybrid.scene.table import (
+from hybrid.scene.base import (
     Finding,
     Kinds,
     NonNegative,

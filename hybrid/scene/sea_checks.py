@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 
+from hybrid.scene.analysis import Equilibrium, Initial, Straight
 from hybrid.scene.attachments import Clump, Float, Modules
+from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Body, Ends, Triple
 from hybrid.scene.sea import wavenumber
 from hybrid.scene.start_checks import SAME_LENGTH
-from hybrid.scene.table import Finding, Place, unit
-from hybrid.scene.task import Equilibrium, Initial, Straight
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
 STEEPEST = 0.142

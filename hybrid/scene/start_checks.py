@@ -6,10 +6,10 @@ import math
 from collections.abc import Iterator
 from itertools import pairwise
 
+from hybrid.scene.analysis import Equilibrium, Initial, Points, Straight, Time
+from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Ends, Triple
-from hybrid.scene.table import Finding, Place, unit
-from hybrid.scene.task import Equilibrium, Initial, Points, Straight, Time
 
 # Positions that differ by less than this part of the cable's length are the same place:
 # people write six to eight digits.

@@ -10,12 +10,12 @@ import numpy as np
 from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.model.state import Ends, Floats, Line, Sea, State
-from hybrid.physics.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
-from hybrid.solve.blocks import SIZE, WIDTH
-from hybrid.solve.march import march, workspace
-from hybrid.solve.step import lay, lowest, newton
-from hybrid.solve.timestep import Stepper
+from hybrid.kernels.assembly import march, workspace
+from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.kernels.newton import lay, lowest, newton
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.solve.stepper import Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration

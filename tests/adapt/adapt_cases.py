@@ -14,11 +14,11 @@ import numpy as np
 from problems import Scene, free, pinned, scene, straight
 
 from hybrid.adapt.manager import DomainManager
-from hybrid.adapt.remap import Remapped, remap
+from hybrid.adapt.state_transfer import Remapped, remap
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
-from hybrid.model.state import Ends, Floats, Line, Sea, State, blank_state, no_sea
 
 Shape = Callable[[Floats], Floats]
 X, Y, Z = np.eye(3)

@@ -16,8 +16,8 @@ from problems import Scene, clamped, pinned, scene
 
 from hybrid import run
 from hybrid.adapt.manager import FLOOR
-from hybrid.adapt.table import CRITERIA
-from hybrid.results.read import Event, Result
+from hybrid.kernels.criteria import CRITERIA
+from hybrid.store.reader import Event, Result
 
 Floats = np.ndarray
 GRAVITY = 10.0

@@ -24,10 +24,10 @@ from adapt_scenes import (
 from problems import Scene, clamped, pinned, scene
 
 import hybrid
-from hybrid.adapt.joint import Joints
 from hybrid.adapt.manager import HARD, DomainManager
-from hybrid.adapt.table import BEND, CRITERIA
-from hybrid.model.state import no_sea
+from hybrid.adapt.moment_joints import Joints
+from hybrid.kernels.criteria import BEND, CRITERIA
+from hybrid.kernels.state import no_sea
 
 STEP = 0.02
 

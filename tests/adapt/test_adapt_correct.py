@@ -10,11 +10,11 @@ import pytest
 from adapt_scenes import LENGTH, bending, sagging
 
 import hybrid
-from hybrid.correction import Correction
-from hybrid.model.bend import LEFT
+from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import build
-from hybrid.results.read import Result
-from hybrid.zoning import on_layout
+from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.zone_switching import on_layout
+from hybrid.store.reader import Result
 
 # One rod cell a base cell: the same nodes whatever a zone is, so that what differs is bending alone.
 NODES = {"rod_cell": 1e9}

@@ -15,12 +15,12 @@ import numpy as np
 import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
 
-from hybrid.adapt.criteria import FORESEEN
 from hybrid.adapt.manager import FLOOR, HARD, HORIZON, MOST_AHEAD, DomainManager
-from hybrid.adapt.plan import wanted
-from hybrid.adapt.table import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
-from hybrid.model.state import no_sea
-from hybrid.physics.loads import SEABED
+from hybrid.adapt.zone_rules import wanted
+from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
+from hybrid.kernels.loads import SEABED
+from hybrid.kernels.state import no_sea
+from hybrid.kernels.zone_criteria import FORESEEN
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
 FLOORED = FLOOR * (EI * W**2) ** (1 / 3)  # N

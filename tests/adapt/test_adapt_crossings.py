@@ -47,7 +47,7 @@ from problems import Scene
 
 import hybrid
 from hybrid.adapt.manager import BUFFER, HORIZON
-from hybrid.adapt.plan import spread
+from hybrid.adapt.zone_rules import spread
 
 Floats = np.ndarray
 DT = 0.02

@@ -12,8 +12,8 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from hybrid.adapt.plan import OFF, Rules, planned, spread, wanted
-from hybrid.adapt.table import BEND, CRITERIA, SLACK
+from hybrid.adapt.zone_rules import OFF, Rules, planned, spread, wanted
+from hybrid.kernels.criteria import BEND, CRITERIA, SLACK
 from hybrid.model.layout import edges
 
 K = len(CRITERIA)

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import pytest
 
 import hybrid
-from hybrid.cli import main
+from hybrid.cli.commands import main
 
 WIRE = """\
 title: a wire that swings
@@ -176,7 +176,7 @@ def test_json_lines_of_a_run(call: Call) -> None:
 
 
 def test_what_happened_is_told_most_important_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybrid.results.read import Event, Result
+    from hybrid.store.reader import Event, Result
 
     events = [Event(0.0, 1, 1, "other", "b"), Event(0.0, 2, 2, "turned in", "a"), Event(1.5, 3, 3, "other", "c")]
     monkeypatch.setattr(Result, "events", events)

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import pytest
 
 import hybrid
-from hybrid.cli import main
+from hybrid.cli.commands import main
 
 DECKS = Path(__file__).parents[1] / "data" / "moordyn"
 

@@ -28,7 +28,7 @@ mesh: {cells: 4}
 time: {duration: 1.0e5, step: 0.01}
 output: {every: 0.1, points: 3}
 """
-COMMAND = [sys.executable, "-c", "from hybrid.cli import main; main()", "run", "long.yaml"]
+COMMAND = [sys.executable, "-c", "from hybrid.cli.commands import main; main()", "run", "long.yaml"]
 PATIENCE = 60  # s, for a machine that has to compile the kernels first
 
 

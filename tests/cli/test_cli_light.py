@@ -22,7 +22,7 @@ HANGING = {
 }
 CODE = """
 import sys, json
-from hybrid.cli import main
+from hybrid.cli.commands import main
 try:
     main(sys.argv[1:])
 except SystemExit as leaving:
@@ -49,10 +49,10 @@ def test_plan_computes_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypa
     monkeypatch.chdir(tmp_path)
     Path("hanging.yaml").write_text(json.dumps(HANGING))  # JSON is YAML
     out, modules = call("plan", "hanging.yaml")
-    assert "4 cells" in out and not modules & {"h5py", "matplotlib", "hybrid.simulate", "hybrid.solve.march"}
+    assert "4 cells" in out and not modules & {"h5py", "matplotlib", "hybrid.simulation.api", "hybrid.kernels.assembly"}
     hybrid.run(hybrid.validate_scene(HANGING), "hanging.h5").close()
     out, modules = call("plot", "hanging.h5")
-    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulate"}
+    assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulation.api"}
 
 
 def test_schema_is_valid_json_schema() -> None:

@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.cli import main
-from hybrid.results import animate
+from hybrid.cli.commands import main
+from hybrid.view import animation as animate
 
 # A wire of two sections, the second thicker: the larger radius holds at the seam.
 SCENE = """\

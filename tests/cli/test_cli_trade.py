@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import pytest
 
-from hybrid.cli import main
+from hybrid.cli.commands import main
 
 SAG = """\
 title: a line that sags
@@ -116,7 +116,7 @@ def test_a_scene_without_time_is_refused(call: Call) -> None:
 
 
 def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    import hybrid.rungs as rungs
+    import hybrid.studies.runs as rungs
     from hybrid.errors import ComputationError, Outcome
 
     def run(*_: object, **__: object) -> None:
@@ -130,7 +130,7 @@ def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.Monkey
 def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> None:
     Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 20.0"))
     arguments = ["trade", "long.yaml", *SHORT, "--json"]
-    command = [sys.executable, "-c", "import sys; from hybrid.cli import main; main(sys.argv[1:])", *arguments]
+    command = [sys.executable, "-c", "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
     assert process.stdout is not None
     with process:

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import pytest
 from rich.console import Console
 
-from hybrid.live import LiveLine, Voice, live_line, span, speed, zones_in_short
+from hybrid.cli.console import LiveLine, Voice, live_line, span, speed, zones_in_short
 from hybrid.model.mesh import Zone
-from hybrid.simulate import Progress
+from hybrid.simulation.api import Progress
 
 TWO = (Zone("catenary", 0.0, 1.5), Zone("rod", 1.5, 2.0))
 SEVEN = tuple(Zone(("catenary", "rod")[k % 2], 10.0 * k, 10.0 * (k + 1)) for k in range(7))
@@ -112,12 +112,12 @@ def test_it_says_nothing_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
 def test_compilation_is_announced_before_it_happens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("hybrid.compiled.is_warm", lambda _: False)
+    monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: False)
     assert Voice(as_json=False, quiet=False).compiling()
     assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
     assert Voice(as_json=True, quiet=False).compiling()
     assert capsys.readouterr().out == '{"event": "compiling"}\n'
-    monkeypatch.setattr("hybrid.compiled.is_warm", lambda _: True)
+    monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: True)
     assert not Voice(as_json=False, quiet=False).compiling()
     assert tuple(capsys.readouterr()) == ("", "")
 

@@ -25,7 +25,7 @@ import numpy as np
 
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT
-from hybrid.results.read import Result
+from hybrid.store.reader import Result
 
 MODELS = ("rod", "catenary", "zones", "adaptive")
 LONGEST = 20.0  # s of wall time: a case that takes longer has failed

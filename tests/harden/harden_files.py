@@ -90,7 +90,7 @@ def outcome(path: Path, good: dict[str, Any]) -> tuple[str, str]:
 
 def plotted(path: Path) -> tuple[str, str]:
     """What came of `hybrid plot`."""
-    from hybrid.cli import main
+    from hybrid.cli.commands import main
 
     err = io.StringIO()
     with contextlib.redirect_stderr(err), contextlib.redirect_stdout(io.StringIO()):

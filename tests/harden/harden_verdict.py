@@ -24,7 +24,7 @@ from typing import Any
 import numpy as np
 
 import hybrid
-from hybrid.cli import main
+from hybrid.cli.commands import main
 
 # s of processor time that a plan may foretell of a run that is made; longer ones are not: their plan said how long.
 LONGEST_PLANNED = 1.0

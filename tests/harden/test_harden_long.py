@@ -16,9 +16,9 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.cli.tables import zones_over_time
 from hybrid.errors import LEFT_OUT, ZONE_EVENTS
-from hybrid.results import record
-from hybrid.said import zones_over_time
+from hybrid.store import writer as record
 
 STEP, PERIOD = 0.05, 40.0  # s: of a step, and of the coming and going of a rod
 PER_STEP = 80  # bytes of the step log a step: ten numbers

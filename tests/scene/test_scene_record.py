@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hybrid.scene.record import _last_digit, first_jump
+from hybrid.scene.motion_file import _last_digit, first_jump
 
 Array = NDArray[np.float64]
 

@@ -12,8 +12,8 @@ import re
 import pytest
 from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SUSPENSION, change, complaints, marked
 
-from hybrid.scene.hints import ALIASES
 from hybrid.scene.schema import Scene
+from hybrid.scene.suggestions import ALIASES
 
 PINNED = "{kind: pinned, position: [0, 0, 0]}"
 GUIDED = "{kind: guided, tangent: [0.8660254, 0, -0.5], force: [0.005, 0, 0.00866025]}"

@@ -14,11 +14,11 @@ import pytest
 from scipy.linalg import solve_banded
 
 import hybrid
+from hybrid.kernels.assembly import march
+from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
 from hybrid.model.build import build
-from hybrid.solve.blocks import SIZE, WIDTH, substitute
-from hybrid.solve.march import march
 from hybrid.solve.statics import solve_statics
-from hybrid.solve.timestep import Stepper
+from hybrid.solve.stepper import Stepper
 
 LENGTH, FAR = 1000.0, 1000.0
 EPS = 2.2e-16

@@ -5,7 +5,7 @@ import pytest
 
 import hybrid
 from hybrid.model.build import build
-from hybrid.solve.timestep import Stepper
+from hybrid.solve.stepper import Stepper
 
 SECTION = {"length": 2.0, "mass": 0.5, "bending_stiffness": 0.01, "torsional_stiffness": 0.01}
 

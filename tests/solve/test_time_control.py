@@ -8,9 +8,9 @@ from test_time_order import scene
 
 from hybrid.errors import Outcome
 from hybrid.model.build import build
-from hybrid.solve.control import LEAST, MOST, REFUSED, Controller
 from hybrid.solve.statics import solve_statics
-from hybrid.solve.timestep import Stepper
+from hybrid.solve.step_control import LEAST, MOST, REFUSED, Controller
+from hybrid.solve.stepper import Stepper
 
 DURATION = 2.0  # s
 REFERENCE = 64 * 16  # steps

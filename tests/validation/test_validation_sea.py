@@ -150,7 +150,7 @@ def test_point_load(name, report):
 
 @pytest.mark.parametrize("name", LOADS)
 def test_point_load_between_the_nodes(name, report):
-    """Outputs in the middle of the cells on both sides of the load: second order everywhere (results/probes.py)."""
+    """Outputs in the middle of the cells on both sides of the load: second order everywhere (outputs/probes.py)."""
     table, load = LOADS[name]
     error = []
     for n in (50, 100, 200, 400):

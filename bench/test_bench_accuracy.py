@@ -1,0 +1,222 @@
+"""Accuracy that is asked for: what is achieved, how true the figures are, what it costs, and what steps that follow gain.
+
+    pytest bench -m bench -s -k "accuracy and (asked or steps or share)"
+
+The truth is an all-rod run asked for a fifth of the finest accuracy.  Scenes are the examples, without their own
+step, mesh and tolerance; CPU time is that of all runs that an accuracy takes, the coarser ones included.
+"""
+
+from __future__ import annotations
+
+import functools
+import sys
+from pathlib import Path
+from statistics import median
+from time import process_time
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.resolution import Effort
+from hybrid.simulation.case import Job
+
+sys.path.insert(0, str(Path(__file__).parent.parent))
+from problems import whip
+
+pytestmark = pytest.mark.bench
+EXAMPLES = Path(__file__).parents[1] / "examples"
+ASKED = (10.0, 3.0, 1.0, 0.3, 0.1)  # %
+TRUTH = "0.03%"
+# Scenes, models they are run as, and settings.  Friction decides where a cable lies in `slack_on_seabed`.
+SCENES: dict[str, tuple[tuple[str, ...], tuple[str, ...]]] = {
+    "touchdown": (("rod", "catenary", "adaptive"), ()),
+    "s_tether": (("rod", "adaptive"), ()),
+    "rov_tether": (("rod", "adaptive"), ()),
+    "laying": (("rod", "adaptive"), ()),
+    "slack_on_seabed": (("rod", "adaptive"), ()),
+    "02_suspension": (("rod",), ()),
+    "06_whip": (("rod",), ("time.duration=0.42", "output.every=0.01")),
+}
+
+
+def load(name, accuracy, model, settings=()):
+    own = ("time.step=null", "mesh=null", f"model={model}")
+    return hybrid.load_scene(EXAMPLES / f"{name}.yaml", [f"accuracy={accuracy}", *own, *settings])
+
+
+def pulls(result):
+    return [np.linalg.norm(result[x], axis=1) for x in ("reaction_start", "reaction_end")]
+
+
+@functools.cache
+def truth(name):
+    result = hybrid.run(load(name, TRUTH, "rod", SCENES[name][1]))
+    missed = [e.text for e in result.events if e.kind == "accuracy missed"]
+    said = result.attributes
+    print(
+        f"{name}: truth of {said['cells']} cells, {len(result['steps/t'])} steps; its own error "
+        f"{said['error_total_position']:.1e} m, {said['error_total_pull']:.1e} N {missed}"
+    )
+    return result
+
+
+@functools.cache
+def row(name, model, percent):
+    """Errors as parts of what is asked, effectivities, and CPU seconds."""
+    exact = truth(name)
+    begin = process_time()
+    result = hybrid.run(load(name, f"{percent}%", model, SCENES[name][1]))
+    cpu = process_time() - begin
+    said, length = result.attributes, result.s[-1]
+    position = np.linalg.norm(result.position - exact.position, axis=2).max()
+    force = max(np.abs(a - b).max() for a, b in zip(pulls(result), pulls(exact), strict=True))
+    whole = max(x.max() for x in pulls(exact))
+    kinds = {e.kind for e in result.events}
+    out = {
+        "position": position / (percent / 100 * length), "pull": force / (percent / 100 * whole),
+        "effect position": said.get("error_total_position", np.nan) / position,
+        "effect pull": said.get("error_total_pull", np.nan) / force,
+        "cpu": cpu, "missed": bool(kinds & {"accuracy missed", "no error figure"}),
+    }  # fmt: skip
+    print(
+        f"  {name:16s} {model:9s} {percent:5g} %  cells {said['cells']:5d} steps {len(result['steps/t']):6d} runs "
+        f"{said['effort_runs']}  achieved/asked {out['position']:.2f} {out['pull']:.2f}  estimated/true "
+        f"{out['effect position']:.2f} {out['effect pull']:.2f}  {cpu:.2f} s {'MISSED, said' if out['missed'] else ''}"
+    )
+    return out
+
+
+def test_accuracy_asked_and_achieved():
+    """Achieved at most as asked in 95 % of cases; estimates 0.7 to 3 times the truth in 90 %, asked of the project."""
+    rows = [row(n, m, p) for n, (models, _) in SCENES.items() for m in models for p in ASKED]
+    within = [max(r["position"], r["pull"]) <= 1.0 for r in rows]
+    silent = [max(r["position"], r["pull"]) > 1.0 and not r["missed"] for r in rows]
+    for what in ("effect position", "effect pull"):
+        e = np.array([r[what] for r in rows if np.isfinite(r[what])])
+        print(
+            f"{what}: {np.mean((e >= 0.7) & (e <= 3.0)):.0%} within 0.7 to 3, {np.mean(e < 0.5):.0%} below 0.5, median "
+            f"{np.median(e):.2f}, 5 to 95 % {np.percentile(e, 5):.2f} to {np.percentile(e, 95):.2f}, {e.size} figures"
+        )
+    print(f"achieved at most as asked: {np.mean(within):.0%} of {len(rows)}; missed in silence: {np.mean(silent):.0%}")
+    for n, (models, _) in SCENES.items():
+        for m in models:
+            cost = [row(n, m, p)["cpu"] for p in ASKED]
+            slope = np.polyfit(np.log(ASKED), np.log(cost), 1)[0]
+            print(f"  {n} {m}: CPU grows as asked^{slope:.2f}, {' '.join(f'{c:.2f}' for c in cost)} s")
+    assert np.mean(within) >= 0.85
+    assert np.mean(silent) <= 0.05
+
+
+class Quiet:
+    stage = ""
+
+    def __call__(self, *args, **more):
+        pass
+
+
+def runs(scene, efforts):
+    """Errors of position against the last of the efforts, and CPU seconds, median of five."""
+    job = Job(scene, None)
+    job.told = Quiet()
+    exact = job.sketch(efforts[-1])
+    out = []
+    for effort in efforts[:-1]:
+        tries = [job.sketch(effort) for _ in range(5)]
+        error = np.linalg.norm(tries[0].values["position"] - exact.values["position"], axis=2).max()
+        out.append((float(error), median(t.cpu for t in tries), tries[0].steps))
+    return out
+
+
+STEPS = {
+    "relaxation": (lambda: fixed("03_suspension_rod", "output.every=1.0"), (0.08, 0.04, 0.02, 0.01, 0.005), 2.0, 3.0),
+    "whip, sharp": (lambda: whip(50, 1e-3, 0.6, 0.5, 0.02), (2e-3, 1e-3, 5e-4, 2.5e-4, 1.25e-4, 6.25e-5), 0.06, 3.0),
+    "whip, example": (
+        lambda: fixed("06_whip", "time.duration=0.6", "output.every=0.02"), (2e-3, 1e-3, 5e-4, 2.5e-4), 0.06, 3.0,
+    ),
+    "touchdown": (lambda: fixed("touchdown", "model=catenary"), (0.2, 0.1, 0.05, 0.025), 8 / 12, 1 / 1.1),
+    "s_tether": (lambda: fixed("s_tether", "model=rod"), (0.25, 0.125, 0.0625, 0.03125), 7 / 12, 1 / 1.1),
+}  # fmt: skip
+
+
+def fixed(name, *settings):
+    return hybrid.load_scene(EXAMPLES / f"{name}.yaml", list(settings))
+
+
+@pytest.mark.parametrize("name", STEPS)
+def test_accuracy_steps_that_follow(name):
+    """CPU time of the best fixed step over that of steps that follow, at equal error, on one mesh."""
+    make, steps, largest, asked = STEPS[name]
+    scene = make()
+    exact = Effort(1.0, steps[-1] / 8, None, 1e-3)
+    fix = runs(scene, [*(Effort(1.0, dt, None, 1e-3) for dt in steps), exact])
+    tolerances = 10.0 ** np.arange(-3.0, -9.0, -1.0) * scene.length / 2
+    follow = runs(scene, [*(Effort(1.0, largest, tol, 1e-3) for tol in tolerances), exact])
+    errors, cpu = np.array(fix)[::-1, 0], np.array(fix)[::-1, 1]
+    ratios = []
+    for tol, (error, seconds, count) in zip(tolerances, follow, strict=True):
+        if errors[0] <= error <= errors[-1]:
+            ratios.append(np.exp(np.interp(np.log(error), np.log(errors), np.log(cpu))) / seconds)
+            print(
+                f"{name}: {count} steps, {tol:.1e} m a step: error {error:.1e} m, fixed over following {ratios[-1]:.2f}"
+            )
+    print(
+        f"{name}: fixed over following {min(ratios):.2f} to {max(ratios):.2f}, median {median(ratios):.2f}; asked {asked:.2g}"
+    )
+    assert median(ratios) > 0.8
+
+
+def test_accuracy_share_of_coarser_runs():
+    """What the error figure costs: CPU time of the coarser runs over that of the result."""
+    for name in ("touchdown", "s_tether", "rov_tether"):
+        scene = fixed(name, "model=rod")
+        cost = []
+        for errors in (False, True):
+            asked = scene.model_copy(update={"output": scene.output.model_copy(update={"errors": errors})})
+            tries = []
+            for _ in range(3):
+                begin = process_time()
+                hybrid.run(asked)
+                tries.append(process_time() - begin)
+            cost.append(median(tries))
+        print(
+            f"{name}: {cost[0]:.2f} s without, {cost[1]:.2f} s with its error figure, {cost[1] / cost[0] - 1:.0%} more"
+        )
+        assert cost[1] < 3.0 * cost[0]
+
+
+def test_accuracy_of_zones_that_move_against_a_rod():
+    """At 1 %: CPU time of rods everywhere, in their plane and in space, over that of zones that move."""
+    from test_bench_adaptive import bight
+
+    def at(base, model, dimension):
+        own = {"model": model, "dimension": dimension, "accuracy": "1%", "mesh": None}
+        return hybrid.validate_scene(base | own | {"time": {"duration": base["time"]["duration"]}})
+
+    scenes = {"ROV tether, 1000 m, slack bight": bight()}
+    for name in ("s_tether", "touchdown"):
+        scenes[name] = fixed(name).model_dump(exclude_none=True)
+    for name, base in scenes.items():
+        cost = {}
+        for what, model, dimension in (
+            ("adaptive", "adaptive", None),
+            ("rod", "rod", None),
+            ("rod in space", "rod", 3),
+        ):
+            tries = []
+            for _ in range(3):
+                begin = process_time()
+                result = hybrid.run(at(base, model, dimension))
+                tries.append(process_time() - begin)
+            cost[what] = median(tries)
+            said, e = result.attributes, {x.kind for x in result.events}
+            print(
+                f"{name}, {what}: {cost[what]:.2f} s, {said['cells']} cells, {len(result['steps/t'])} steps, "
+                f"{said['effort_runs']} runs{', missed' if 'accuracy missed' in e else ''}"
+            )
+        print(
+            f"{name}: rod over adaptive {cost['rod'] / cost['adaptive']:.2f}, "
+            f"rod in space over adaptive {cost['rod in space'] / cost['adaptive']:.2f}"
+        )
+        # the ratios that docs/accuracy.md states are 0.24 to 1.24; a factor of two off and the page is wrong
+        assert 0.1 < cost["rod"] / cost["adaptive"] < 2.5

@@ -1,0 +1,203 @@
+"""From what the criteria say to zones: a pure function, so that the same past gives the same plan.
+
+Compiled, because it is asked for a plan several times in a dwell time, mostly to hear that nothing changes.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.criteria import CRITERIA
+from hybrid.kernels.state import Floats
+
+
+class Rules(NamedTuple):
+    """How zones are made of what is asked.
+
+    buffer: (n,) m, rod on either side of what asks for it; shortest: m, least length of a zone; dwell: s, how
+    long a rod must have been calm before it goes.
+    """
+
+    buffer: Floats
+    shortest: float
+    dwell: float
+
+
+OFF = np.array([x.off for x in CRITERIA])
+ROUND = 1e-12  # of a length
+BACK = 0.5  # ratio above which a rod that is on its way out comes back
+
+
+def wanted(ratios: Floats, rod: np.ndarray) -> np.ndarray:
+    """Base cells (n,) that ask to be, or to stay, a rod: hysteresis between 1 and the criterion's `off`."""
+    out = np.empty(rod.size, bool)
+    _wanted(ratios, OFF, rod, out)
+    return out
+
+
+def spread(asks: np.ndarray, base: Floats, buffer: Floats) -> np.ndarray:
+    """Base cells within the buffer of those that ask."""
+    out = np.empty(asks.size, bool)
+    _spread(asks, base, buffer, out)
+    return out
+
+
+def tidied(flags: np.ndarray, rod: np.ndarray, base: Floats, shortest: float) -> np.ndarray:
+    """No rod and no gap between rods shorter than `shortest`: rods widen, into what was rod first, and gaps close."""
+    out = flags.copy()
+    _tidy(out, rod, base, shortest, np.empty_like(out))
+    return out
+
+
+def planned(
+    ratios: Floats,
+    rod: np.ndarray,
+    calm_since: Floats,
+    t: float,
+    base: Floats,
+    rules: Rules,
+    leaving: np.ndarray | None = None,
+    patience: Floats | None = None,
+) -> tuple[np.ndarray, Floats]:
+    """What the base cells should be, and since when (s) each rod has been calm (infinity: it is not).
+
+    rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
+    whose curvature rises for that reason alone: they are kept only above BACK; patience: (n,) dwell times that each
+    cell must be calm, 1 if it is not said.
+    """
+    n = rod.size
+    calm = calm_since.copy()
+    flags = np.zeros((4, n), bool)
+    if leaving is not None:
+        flags[0] = leaving
+    wait = np.full(n, float(rules.dwell)) if patience is None else rules.dwell * patience
+    _plan(ratios, OFF, rod, calm, float(t), base, rules.buffer, float(rules.shortest), wait, flags)
+    return flags[3], calm
+
+
+@inner
+def _asks(ratios, bound, j):
+    """Whether any ratio of base cell j is above its bound, or not a number."""
+    for c in range(ratios.shape[0]):
+        if not ratios[c, j] <= bound[c]:
+            return True
+    return False
+
+
+@inner
+def _over(ratios, bound, j):
+    """The same with one bound for all."""
+    for c in range(ratios.shape[0]):
+        if not ratios[c, j] <= bound:
+            return True
+    return False
+
+
+@kernel
+def _wanted(ratios, off, rod, out):
+    for j in range(rod.size):
+        out[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
+
+
+@kernel
+def _spread(asks, base, buffer, out):
+    n = asks.size
+    out[:] = False
+    for j in range(n):
+        if asks[j]:
+            out[j] = True
+            k = j - 1
+            while k >= 0 and base[k + 1] > base[j] - buffer[j]:
+                out[k] = True
+                k -= 1
+            k = j + 1
+            while k < n and base[k] < base[j + 1] + buffer[j]:
+                out[k] = True
+                k += 1
+
+
+@kernel
+def reach(T, base_of_cell, EI, w, floor, parts, light, buffer):
+    """Buffers (n,) m of base cells: `parts` times sqrt(EI/T), or (EI/w)^(1/3) where that is shorter.
+
+    Of the lowest tension in a base cell, and of its first node; light: least weight that counts, N/m.
+    """
+    j = -1
+    for i in range(T.size):
+        new = base_of_cell[i] != j
+        j = base_of_cell[i]
+        if new:
+            buffer[j] = parts * (EI[i] / max(w[i], light)) ** (1.0 / 3.0)
+            low, least = floor[i], T[i]
+            e = EI[i]
+        least = min(least, T[i])
+        if i + 1 == T.size or base_of_cell[i + 1] != j:
+            buffer[j] = min(buffer[j], parts * math.sqrt(e / max(least, low)))
+
+
+@inner
+def _end(flags, a):
+    """Where the run of equal flags that begins at a ends."""
+    b = a + 1
+    while b < flags.size and flags[b] == flags[a]:
+        b += 1
+    return b
+
+
+@kernel
+def _tidy(flags, rod, base, shortest, before):
+    n, least = flags.size, shortest * (1.0 - ROUND)
+    changed = True
+    while changed:
+        for j in range(n):
+            before[j] = flags[j]
+        a = 0
+        while a < n:
+            b = _end(before, a)
+            if before[a]:
+                # a rod grows on both sides, cell by cell; on one side only while only that one was rod
+                lo, hi = a, b
+                while base[hi] - base[lo] < least and (lo > 0 or hi < n):
+                    left, right = lo > 0, hi < n
+                    if left and right and rod[lo - 1] != rod[hi]:
+                        left, right = rod[lo - 1], rod[hi]
+                    if left:
+                        lo -= 1
+                    if right and base[hi] - base[lo] < least:
+                        hi += 1
+                flags[lo:hi] = True
+            a = b
+        a = 0
+        while a < n:
+            b = _end(flags, a)
+            if not flags[a] and a > 0 and b < n and base[b] - base[a] < least:
+                flags[a:b] = True
+            a = b
+        changed = False
+        for j in range(n):
+            if flags[j] != before[j]:
+                changed = True
+
+
+@kernel
+def _plan(ratios, off, rod, calm, t, base, buffer, shortest, wait, flags):
+    """wait: (n,) s that rods must be calm; flags: (4, n) leaving, two to work in, what the base cells should be."""
+    leaving, asks, near, out = flags[0], flags[1], flags[2], flags[3]
+    n = rod.size
+    for j in range(n):
+        if leaving[j]:
+            asks[j] = _over(ratios, BACK, j)
+        else:
+            asks[j] = _asks(ratios, off, j) if rod[j] else _over(ratios, 1.0, j)
+    _spread(asks, base, buffer, near)
+    for j in range(n):
+        calm[j] = min(calm[j], t) if rod[j] and not near[j] else np.inf
+        asks[j] = _over(ratios, 1.0, j)
+    _spread(asks, base, buffer, near)
+    for j in range(n):
+        out[j] = near[j] or (rod[j] and t - calm[j] < wait[j])
+    _tidy(out, rod, base, shortest, asks)

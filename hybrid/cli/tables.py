@@ -1,0 +1,220 @@
+"""What the command line says of plans, results and ladders: facts for programs, tables for people.
+
+rich is imported when a table is made: a command that prints JSON does without.
+"""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from hybrid.errors import LEFT_OUT, ZONE_EVENTS
+
+if TYPE_CHECKING:
+    from hybrid.interop.moordyn import ImportedDeck
+    from hybrid.model.plan import Plan
+    from hybrid.scene.schema import Scene
+    from hybrid.store.reader import Result
+    from hybrid.store.tradeoff_table import Row, TradeTable
+
+
+def equilibrium_facts(result: Result) -> dict[str, Any]:
+    """What one asks of an equilibrium first; None for what its solver does not say."""
+    s, tension, position = result.s, result.tension[-1], result.position[-1]
+    low, high, bottom = int(tension.argmin()), int(tension.argmax()), int(position[:, 2].argmin())
+    force = {end: result[f"reaction_{end}"][-1].tolist() for end in ("start", "end") if f"reaction_{end}" in result}
+    return {
+        "path": result.attributes.get("static_path", result.message),
+        "residual": result.attributes.get("static_residual"),
+        "tension_max": {"value": float(tension[high]), "s": float(s[high])},
+        "tension_min": {"value": float(tension[low]), "s": float(s[low])},
+        "lowest": {"position": position[bottom].tolist(), "s": float(s[bottom])},
+        "force": force,
+        "zones": [zone._asdict() if hasattr(zone, "_asdict") else asdict(zone) for zone in result.zones[-1]],
+    } | _on_the_seabed(result)
+
+
+def _on_the_seabed(result: Result) -> dict[str, Any]:
+    """Touchdown, grounded length and contact force, where there is a seabed; None where nothing touches."""
+    if "grounded_length" not in result:
+        return {}
+    edges = [float(x) if x == x else None for x in result["touchdown"][-1]]
+    grounded, force = float(result.grounded_length[-1]), float(result.contact_force[-1])
+    return {"touchdown": edges, "grounded_length": grounded, "contact_force": force}
+
+
+def equilibrium_table(facts: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    def vector(x: list[float]) -> str:
+        zero = 1e-9 * max(abs(c) for c in x)
+        return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
+
+    table = Table.grid(padding=(0, 2))
+    table.add_row("found by", facts["path"].replace("; ", "\n"))
+    if facts["residual"] is not None:
+        table.add_row("out of balance", f"{facts['residual']:.2g} N at most")
+    for name, key in (("largest tension", "tension_max"), ("smallest tension", "tension_min")):
+        table.add_row(name, f"{facts[key]['value']:.5g} N at s = {facts[key]['s']:.5g} m")
+    for end, force in facts["force"].items():
+        table.add_row(f"force at {end}", f"{vector(force)} N on the cable")
+    if facts.get("grounded_length"):
+        a, b = facts["touchdown"]
+        table.add_row("on the seabed", f"{facts['grounded_length']:.5g} m between s = {a:.5g} and {b:.5g} m")
+        table.add_row("contact force", f"{facts['contact_force']:.5g} N")
+    elif "grounded_length" in facts:
+        table.add_row("on the seabed", "nothing")
+    if len(facts["zones"]) > 1:
+        table.add_row("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"]))
+    table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")
+    table.columns[0].style = "bold"
+    return table
+
+
+def zones_over_time(result: Result) -> dict[str, Any]:
+    """What zones that move have done: shares of the line that were rod, and changes."""
+    length = float(result.s[-1])
+    shares = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / length for zones in result.zones]
+    events = result.events
+    changes = sum(e.kind in ZONE_EVENTS for e in events)
+    changes += sum(int(e.value or 0) for e in events if e.kind == LEFT_OUT and e.criterion in ZONE_EVENTS)
+    rod = {"least": min(shares), "mean": sum(shares) / len(shares), "most": max(shares)}
+    return {"rod": rod, "zone_changes": changes}
+
+
+def errors_facts(result: Result) -> dict[str, Any]:
+    """The estimated errors: largest of position (m) and of the pulls at the ends (N), by kind; whether they are met."""
+    found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
+    if found and "accuracy_asked" in result.attributes:
+        kinds = {event.kind for event in result.events}
+        known = not kinds & {"error uncertain", "error beyond estimate"}
+        found["met"] = "accuracy missed" not in kinds and (known or None)
+    return found
+
+
+def errors_table(errors: dict[str, Any], result: Result) -> Any:
+    """The same for people: by cause, beside what was asked."""
+    from rich.table import Table
+
+    pulls = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
+    most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in pulls), default=0.0)
+    table = Table.grid(padding=(0, 2))
+    kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
+    table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
+    for what, unit, whole in (("position", "m", float(result.s[-1])), ("pull", "N", most)):
+        total = errors[f"total_{what}"]
+        share = (
+            f"{100 * total / whole:.2g} % of {'the length' if what == 'position' else f'{_short(whole)} N'}"
+            if whole
+            else ""
+        )
+        sizes = (f"{_short(errors[f'{kind}_{what}'], total)} {unit}" for kind in kinds)
+        table.add_row("position" if what == "position" else "pull at ends", *sizes, share)
+    if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
+        names = [f"errors/{kind}/bending_moment" for kind in kinds]
+        found = {name: float(result[name].max()) for name in names if name in result}
+        most = max(found.values())
+        sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
+        peak = float(result["bending_moment"].max()) if "bending_moment" in result else 0.0
+        table.add_row("moment", *sizes, f"of {_short(peak)} N m" if peak else "no rod, no moment: model: rod")
+    asked = result.attributes.get("accuracy_asked")
+    if not asked:
+        return table
+    from rich.console import Group
+
+    verdict = {True: "met", False: "MISSED", None: "perhaps met, see the note"}[errors["met"]]
+    return Group(table, f"asked {asked}: {verdict}")
+
+
+def _short(x: float, beside: float = 0.0) -> str:
+    """Two digits, without an exponent where that is as short; round-off beside another number is nothing."""
+    x = 0.0 if abs(x) < 1e-9 * beside else x
+    return f"{float(f'{x:.2g}'):.6g}" if 1e-4 <= abs(x) < 1e6 or x == 0.0 else f"{x:.1e}"
+
+
+def zones_said(facts: dict[str, Any], file: Path) -> str:
+    """The same in a line."""
+    rod, changes = facts["rod"], facts["zone_changes"]
+    if not changes:
+        return f"rod: {rod['mean']:.0%} of the line, all the time"
+    times = f"{changes} change{'s' * (changes > 1)} of zones"
+    part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on the mean"
+    return f"{part}; {times}: hybrid plot --zones {file}"
+
+
+def judged(table: TradeTable, row: Row) -> dict[str, Any]:
+    """What the table says of a row."""
+    score = table.score(row) if row.is_choice else None
+    return {"score": score, "front": row in table.front(), "recommended": row == table.recommended}
+
+
+def trade_table(table: TradeTable) -> Any:
+    """The rows as a terminal has room for them."""
+    from rich.table import Table
+
+    def part(value: float | None) -> str:
+        return "" if value is None else f"{100 * value:.2g} %"
+
+    out = Table(box=None, pad_edge=False, header_style="bold")
+    out.add_column("run", no_wrap=True)
+    for name in ("position", "pull", "cells", "steps", "CPU"):
+        out.add_column(name, justify="right", no_wrap=True)
+    out.add_column("", overflow="fold")
+    front, best = table.front(), table.recommended
+    for row in table.rows:
+        said = "take this" if row == best else "front" if row in front else ""
+        said = ", ".join(x for x in (said, "" if row.status == "done" else row.status, row.cause) if x)
+        style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
+        figures = [part(row.position_part), part(row.pull_part), str(row.cells or ""), str(row.steps or "")]
+        out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", said, style=style)
+    return out
+
+
+def plan_table(scene: Scene, plan: Plan) -> Any:
+    from rich.console import Group
+    from rich.table import Table
+
+    from hybrid.cli.console import span
+
+    ledger = Table.grid(padding=(0, 3, 0, 0))
+    ledger.add_column(no_wrap=True)
+    ledger.add_column(overflow="fold")
+    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would ask for it")):
+        ledger.add_row(what, why, style="bold")
+        for entry in (e for e in plan.ledger if e.on == on):
+            ledger.add_row(entry.what, entry.why, style="" if on else "dim")
+        ledger.add_row()
+    zones = Table.grid(padding=(0, 3, 0, 0))
+    zones.add_row("zone", "from", "to", "cells", style="bold")
+    moving = plan.base_cells is not None
+    for zone, cells in zip(plan.zones, plan.cells, strict=True):
+        kind, count = ("as it comes", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
+        zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
+    work = "no time in the scene, so statics only"
+    follows = scene.time is not None and scene.time.controlled
+    most = "about" if plan.base_cells is None else "at most about"
+    if scene.time is not None:
+        asked = scene.time.step or plan.step
+        shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
+        work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, {most} {span(plan.seconds)} of computing"
+        if follows:
+            work = f"{plan.steps} steps or more, as the motion asks, in several runs: {span(plan.seconds)} or more"
+    head = [scene.title, ""] if scene.title else []
+    size = f"{sum(plan.cells)} cells, {plan.unknowns} unknowns"
+    if moving:
+        size = f"{plan.base_cells} cells where it is catenary, {size} if all of it is rod"
+    return Group(*head, ledger, zones, "", f"{size}; {work}")
+
+
+def import_said(made: ImportedDeck) -> list[str]:
+    """What could not be carried over from a deck: of the deck, then of each scene what the others do not share."""
+    parts = [note.told(made.file) for note in made.notes if note.kind != "not needed"]
+    shared = set.intersection(*(set(scene.notes) for scene in made.scenes.values()))
+    parts += [note.told(made.file) for note in next(iter(made.scenes.values())).notes if note in shared]
+    for name, scene in made.scenes.items():
+        parts += [f"{name}: {note.told(made.file)}" for note in scene.notes if note not in shared]
+    settings = [f"    {note.line}: {note.text}" for note in made.notes if note.kind == "not needed"]
+    if settings:
+        parts += ["not needed, MoorDyn's own settings and outputs (--json says why):", *settings]
+    return parts

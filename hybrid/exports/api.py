@@ -1,0 +1,219 @@
+"""Write a result in a format of other programs: `export(result, "run.nc")`.
+
+nc      everything, for xarray, MATLAB, Panoply and other programs that read netCDF (`labelled`)
+csv     histories at some places, for spreadsheets
+vtkhdf  the cable over time, for ParaView (`vtk`)
+fatigue cycles of tension and curvature at the places that matter, and the histories they are counted in (`fatigue`)
+
+Exports read files and nothing else.  A file appears when it is whole, and not at all if it cannot be made so.
+"""
+
+from __future__ import annotations
+
+import csv
+import io
+from collections.abc import Sequence
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.exports.fatigue import count
+from hybrid.exports.vtk import image as vtkhdf
+from hybrid.store.reader import Result
+from hybrid.store.selection import (
+    MARK,
+    Numbers,
+    Part,
+    Window,
+    check_place,
+    error_name,
+    head_lines,
+    part_of,
+    scene_lines,
+    shortfalls,
+    write_whole,
+)
+from hybrid.store.xarray_dataset import image as netcdf
+
+SUFFIXES = {"nc": ".nc", "csv": ".csv", "vtkhdf": ".vtkhdf", "fatigue": ".cycles.csv"}
+# Decimals of an arc length in the name of a column: micrometres of a kilometre.
+_PLACE = ".9g"
+
+
+class Exported(NamedTuple):
+    """What was written: the files, what is in them in a sentence, and what their reader must know."""
+
+    files: tuple[Path, ...]
+    text: str
+    notes: tuple[str, ...]
+
+
+def export(
+    result: Result,
+    path: str | Path | None = None,
+    *,
+    format: str | None = None,
+    names: Sequence[str] | None = None,
+    times: Window | None = None,
+    at: Numbers | None = None,
+    overwrite: bool = True,
+) -> Exported:
+    """Write a result as netCDF, CSV, VTKHDF or as cycles for fatigue.
+
+    path: the file, whose ending says the format unless `format` does; None: beside the result.  names: fields or
+    groups, None for all (of a CSV: tension).  times: from and to, s, None for no limit.  at: arc lengths, m; None for
+    all (of a CSV: the ends, and those recorded as `history`).  An older export is replaced if `overwrite`; what is
+    not one never is.  ResultError when something is unknown, a package is missing, or the disk says no.
+    """
+    kind = _format(path, format)
+    if path is None and result.file is None:
+        raise ResultError(f"a result in memory has no name of its own\n    try:      path='run{SUFFIXES[kind]}'")
+    file = Path(path).expanduser() if path is not None else beside(result.file or Path(), kind)
+    if kind == "csv":
+        names, at = ["tension"] if names is None else names, _usual_places(result) if at is None else at
+    if kind == "fatigue" and names is not None:
+        raise ResultError("fatigue counts tension and curvature; other names cannot be chosen")
+    part = part_of(result, names, times, at)
+    files = [file]
+    if kind == "fatigue":
+        files.append(file.with_name(file.name.removesuffix(".csv").removesuffix(".cycles") + ".histories.csv"))
+    for place in files:
+        check_place(place, overwrite)  # before the work
+    made = _MADE[kind](part)
+    write_whole(dict(zip(files, made.files, strict=True)), overwrite)
+    return Exported(tuple(files), made.text + _span(part), (*shortfalls(part), *made.notes))
+
+
+class _Made(NamedTuple):
+    """The content of the files of an export, what to say of it, and what to warn of."""
+
+    files: tuple[bytes | memoryview, ...]
+    text: str = ""
+    notes: Sequence[str] = ()
+
+
+def _csv(part: Part) -> _Made:
+    columns = histories(part)
+    head = head_lines(part) + _errors_of(part) + scene_lines(part)
+    rows = len(next(iter(columns.values())))
+    text = f"{rows} row{'s' * (rows != 1)}, {len(columns)} columns; "
+    return _Made((_table("histories", head, list(columns), list(columns.values())),), text)
+
+
+def _fatigue(part: Part) -> _Made:
+    found = count(part)
+    head = found.head + scene_lines(part)
+    cycles = _table("cycles", head, found.cycle_names, found.cycles)
+    text = f"{len(found.cycles[0])} cycles at {found.places} places; "
+    return _Made((cycles, _table("histories", head, found.history_names, found.histories)), text, found.notes)
+
+
+_MADE = {
+    "nc": lambda part: _Made((netcdf(part),)),
+    "csv": _csv,
+    "vtkhdf": lambda part: _Made((vtkhdf(part),)),
+    "fatigue": _fatigue,
+}
+
+
+def _span(part: Part) -> str:
+    t = part.times
+    return f"{len(t)} output{'s' * (len(t) != 1)}, t = {t[0]:.6g}" + (f" to {t[-1]:.6g} s" if len(t) > 1 else " s")
+
+
+def beside(source: Path, format: str | None = None) -> Path:
+    """The name of an export beside its result."""
+    return source.with_suffix(SUFFIXES[_format(None, format)])
+
+
+def histories(part: Part) -> dict[str, np.ndarray]:
+    """Columns over one clock, the clock first: names with unit and place, and values (n,).
+
+    ResultError when the fields lie on different clocks, such as the outputs and the step log.
+    """
+    result, columns = part.result, {}
+    clocks = {name: (result.dims(name) or ("",))[0] for name in part.names}
+    inside = {name: clock for name, clock in clocks.items() if clock == "t" or clock.endswith("/t")}
+    if len(set(inside.values())) != 1 or len(inside) < len(clocks):
+        groups = (f"{clock or 'no time'}: {_some(clocks, clock)}" for clock in sorted(set(clocks.values())))
+        raise ResultError(
+            f"the columns of a CSV have one clock in common\n    given:    {'; '.join(groups)}\n"
+            "    try:      one export for each of them, or nc, which holds them all"
+        )
+    (clock,) = set(inside.values())
+    columns["t (s)"] = part.array(clock)
+    for name in part.names:
+        if name != clock:
+            _unfold(columns, part, name)
+    return columns
+
+
+def _some(clocks: dict[str, str], clock: str) -> str:
+    names = [name for name in clocks if clocks[name] == clock]
+    return ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
+
+
+def _unfold(columns: dict[str, np.ndarray], part: Part, name: str) -> None:
+    """One column for each place and component of a field."""
+    array, dims = part.array(name), part.result.dims(name)
+    unit = part.result.units[name]
+    for index in np.ndindex(array.shape[1:]):
+        title, place = name, ""
+        for dim, k in zip(dims[1:], index, strict=True):
+            if dim == "s":
+                place = f" at s = {part.s[k]:{_PLACE}} m"
+            else:
+                title += f" {'xyz'[k] if dim == 'xyz' else k}"
+        columns[title + (f" ({unit})" if unit else "") + place] = array[(slice(None), *index)]
+
+
+def _usual_places(result: Result) -> np.ndarray:
+    """The ends, and the places that the scene asks to follow."""
+    asked = np.asarray(result["history"], float).ravel() if "history" in result else np.zeros(0)
+    return np.unique([result["s"][0], *asked, result["s"][-1]])
+
+
+def _errors_of(part: Part) -> list[str]:
+    """The largest estimated error of every field at every place."""
+    lines = []
+    for name in part.names:
+        error, said = error_name(part, name)
+        if error and part.result.dims(error) == ("t", "s"):
+            most, unit = part.array(error).max(axis=0), part.result.units[error]
+            lines += [
+                f"  {name} at s = {s:{_PLACE}} m: at most {x:.3g} {unit}, {said}"
+                for s, x in zip(part.s, most, strict=True)
+            ]
+    return ["errors:", *lines] if lines else ["errors: not estimated (output: {errors: true} in the scene asks for it)"]
+
+
+def _table(what: str, head: Sequence[str], names: Sequence[str], columns: Sequence[np.ndarray]) -> bytes:
+    """A table with a head of comments.  Numbers as Python writes them: 17 digits if need be, a point, no grouping."""
+    out = io.StringIO(newline="")
+    out.writelines(f"# {line}\n" for line in (f"{MARK}: {what}", *head))
+    table = csv.writer(out, lineterminator="\n")
+    table.writerow(names)
+    table.writerows(zip(*(column.tolist() for column in columns), strict=True))
+    return out.getvalue().encode()
+
+
+def _format(path: str | Path | None, format: str | None) -> str:
+    """The format that was asked for, or that the name says."""
+    expected = f"    expected: {', '.join(SUFFIXES)}"
+    suffix = Path(path or "").suffix.lower().removeprefix(".")
+    if format is None and path is None:
+        return "nc"
+    if format is None and suffix not in SUFFIXES:
+        said = f"the name '{Path(path or '').name}' says no format"
+        raise ResultError(f"{said}\n{expected}\n    try:      a name such as run.nc, or say the format")
+    if format is None:
+        return suffix
+    if format not in SUFFIXES:
+        raise ResultError(f"there is no format '{format}'\n{expected}")
+    if suffix in SUFFIXES and "." + suffix != Path("run" + SUFFIXES[format]).suffix:
+        raise ResultError(
+            f"the format is {format}, but the name ends with .{suffix}\n    try:      leave one of them out"
+        )
+    return format

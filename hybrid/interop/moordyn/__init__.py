@@ -1,0 +1,148 @@
+"""Input files of MoorDyn ("decks"), versions 1 and 2, as scenes: one for each cable.
+
+    rows     text: sections, rows, cells, each with its line
+    types    line types, of both versions
+    deck     the tables of the deck: points, bodies, rods, lines, and do they hold together
+    options  its options, and those that hybrid has no use for
+    cables   which lines are one cable, and what is at its ends
+    scenes   the scene of a cable
+    notes    what could not be carried over as it stands
+
+docs/import.md says what becomes of what.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.cables import Cable, cables
+from hybrid.interop.moordyn.deck import Deck, read_deck
+from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_order, note
+from hybrid.interop.moordyn.rows import Source, read_source
+from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
+
+__all__ = ["ImportedDeck", "ImportedScene", "Note", "import_moordyn"]
+
+# Sections of which no row has a place in a scene: why, and what to do.
+_NO_PLACE = {
+    "failure": ("lines of hybrid do not break", "compute the broken line as a scene of its own"),
+    "control": ("winches that follow a controller; payout is not computed", ""),
+    "external loads": ("steady forces and dampers on points, rods and bodies", "a force acts on `kind: free` ends"),
+    "syrope": ("tension of polyester that depends on its past", "give axial_stiffness, in N, at the mean tension"),
+}
+
+
+@dataclass(frozen=True)
+class ImportedDeck:
+    """The scenes of a deck by name, and what is to be known of all of them."""
+
+    file: str
+    scenes: dict[str, ImportedScene]
+    notes: tuple[Note, ...]
+
+    def files(self, target: str | Path) -> dict[Path, ImportedScene]:
+        """Where scenes are written: to `target` if it names a YAML file and there is one scene, else into the folder
+        `target`, as DECK.line1.yaml, or DECK.yaml if there is one.
+
+        SceneError if several scenes are to go into one file.
+        """
+        target, stem = Path(target), Path(self.file).stem
+        one = len(self.scenes) == 1
+        if target.suffix.lower() in (".yaml", ".yml") and not target.is_dir():
+            if not one:
+                given = f"{target} for {len(self.scenes)} cables: {', '.join(self.scenes)}"
+                fix = "name a folder, or choose a line: --line " + str(next(iter(self.scenes.values())).lines[0])
+                raise SceneError(
+                    [Complaint("output", given, "a folder: each cable is a scene of its own", fix)], self.file
+                )
+            return {target: next(iter(self.scenes.values()))}
+        return {target / (f"{stem}.yaml" if one else f"{stem}.{name}.yaml"): s for name, s in self.scenes.items()}
+
+    def write(self, target: str | Path, overwrite: bool = False) -> list[Path]:
+        """Write the scenes (see `files`); SceneError if a file is there already: people edit scenes by hand."""
+        files = self.files(target)
+        there = [path for path in files if path.exists()]
+        if there and not overwrite:
+            fix = "give another place (-o), or --overwrite; what was edited in them is lost then"
+            expected = "files that are not there yet: a scene may have been edited by hand"
+            raise SceneError([Complaint("output", ", ".join(map(str, there)), expected, fix)], self.file)
+        for path, made in files.items():
+            try:
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_text(made.text, encoding="utf-8")
+            except OSError as error:
+                expected = f"a place that can be written to ({error.strerror})"
+                raise SceneError([Complaint("output", str(path), expected, "give another (-o)")], self.file) from None
+        return list(files)
+
+
+def import_moordyn(path: str | Path, line: int | None = None) -> ImportedDeck:
+    """Read a MoorDyn input file; of all its cables, or of the one that line `line` is part of.
+
+    SceneError with every complaint, in lines of the deck, if it is refused.
+    """
+    source = read_source(path)
+    deck = read_deck(source)
+    found, lost = cables(deck)
+    if line is not None:
+        found = _chosen(deck, found, lost, line)
+    if not found:
+        expected = "a line that a scene can be made of; "
+        complaints = [Complaint("no scene", n.text, expected + n.why, n.instead, n.line) for n in lost]
+        raise SceneError(complaints, deck.file)
+    scenes = _all_scenes(deck, found)
+    notes = [*deck.notes, *lost, *_no_place(source, deck)]
+    return ImportedDeck(deck.file, {made.name: made for made in scenes}, in_order(notes))
+
+
+def _chosen(deck: Deck, found: list[Cable], lost: list[Note], line: int) -> list[Cable]:
+    if line not in deck.lines:
+        expected = f"a line of the deck: {', '.join(map(str, deck.lines))}"
+        raise SceneError([Complaint("line", str(line), expected, "choose one of them")], deck.file)
+    chosen = [cable for cable in found if line in cable.ids]
+    if not chosen:
+        row = deck.lines[line].row
+        lost[:] = [n for n in lost if n.line == row.line]
+    return chosen
+
+
+def _all_scenes(deck: Deck, found: list[Cable]) -> list[ImportedScene]:
+    """The scenes; SceneError with the complaints about all of them."""
+    made: list[ImportedScene] = []
+    complaints: list[Complaint] = []
+    for cable in found:
+        try:
+            made.append(scene_of(deck, cable))
+        except SceneError as error:
+            complaints += error.complaints
+    if complaints:
+        raise SceneError(complaints, deck.file)
+    return made
+
+
+def _no_place(source: Source, deck: Deck) -> list[Note]:
+    """Notes of rows that no scene takes up."""
+    notes = [note(LEFT_OUT, row, *why) for name, why in _NO_PLACE.items() for row in source.rows(name)]
+    for section in source.unknown:
+        why = f"the section {section.title} is not known here"
+        notes += [note(LEFT_OUT, row, why) for row in section.rows]
+    why = "D of an exponent is taken as Fortran does, 1.0D+8 as 1e8; MoorDyn-C stops reading at the D, and takes 1"
+    notes += [note(TAKEN, row, why, "write e, as in 1.0e8") for row in source.fortran]
+    outputs = [row for row in source.rows("outputs") if row.cells[0].upper() != "END"]
+    why = "output channels; hybrid keeps the whole cable, and the pull at both ends at every step (steps/pull_end)"
+    notes += [note(NOT_NEEDED, row, why) for row in outputs]
+    used = {(kind, id) for line in deck.lines.values() for kind, id, _ in line.ends}
+    carried = {p.on for id, p in deck.points.items() if p.kind == "body" and ("point", id) in used}
+    carried |= {r.on for id, r in deck.rods.items() if r.kind == "body" and ("rod", id) in used}
+    for id, rod in deck.rods.items():
+        if ("rod", id) not in used:
+            notes.append(note(LEFT_OUT, rod.row, "a rod that holds no line; hybrid computes cables alone"))
+    for id, body in deck.bodies.items():
+        if id not in carried:
+            notes.append(note(LEFT_OUT, body.row, "a body that holds no line; hybrid computes cables alone"))
+    for id, point in deck.points.items():
+        if ("point", id) not in used:
+            notes.append(note(LEFT_OUT, point.row, "a point that holds no line; hybrid computes cables alone"))
+    return notes

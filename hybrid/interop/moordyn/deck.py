@@ -1,0 +1,275 @@
+"""The tables of a deck: line types, points, bodies, rods, lines.
+
+Two forms are read.  MoorDyn 2: line types with EI (10 columns and more), points of 9 columns, lines with their ends
+before their length.  MoorDyn 1: line types without EI (9 columns, added mass before drag), points of 12 columns with a
+force, lines with their length before their ends.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
+from hybrid.interop.moordyn.options import Options, read_options
+from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, simple
+from hybrid.interop.moordyn.types import LineType, line_type
+from hybrid.scene.suggestions import did_you_mean
+
+Triple = tuple[float, float, float]
+
+_POINT_V2 = (
+    ("ID", "id", "node", "point"), ("Attachment", "attachment", "type"), ("X", "x"), ("Y", "y"), ("Z", "z"),
+    ("Mass", "mass", "m"), ("Volume", "volume", "v"), ("CdA", "cda"), ("Ca", "ca"),
+)  # fmt: skip
+_POINT_V1 = (*_POINT_V2[:7], ("FX", "fx"), ("FY", "fy"), ("FZ", "fz"), *_POINT_V2[7:])
+_LENGTH, _SEGMENTS = ("UnstrLen", "unstrlen", "length"), ("NumSegs", "numsegs", "nsegs")
+_A, _B = ("AttachA", "attacha", "nodea", "nodeanch"), ("AttachB", "attachb", "nodeb", "nodefair")
+_FLAGS = ("Outputs", "outputs", "lineoutputs", "flagsoutputs", "output")
+_LINE_V2 = (("ID", "id", "line"), ("LineType", "linetype", "type"), _A, _B, _LENGTH, _SEGMENTS, _FLAGS)
+_LINE_V1 = (*_LINE_V2[:2], _LENGTH, _SEGMENTS, _A, _B, _FLAGS)
+
+# How points, bodies and rods are attached, by the words of MoorDyn.
+WORDS = {
+    "fixed": ("FIXED", "FIX", "ANCHOR"),
+    "coupled": ("COUPLED", "CPLD", "VESSEL", "VES", "FAIRLEAD"),
+    "coupled pinned": ("COUPLEDPINNED", "CPLDPIN", "VESPIN", "COUPLED PINNED"),
+    "pinned": ("PINNED", "PIN"),
+    "free": ("FREE", "CONNECT", "CON", "POINT"),
+}
+_KIND = {word: kind for kind, words in WORDS.items() for word in words}
+_PLURAL = {"point": "points", "rod": "rods", "body": "bodies"}
+
+
+@dataclass(frozen=True)
+class Point:
+    """kind: fixed, coupled, free, body, turbine; of the last two `on` is the number."""
+
+    id: int
+    row: Row
+    kind: str
+    on: int
+    place: Triple
+    mass: float
+    volume: float
+    drag_area: float
+    added: float
+
+
+@dataclass(frozen=True)
+class Body:
+    """A rigid body; angles in degrees, as MoorDyn takes them whatever the row of units says."""
+
+    id: int
+    row: Row
+    kind: str
+    place: Triple
+    angles: Triple
+
+
+@dataclass(frozen=True)
+class Rod:
+    """A rigid rod from a to b; on: the body that carries it, 0 if none does."""
+
+    id: int
+    row: Row
+    kind: str
+    on: int
+    a: Triple
+    b: Triple
+    segments: int
+
+
+@dataclass(frozen=True)
+class Line:
+    """A line from its end A to its end B; each is a point, ("point", id, ""), or the end of a rod, ("rod", id, "A")."""
+
+    id: int
+    row: Row
+    type: str
+    ends: tuple[tuple[str, int, str], tuple[str, int, str]]
+    length: float  # m; negative: so many times the distance of the ends
+    segments: int
+
+
+@dataclass
+class Deck:
+    """What a deck says."""
+
+    file: str
+    types: dict[str, LineType]
+    points: dict[int, Point]
+    bodies: dict[int, Body]
+    rods: dict[int, Rod]
+    lines: dict[int, Line]
+    options: Options
+    notes: list[Note] = field(default_factory=list)
+
+
+def read_deck(source: Source) -> Deck:
+    """The tables of a deck; SceneError with every complaint if it is refused."""
+    for name, title in (("line types", "LINE TYPES"), ("lines", "LINES")):
+        if name not in source.sections:
+            found = ", ".join(s.title for s in source.sections.values()) or "no section that MoorDyn knows"
+            expected = f"a section that begins with a row such as ------- {title} -------"
+            source.complain(title, found, expected, "check that this is a MoorDyn input file", None)
+        elif not source.rows(name) and not source.complaints:
+            section = source.sections[name]
+            fix = "fill the table: names, units, then one row for each"
+            source.complain(section.title, "", "at least one row under names and units", fix, section.line)
+    source.refuse()
+    notes: list[Note] = []
+    types = {x.name: x for x in _each(source, "line types", line_type, notes)}
+    bodies = _numbered(source, "bodies", _each(source, "bodies", _body, notes))
+    rods = _numbered(source, "rods", _each(source, "rods", _rod, notes))
+    points = _numbered(source, "points", _each(source, "points", _point, notes))
+    lines = _numbered(source, "lines", _each(source, "lines", _line, notes))
+    deck = Deck(source.file, types, points, bodies, rods, lines, read_options(source, notes), notes)
+    _hold_together(source, deck)
+    source.refuse()
+    return deck
+
+
+def _each(source: Source, name: str, read: Callable[..., object], notes: list[Note]) -> list:
+    found = [read(source, row, notes) for row in source.rows(name)]
+    return [x for x in found if x is not None]
+
+
+def _numbered(source: Source, name: str, things: list) -> dict:
+    """By ID; MoorDyn counts rows, so the IDs must count them too."""
+    if len(things) == len(source.rows(name)):
+        for n, thing in enumerate(things, start=1):
+            if thing.id != n:
+                expected = f"{n}: IDs count the rows from 1, because MoorDyn attaches by place"
+                source.complain("ID", str(thing.id), expected, "number the rows in order", thing.row.line)
+    return {thing.id: thing for thing in things}
+
+
+# --- points, bodies, rods ----------------------------------------------------------------------
+
+
+def _attachment(source: Source, row: Row, cell: str, kinds: Sequence[str]) -> tuple[str, int]:
+    """How a thing is attached, and the number of the body or turbine that carries it."""
+    word = cell.upper()
+    carried = re.fullmatch(r"(BODY|TURBINE)(\d{1,6})(PINNED|PIN)?", word)
+    if carried and carried[1].lower() in kinds:
+        return carried[1].lower() + (" pinned" if carried[3] else ""), int(carried[2])
+    kind = _KIND.get(word)
+    if kind is not None and kind in kinds:
+        return kind, 0
+    known = [WORDS[k][0].title() for k in kinds if k in WORDS] + [f"{k.title()}1" for k in kinds if k not in WORDS]
+    near = did_you_mean(cell.title(), known)
+    source.complain("attachment", cell, f"one of {', '.join(known)}", near or "check the columns of this row", row.line)
+    return kinds[0], 0
+
+
+def _triple(source: Source, row: Row, cells: Sequence[str], names: str) -> Triple:
+    x, y, z = (source.number(row, cell, name) for cell, name in zip(cells, names.split(), strict=True))
+    return x, y, z
+
+
+def _point(source: Source, row: Row, notes: list[Note]) -> Point | None:
+    old = len(row.cells) == len(_POINT_V1)
+    names = _POINT_V1 if old else _POINT_V2
+    if not (old or source.columns(row, 9, 9, names)):
+        return None
+    check_names(source, "points", names, len(names))
+    cells = row.cells
+    kind, on = _attachment(source, row, cells[1], ("fixed", "coupled", "free", "body", "turbine"))
+    mass = source.number(row, cells[5], "mass (kg)", least=0.0)
+    volume = source.number(row, cells[6], "volume (m^3)", least=0.0)
+    if old and any(_triple(source, row, cells[7:10], "FX FY FZ")):
+        why = "a steady force on a point; hybrid has none in the middle of a cable"
+        notes.append(note(LEFT_OUT, row, why, "give an end `kind: free` with a force, or make it weight or buoyancy"))
+    if old and kind == "coupled":
+        why = "MoorDyn 1 counts the place of a vessel's point from the platform, which is taken to be at 0 0 0"
+        notes.append(note(TAKEN, row, why, "shift ends.end.position, if the platform is elsewhere"))
+    area, added = (source.number(row, c, n, least=0.0) for c, n in zip(cells[-2:], ("CdA (m^2)", "Ca"), strict=True))
+    place = _triple(source, row, cells[2:5], "X Y Z")
+    return Point(source.whole(row, cells[0], "ID", 1), row, kind, on, place, mass, volume, area, added)
+
+
+def _body(source: Source, row: Row, notes: list[Note]) -> Body | None:
+    columns = "ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG I Volume CdA Ca"
+    if not source.columns(row, 14, 14, [(name,) for name in columns.split()]):
+        return None
+    kind, _ = _attachment(
+        source, row, row.cells[1], ("fixed", "coupled", "free", "pinned", "coupled pinned", "turbine")
+    )
+    place, angles = (_triple(source, row, row.cells[i : i + 3], n) for i, n in ((2, "X0 Y0 Z0"), (5, "r0 p0 y0")))
+    return Body(source.whole(row, row.cells[0], "ID", 1), row, kind, place, angles)
+
+
+def _rod(source: Source, row: Row, notes: list[Note]) -> Rod | None:
+    columns = "ID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs RodOutputs"
+    if not source.columns(row, 11, 11, [(name,) for name in columns.split()]):
+        return None
+    kinds = ("fixed", "coupled", "free", "pinned", "coupled pinned", "body", "turbine")
+    kind, on = _attachment(source, row, row.cells[2], kinds)
+    a, b = (_triple(source, row, row.cells[i : i + 3], n) for i, n in ((3, "Xa Ya Za"), (6, "Xb Yb Zb")))
+    segments = source.whole(row, row.cells[9], "NumSegs", 0)
+    return Rod(source.whole(row, row.cells[0], "ID", 1), row, kind, on, a, b, segments)
+
+
+# --- lines -------------------------------------------------------------------------------------
+
+
+def _lines_are_old(section: Section) -> bool:
+    """Whether lengths stand before ends, as in MoorDyn 1: their columns are as many, so the names decide."""
+    return section.names is not None and any(simple(c) in _LENGTH[1:] for c in section.names.cells[2:3])
+
+
+def _line(source: Source, row: Row, notes: list[Note]) -> Line | None:
+    old = _lines_are_old(source.sections["lines"])
+    names = _LINE_V1 if old else _LINE_V2
+    if not source.columns(row, 7, 7, names):
+        return None
+    check_names(source, "lines", names, len(names))
+    cells = row.cells
+    length, segments = (cells[2], cells[3]) if old else (cells[4], cells[5])
+    ends = tuple(_end(source, row, cell) for cell in (cells[4:6] if old else cells[2:4]))
+    unstretched = source.number(row, length, "unstretched length (m)")
+    if unstretched == 0.0:
+        source.complain("unstretched length (m)", length, "a number other than 0", "check the columns", row.line)
+    if cells[6] != "-":
+        why = "output flags of a line; hybrid keeps position, velocity, tension along the whole cable"
+        notes.append(note(NOT_NEEDED, row, why, "output.points and output.every say where and how often"))
+    count = source.whole(row, segments, "NumSegs", 1)
+    return Line(source.whole(row, cells[0], "ID", 1), row, cells[1], (ends[0], ends[1]), unstretched, count)
+
+
+def _end(source: Source, row: Row, cell: str) -> tuple[str, int, str]:
+    word = cell.upper()
+    if point := re.fullmatch(r"(?:P|POINT|C|CON)?(\d{1,8})", word):
+        return "point", int(point[1]), ""
+    if rod := re.fullmatch(r"R(?:OD)?(\d{1,8})([AB])", word):
+        return "rod", int(rod[1]), rod[2]
+    source.complain("attachment", cell, "the ID of a point, such as 2, or the end of a rod, such as R1A", "", row.line)
+    return "point", 0, ""
+
+
+# --- do the tables hold together ---------------------------------------------------------------
+
+
+def _hold_together(source: Source, deck: Deck) -> None:
+    """Complain of what points to a row that is not there; a row that is there and wrong is complained of already."""
+    names = [row.cells[0] for row in source.rows("line types")]
+    count = {kind: len(source.rows(f"{kind}s")) for kind in ("point", "rod")} | {"body": len(source.rows("bodies"))}
+    for line in deck.lines.values():
+        if line.type not in names:
+            expected = f"a name of LINE TYPES: {', '.join(names)}"
+            source.complain("line type", line.type, expected, did_you_mean(line.type, names), line.row.line)
+        for kind, id, _ in line.ends:
+            _there(source, line.row, kind, id, count[kind])
+    things: list[Point | Rod] = [*deck.points.values(), *deck.rods.values()]
+    for thing in things:
+        if thing.kind.startswith("body"):
+            _there(source, thing.row, "body", thing.on, count["body"])
+
+
+def _there(source: Source, row: Row, kind: str, id: int, count: int) -> None:
+    if not 1 <= id <= count:
+        expected = f"a {kind} that is there: " + (f"1 to {count}" if count else "there is none")
+        fix = "check the columns of this row" if count else f"add its section, {TITLES[_PLURAL[kind]][0]}"
+        source.complain(f"{kind} {id}", row.text, expected, fix, row.line)

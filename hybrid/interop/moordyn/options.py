@@ -1,0 +1,117 @@
+"""OPTIONS of a deck: what acts on the lines is read, the rest is told apart."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
+from hybrid.interop.moordyn.rows import Row, Source, number
+from hybrid.scene.suggestions import nearest
+
+# What MoorDyn takes where a deck says nothing: measured with MoorDyn 2.7 (bench/test_moordyn_measured.py).
+GRAVITY, DENSITY, BED_STIFFNESS, BED_DAMPING = 9.80665, 1025.0, 3.0e6, 3.0e5
+
+# Numbers that are read, by the names that versions of MoorDyn know, in lower case; and what each must be at least.
+_READ: dict[str, tuple[str, ...]] = {
+    "gravity": ("g", "gravity"),
+    "density": ("rho", "rhow", "wtrdnsty"),
+    "depth": ("wtrdpth",),
+    "bed_stiffness": ("kbot", "kb"),
+    "bed_damping": ("cbot", "cb"),
+    "friction": ("frictioncoefficient",),
+    "friction_across": ("mu_kt",),
+    "friction_along": ("mu_ka",),
+}
+_FIELD = {name: field for field, names in _READ.items() for name in names}
+
+_STEPS = ("a setting of MoorDyn's time steps", "time.step, or accuracy, says how finely hybrid steps")
+_REST = (
+    "a setting of MoorDyn's search for the rest; hybrid solves for it (initial: equilibrium)",
+    "hybrid static SCENE.yaml shows it",
+)
+_OUTPUT = ("a setting of MoorDyn's own output", "output.every says how often results are kept")
+_SLIDING = ("it blurs MoorDyn's friction; hybrid's holds and slides without it", "")
+_UNUSED: dict[str, tuple[str, str]] = (
+    dict.fromkeys(("dtm", "dt", "cfl", "tscheme", "inertialf", "inertialf_rampt"), _STEPS)
+    | dict.fromkeys(("dtic", "icdt", "tmaxic", "ictmax", "cdscaleic", "icdfac", "threshic", "icthresh"), _REST)
+    | {"icgendynamic": _REST}
+    | dict.fromkeys(("writelog", "writeunits", "dtout", "disableoutput", "disableouttime", "outswitch"), _OUTPUT)
+    | dict.fromkeys(("fricdamp", "cv", "statdynfricscale", "mc"), _SLIDING)
+    | dict.fromkeys(("dtwave", "unifycurrentgrid", "wavekin_rampt"), ("a setting of MoorDyn's grid of waves", ""))
+)
+
+# What acts, and has another form in a scene; a value of 0 says that there is none.
+_ELSEWHERE: dict[str, tuple[str, str]] = {
+    "wavekin": ("waves of MoorDyn come from files or from the calling program", "give environment.fluid.waves"),
+    "currents": ("currents of MoorDyn come from files", "give environment.fluid.current, a list of {z, velocity}"),
+    "waterkin": ("waves and currents of MoorDyn-F come from a file", "give environment.fluid.waves and .current"),
+    "seafloorfile": (
+        "the bed of a scene is a plane, not a grid of depths",
+        "give environment.seabed.z and .slope as they are where the line lies",
+    ),
+}
+_NAMES = (*_FIELD, *_UNUSED, *_ELSEWHERE)
+
+
+@dataclass
+class Options:
+    """What surrounds the lines; None where the deck says nothing.  rows: where each was said."""
+
+    rows: dict[str, Row]
+    gravity: float = GRAVITY
+    density: float = DENSITY
+    depth: float | None = None
+    bed_stiffness: float = BED_STIFFNESS
+    bed_damping: float = BED_DAMPING
+    friction: float = 0.0
+    friction_across: float = 0.0
+    friction_along: float = 0.0
+
+
+def read_options(source: Source, notes: list[Note]) -> Options:
+    """The options; of one that is given twice the last, as in MoorDyn."""
+    found = Options({})
+    for row in source.rows("options"):
+        if len(row.cells) < 2:
+            notes.append(note(LEFT_OUT, row, "not a value and a name, such as 9.81 g; MoorDyn ignores it"))
+            continue
+        value, name = row.cells[0].strip("\"'"), row.cells[1].lower()
+        if name not in _NAMES and row.cells[0].lower() in _NAMES:
+            fix = f"write {row.cells[1]} {row.cells[0]}"
+            source.complain(row.cells[0], row.text, "the value first, then the name", fix, row.line)
+        elif name in _FIELD:
+            _read(source, row, _FIELD[name], value, found, notes)
+        elif name in _UNUSED:
+            notes.append(note(NOT_NEEDED, row, *_UNUSED[name]))
+        elif name in _ELSEWHERE:
+            if number(value) != 0.0 and value:
+                notes.append(note(LEFT_OUT, row, *_ELSEWHERE[name]))
+        else:
+            why = f"no option of MoorDyn that is known here is called {row.cells[1]}"
+            notes.append(note(LEFT_OUT, row, why, nearest(name, _NAMES)))
+    _plausible(source, found)
+    return found
+
+
+def _read(source: Source, row: Row, field: str, value: str, found: Options, notes: list[Note]) -> None:
+    if field == "depth" and number(value) is None and any(c.isalpha() for c in value) and value.lower() != "nan":
+        why = "the depth is read from a file; the bed of a scene is a plane"
+        notes.append(note(LEFT_OUT, row, why, "give environment.seabed.z and .slope as they are where the line lies"))
+        return
+    if field in found.rows:
+        first = found.rows[field].line
+        notes.append(note(TAKEN, row, f"given in line {first} as well; the last one counts, as in MoorDyn"))
+    found.rows[field] = row
+    setattr(found, field, source.number(row, value, row.cells[1], least=0.0))
+
+
+def _plausible(source: Source, options: Options) -> None:
+    """Complain of values that only another unit explains."""
+    row = options.rows.get("density")
+    if row is not None and 0.9 <= options.density <= 1.1:  # between these neither water nor air has any kg/m^3
+        expected = "a density in kg/m^3: about 1025 for sea water, 1.2 for air"
+        source.complain("density", row.text, expected, "t/m^3? write 1025", row.line)
+    row = options.rows.get("gravity")
+    if row is not None and options.gravity > 100.0:  # ten times that of the earth
+        expected = "an acceleration in m/s^2, such as 9.81"
+        source.complain("gravity", row.text, expected, "cm/s^2? write 9.81", row.line)

@@ -1,0 +1,130 @@
+"""Line types of a deck: properties per length, in the columns of MoorDyn 2 or 1, and units that cannot be."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+
+from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
+from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, number, simple
+
+# Mass over volume of a line, kg/m^3, of anything from foam to a chain whose diameter is that of its bar: 100 to 30 000.
+# A diameter in mm or inches, or a mass in t/m or g/m, is out by 10^3 or more.
+DENSITIES = (20.0, 2.0e5)
+# Speed of waves of tension sqrt(EA/m), m/s, from rubber to aramid: 100 to 12 000.  EA in kN is out by 30.
+SPEEDS = (20.0, 3.0e4)
+
+_TYPE_V2 = (
+    ("TypeName", "name", "typename", "linetype", "type"), ("Diam", "diam", "diameter", "d"),
+    ("Mass/m", "massm", "massden", "massdeninair", "massdenair", "mass", "w"), ("EA", "ea"),
+    ("BA/-zeta", "bazeta", "ba", "zeta"), ("EI", "ei"), ("Cd", "cd", "cdn"), ("Ca", "ca", "can"),
+    ("CdAx", "cdax", "cdt"), ("CaAx", "caax", "cat"), ("Cl", "cl"), ("dF", "df"), ("cF", "cf"),
+)  # fmt: skip
+_TYPE_V1 = (*_TYPE_V2[:5], ("Can", "can", "ca"), ("Cat", "cat", "caax"), ("Cdn", "cdn", "cd"), ("Cdt", "cdt", "cdax"))
+
+
+@dataclass(frozen=True)
+class LineType:
+    """Properties per length of a line.  trouble: why no line of this type can be carried over, "" if it can."""
+
+    name: str
+    row: Row
+    diameter: float
+    mass: float
+    ea: float
+    ba: float
+    ei: float
+    drag: tuple[float, float]  # normal, tangential
+    added: tuple[float, float]
+    trouble: str = ""
+    instead: str = ""
+
+
+def _types_are_old(section: Section) -> bool:
+    """Whether a row of 9 columns is one of MoorDyn 1, or lacks one: the names decide."""
+    names = {simple(cell) for cell in section.names.cells} if section.names is not None else set()
+    return "ei" not in names and bool(names & {"ca", "can"})
+
+
+def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
+    old = len(row.cells) == len(_TYPE_V1) and _types_are_old(source.sections["line types"])
+    names = _TYPE_V1 if old else _TYPE_V2
+    if not (old or source.columns(row, 10, len(_TYPE_V2), names)):
+        return None
+    check_names(source, "line types", names, least=len(_TYPE_V1) if old else 10)
+    name = row.cells[0]
+    twin = next((r for r in source.rows("line types") if r.line < row.line and r.cells[0] == name), None)
+    if twin is not None:
+        fix = "give it another name"
+        source.complain("line type", name, f"a name of its own; line {twin.line} has it already", fix, row.line)
+    diameter = source.number(row, row.cells[1], "diameter (m)", above=0.0)
+    mass = source.number(row, row.cells[2], "mass per length (kg/m)", above=0.0)
+    ea, trouble, instead = _stiffness(source, row, row.cells[3], notes)
+    ba = _damping(source, row, row.cells[4], notes)
+    if old and ba > 0.0:
+        why = "BA is taken in N s, as MoorDyn 2 does, whatever the row of units says"
+        notes.append(note(TAKEN, row, why, "if it is in Pa s, multiply damping.stiffness by the area of the line"))
+    rest = row.cells[5:]
+    ei = 0.0
+    if not old:
+        if _is_word(rest[0]):
+            trouble, instead = f"EI is read from {rest[0]}", "write EI as a number, in N m^2, in a copy of the deck"
+        else:
+            ei = source.number(row, rest[0], "EI (N m^2)", least=0.0)
+        rest = rest[1:]
+    words = ("Can", "Cat", "Cdn", "Cdt") if old else ("Cd", "Ca", "CdAx", "CaAx")
+    c = [source.number(row, cell, word, least=0.0) for word, cell in zip(words, rest, strict=False)]
+    drag, added = ((c[2], c[3]), (c[0], c[1])) if old else ((c[0], c[2]), (c[1], c[3]))
+    if len(rest) > 4 and source.number(row, rest[4], "Cl", least=0.0) > 0.0:
+        why = "Cl makes lines vibrate in their own eddies; hybrid has no such force"
+        notes.append(note(LEFT_OUT, row, why, "raise drag.normal of the sections by what the vibration adds"))
+    _units(source, row, diameter, mass, ea)
+    return LineType(name, row, diameter, mass, ea, ba, ei, drag, added, trouble, instead)
+
+
+def _is_word(cell: str) -> bool:
+    """Whether a cell that may be a number names a file, or lists several numbers."""
+    return number(cell) is None and bool(re.search(r"[A-Za-z]{2}|\|", cell)) and cell.lower() not in ("nan", "inf")
+
+
+def _stiffness(source: Source, row: Row, cell: str, notes: list[Note]) -> tuple[float, str, str]:
+    """EA; NaN with the reason and what to do, if it is no number."""
+    if not _is_word(cell):
+        return source.number(row, cell, "EA (N)", above=0.0), "", ""
+    first, *rest = cell.split("|")
+    if rest and number(first):
+        instead = "set axial_stiffness to the dynamic one, for motion about a mean tension"
+        notes.append(note(TAKEN, row, f"of {cell} the first, static EA is taken: hybrid's EA is constant", instead))
+        return source.number(row, first, "EA (N)", above=0.0), "", ""
+    instead = "write EA as a number, in N, the slope at the tension you expect, in a copy of the deck"
+    return math.nan, f"EA is not one number but {cell}, tension over strain", instead
+
+
+def _damping(source: Source, row: Row, cell: str, notes: list[Note]) -> float:
+    if not _is_word(cell):
+        return source.number(row, cell, "BA/-zeta")
+    first, *rest = cell.split("|")
+    if rest and number(first) is not None:
+        notes.append(
+            note(TAKEN, row, f"of {cell} the first, static BA is taken", "set damping.stiffness (s) otherwise")
+        )
+        return source.number(row, first, "BA/-zeta")
+    notes.append(note(LEFT_OUT, row, f"BA is read from {cell}", "set damping.stiffness, BA/EA, in s"))
+    return 0.0
+
+
+def _units(source: Source, row: Row, diameter: float, mass: float, ea: float) -> None:
+    """Complain of values that only another unit explains."""
+    density = mass / (math.pi / 4 * diameter**2) if diameter > 0.0 else math.nan
+    if density < DENSITIES[0] or density > DENSITIES[1]:
+        expected = f"a line of {DENSITIES[0]:g} to {DENSITIES[1]:g} kg/m^3; this one has {density:.3g} kg/m^3"
+        fix = "diameter in m and mass in kg/m; " + ("mm?" if density < DENSITIES[0] else "g/m, or a radius?")
+        source.complain("diameter and mass", f"{diameter:g} {mass:g}", expected, fix, row.line)
+    speed = math.sqrt(ea / mass) if mass > 0.0 and ea > 0.0 else math.nan
+    if speed < SPEEDS[0] or speed > SPEEDS[1]:
+        expected = (
+            f"a line in which tension travels at {SPEEDS[0]:g} to {SPEEDS[1]:g} m/s, sqrt(EA/m); here {speed:.3g}"
+        )
+        fix = "EA in N: " + ("kN or MN?" if speed < SPEEDS[0] else "or the modulus E, in Pa?")
+        source.complain("EA and mass", f"{ea:g} {mass:g}", expected, fix, row.line)

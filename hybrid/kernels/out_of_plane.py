@@ -1,0 +1,263 @@
+"""What a small push out of the plane would do to a cable that is computed in it.
+
+Across the plane a small displacement w of the nodes, and a spin psi of the cells of rods, obey linear equations of
+their own, whose coefficients come from the motion in the plane.  They are stepped along with it by the same
+generalized-alpha, from a small push, so that whatever makes the plane unstable shows as growth: buckling and lifting
+of compressed or twisted rods, whirling and parametric resonance of taut lines.  docs/theory.md, 5.
+
+    symbol   meaning                                                     shape  unit
+    w        displacement of a node along the normal n of the plane      -      m
+    zeta     tilt of a chord out of the plane, (w_{c+1} - w_c)/l         -      rad
+    psi      spin of a cell about its chord                              -      rad
+    C        dM = C (dth_b - dth_a) - M J dth_a, J = n x                 4      N m, plane
+    was, now w, its rate, algorithmic and true acceleration              N+1, 4 m, s
+
+What only damps or turns sections (stiffness-proportional damping, rotary inertia) is left out, which lets a push
+grow rather than fade; so is what a chord's tilt does to its contact with the bed, which lies in the plane.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.assembly_plane import end_chord
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.generalized_alpha import weights
+from hybrid.kernels.loads import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, part2
+from hybrid.kernels.rotations import jacobian_functions
+from hybrid.kernels.water import current_at
+
+REACH = 4  # an equation of node i reaches to node i + 2, two unknowns a node
+BAND = 2 * REACH + 2  # numbers of an equation: its band and its right-hand side
+
+
+@inner
+def answer(kappa, M, out, torsion, d):
+    """C (in the plane) and C + M J of an element with bend kappa, moment M, stiffness out of the plane and in torsion.
+
+    d: the chord before it.  P = c I - kappa/2 J, c = kappa/2 cot(kappa/2); C = (D + P^T K) P, D = M (g kappa - J/2).
+    """
+    g, _ = jacobian_functions(kappa * kappa)
+    c, half = 1.0 - g * kappa * kappa, 0.5 * kappa
+    # in the axes (m, d) of the cell before
+    s0, s1 = M * g * kappa + c * out, -0.5 * M + half * torsion
+    s2, s3 = 0.5 * M - half * out, M * g * kappa + c * torsion
+    a, b = s0 * c + s1 * half, -s0 * half + s1 * c
+    e, f = s2 * c + s3 * half, -s2 * half + s3 * c
+    # in those of the plane: m = (-d1, d0)
+    x, y = d[0], d[1]
+    C = (
+        a * y * y - (b + e) * x * y + f * x * x, -a * x * y - b * y * y + e * x * x + f * x * y,
+        -a * x * y + b * x * x - e * y * y + f * x * y, a * x * x + (b + e) * x * y + f * y * y,
+    )  # fmt: skip
+    return C, (C[0], C[1] - M, C[2] + M, C[3])
+
+
+@inner
+def times2(A, x):
+    return (A[0] * x[0] + A[1] * x[1], A[2] * x[0] + A[3] * x[1])
+
+
+@inner
+def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
+    """Loads on node i across the plane: factors of w, its rate, its acceleration, and of the tilt before and after."""
+    bits, plane = line.bits, line.plane
+    stiff, rate, inert = 0.0, 0.0, line.mass[i]
+    before = after = 0.0
+    if bits & MASS_DAMPING:
+        rate += line.damp[i]
+    if bits & (DRAG | ADDED_MASS | BODIES):
+        u, b = part2(plane, v, i), part2(plane, vd, i)
+        z, eta = r[i, 2], sea.surface
+        if bits & FLOW:
+            U, _ = current_at(sea.z, sea.current, sea.now[1], z)
+            u = (
+                u[0] - plane[0, 0] * U[0] - plane[0, 1] * U[1] - plane[0, 2] * U[2],
+                u[1] - plane[1, 0] * U[0] - plane[1, 1] * U[1] - plane[1, 2] * U[2],
+            )
+        if bits & WAVES:
+            U, A = part2(plane, sea.flow, i), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
+            u = (u[0] - U[0], u[1] - U[1])
+            b = (
+                b[0] - plane[0, 0] * A[0] - plane[0, 1] * A[1] - plane[0, 2] * A[2],
+                b[1] - plane[1, 0] * A[0] - plane[1, 1] * A[1] - plane[1, 2] * A[2],
+            )
+            eta += sea.flow[i, 6]
+        if not (bits & SURFACE and z > eta):
+            for side in range(2):
+                c = i - 1 + side
+                if c < 0 or c >= e.shape[0]:
+                    continue
+                d, _, _ = chord2(part2(plane, e, c))
+                m = (-d[1], d[0])
+                tilt = 0.0
+                if bits & DRAG:
+                    ut, un = dot2(u, d), abs(dot2(u, m))
+                    rate += line.drag_n[c] * un
+                    tilt += (line.drag_n[c] * un - line.drag_t[c] * abs(ut)) * ut
+                if bits & ADDED_MASS:
+                    inert += line.added_n[c]
+                    tilt += (line.added_n[c] - line.added_t[c]) * dot2(b, d)
+                if side == 0:
+                    before = tilt
+                else:
+                    after = tilt
+            if bits & BODIES:
+                rate += line.point_drag[i] * math.sqrt(dot2(u, u))
+                inert += line.point_added[i]
+    if bits & SEABED and bits & FRICTION:  # a small push does not slide
+        f = part2(plane, sea.bed, i)
+        n = (
+            plane[0, 0] * sea.normal[0] + plane[0, 1] * sea.normal[1] + plane[0, 2] * sea.normal[2],
+            plane[1, 0] * sea.normal[0] + plane[1, 1] * sea.normal[1] + plane[1, 2] * sea.normal[2],
+        )
+        stiff += sea.friction[1] * max(dot2(f, n), 0.0) / sea.slip_length
+    return stiff, rate, inert, before, after
+
+
+@kernel
+def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, before, rho, was, now, A):
+    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, to (r, e, v, vd, T, a1).
+
+    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
+    of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the
+    step can follow.
+    """
+    am, af, ga, be, _ = weights(rho, before / dt)
+    cv = ga / (be * dt)
+    ca = (1.0 - am) / ((1.0 - af) * be * dt * dt)
+    n = e.shape[0]
+    plane = line.plane
+    for j in range((2 * (n + 1) + REACH) * BAND):  # with room for the rows that the last ones reach to
+        A[j] = 0.0
+
+    # shear S_c = T zeta_c + m_c.(dM_{c+1} - dM_c)/l_c, spin row d_c.(dM_{c+1} - dM_c) + Q_c zeta_c, cell by cell
+    d, _, il = chord2(part2(plane, e, 0))
+    soft = 0.0
+    M = -across2(plane, ends.moment, 0)
+    # dM of the element before cell c by the tilt and spin of cells c-1 and c
+    z0, p0, z1, p1 = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
+    il0 = 0.0
+    if line.element[0]:
+        k, k0 = about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
+        ghost = end_chord(plane, ends.frame, 0)
+        kappa = angle_between(ghost, d)
+        M = k * (kappa - k0)
+        C, _ = answer(kappa, M, line.kb[0, 0] + line.kb[0, 1] - k, line.kb[0, 2], ghost)
+        z1, p1 = times2(C, (d[1], -d[0])), times2(C, d)
+        soft = line.kb[0, 2]
+    for c in range(n):
+        dn, iln = (0.0, 0.0), 0.0
+        if c + 1 < n:
+            dn, _, iln = chord2(part2(plane, e, c + 1))
+        Mn, softn = 0.0, 0.0
+        # dM of the element after cell c by the tilt and spin of cells c and c+1
+        zc, pc, zn, pn = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
+        if line.element[c + 1]:
+            k, k0 = about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
+            kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
+            Mn = k * (kappa - k0)
+            C, Ca = answer(kappa, Mn, line.kb[c + 1, 0] + line.kb[c + 1, 1] - k, line.kb[c + 1, 2], d)
+            zc, pc = times2(Ca, (-d[1], d[0])), times2(Ca, (-d[0], -d[1]))
+            if c + 1 < n:
+                zn, pn = times2(C, (dn[1], -dn[0])), times2(C, dn)
+            softn = line.kb[c + 1, 2]
+        elif c + 1 == n:
+            Mn = across2(plane, ends.moment, 1)
+        m = (-d[1], d[0])
+        # S_c by zeta and psi of cells c-1, c, c+1
+        sz0, sp0 = -il * dot2(m, z0), -il * dot2(m, p0)
+        sz1, sp1 = T[c] + il * (dot2(m, zc) - dot2(m, z1)), il * (dot2(m, pc) - dot2(m, p1))
+        sz2, sp2 = il * dot2(m, zn), il * dot2(m, pn)
+        a, b, g = sz0 * il0, sz1 * il, sz2 * iln  # by w_{c-1} .. w_{c+2}: -a, a - b, b - g, g
+        for side in range(2):  # + on node c, - on node c+1
+            sign = 1.0 - 2.0 * side
+            o = 2 * (c + side) * BAND + REACH - 2 * side
+            if c > 0:
+                A[o - 2] -= sign * a
+                A[o - 1] += sign * sp0
+            A[o] += sign * (a - b)
+            A[o + 1] += sign * sp1
+            A[o + 2] += sign * (b - g)
+            if c + 1 < n:
+                A[o + 3] += sign * sp2
+                A[o + 4] += sign * g
+        o = (2 * c + 1) * BAND + REACH
+        if line.spin[c]:
+            rz0, rp0 = -dot2(d, z0) * il0, -dot2(d, p0)
+            rz1, rp1 = (dot2(d, zc) - dot2(d, z1) + Mn - M) * il, dot2(d, pc) - dot2(d, p1)
+            rz2, rp2 = dot2(d, zn) * iln, dot2(d, pn)
+            if c > 0:
+                A[o - 3], A[o - 2] = -rz0, rp0
+            A[o - 1], A[o], A[o + 1] = rz0 - rz1, rp1 - 1e-9 * (soft + softn), rz1 - rz2
+            if c + 1 < n:
+                A[o + 2], A[o + 3] = rp2, rz2
+        else:
+            A[o] = -1.0
+        z0, p0, z1, p1 = zc, pc, zn, pn
+        il0 = il
+        d, il, M, soft = dn, iln, Mn, softn
+    A[(2 * n + 1) * BAND + REACH] = -1.0
+
+    for i in range(n + 1):
+        o = 2 * i * BAND + REACH
+        ai = was[i, 2]
+        wp = was[i, 0] + dt * was[i, 1] + 0.5 * dt * dt * ai
+        vp = was[i, 1] + dt * ai
+        vdp = (am * ai - af * was[i, 3]) / (1.0 - af) + ca * be * dt * dt * ai
+        now[i, 0], now[i, 1], now[i, 3] = wp, vp, vdp
+        if (i == 0 and ends.held[0]) or (i == n and ends.held[1]):
+            for j in range(-REACH, REACH + 1):
+                A[o + j] = 0.0
+            A[o] = -1.0
+            continue
+        stiff, rate, inert, before, after = loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca)
+        A[o] -= stiff + cv * rate + ca * inert
+        if before != 0.0:
+            _, _, x = chord2(part2(plane, e, i - 1))
+            A[o] += before * x
+            A[o - 2] -= before * x
+        if after != 0.0:
+            _, _, x = chord2(part2(plane, e, i))
+            A[o] -= after * x
+            A[o + 2] += after * x
+        A[o + REACH + 1] = rate * (vp - cv * wp) + inert * (vdp - ca * wp)
+
+    wrong = 0
+    rows = 2 * (n + 1)
+    for i in range(rows):
+        o = i * BAND + REACH
+        if not A[o] < 0.0:
+            wrong += 1
+        inverse = 1.0 / A[o]
+        A[o] = inverse
+        b1, b2, b3, b4, b = A[o + 1], A[o + 2], A[o + 3], A[o + 4], A[o + 5]
+        for j in range(1, REACH + 1):
+            p = o + j * BAND
+            f = A[p - j]
+            if f != 0.0:  # a catenary has no equations of spin, and reaches half as far
+                f *= inverse
+                p -= j
+                A[p + 1] -= f * b1
+                A[p + 2] -= f * b2
+                A[p + 3] -= f * b3
+                A[p + 4] -= f * b4
+                A[p + j + REACH + 1] -= f * b
+    energy = 0.0
+    x1 = x2 = x3 = x4 = 0.0
+    for i in range(rows - 1, -1, -1):
+        o = i * BAND + REACH
+        x = (A[o + 5] - A[o + 1] * x1 - A[o + 2] * x2 - A[o + 3] * x3 - A[o + 4] * x4) * A[o]
+        x1, x2, x3, x4 = x, x1, x2, x3
+        if i % 2 == 0:
+            k = i // 2
+            more = x - now[k, 0]
+            if (k == 0 and ends.held[0]) or (k == n and ends.held[1]):
+                more = -now[k, 0]
+            now[k, 0] += more
+            now[k, 1] += cv * more
+            now[k, 2] = was[k, 2] + more / (be * dt * dt)
+            now[k, 3] += ca * more
+            energy += 0.5 * line.mass[k] * now[k, 1] * now[k, 1]
+    return energy, wrong

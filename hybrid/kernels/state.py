@@ -1,0 +1,131 @@
+"""The arrays a solver works on: the line (what does not move), its ends, the sea around it, and its state.
+
+All four are NamedTuples of contiguous arrays with fixed types, so that one compiled
+signature serves every scene.  N cells, N+1 nodes; SI units; inertial frame unless said.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+Floats = NDArray[np.float64]
+NO_PLANE: Floats = np.full((3, 3), np.nan)  # of a line in space
+NO_PLANE.flags.writeable = False
+
+
+class Line(NamedTuple):
+    """What the plan says: mesh, stiffness, mass and load parameters.
+
+    A parameter of a force that is off (see `bits`) is NaN: used by mistake, it shows at once.
+    """
+
+    s: Floats  # (N+1,) m, unstretched arc length of the nodes
+    h: Floats  # (N,) m, unstretched cell length
+    ck: Floats  # (N,) 1/N, axial compliance; 0 when inextensible
+    mass: Floats  # (N+1,) kg, of the half cells that meet at the node
+    force: Floats  # (N+1, 3) N, weight and buoyancy
+    element: NDArray[np.int8]  # (N+1,) 1 where a rod element sits
+    spin: NDArray[np.int8]  # (N,) 1 where the cell has a frame and a spin
+    kb: Floats  # (N+1, 3) N m, stiffness of the element (two bending, torsion)
+    k0: Floats  # (N+1, 3) rad, its strain without stress
+    hn: Floats  # (N+1,) m, length an element stands for
+    rotary: Floats  # (N,) kg m2, transverse rotary inertia of the cell
+    polar: Floats  # (N,) kg m2, polar inertia of the cell
+    drag_n: Floats  # (N,) kg/m, of half the cell
+    drag_t: Floats  # (N,) kg/m
+    added_n: Floats  # (N,) kg, of half the cell
+    added_t: Floats  # (N,) kg
+    damp: Floats  # (N+1,) kg/s, mass-proportional damping of the node
+    tau: Floats  # (N,) s, stiffness-proportional damping time
+    buoy: Floats  # (N,) N, buoyancy of half the cell where it depends on the surface (else part of `force`)
+    displaced: Floats  # (N,) kg, water displaced by half the cell, on which the pressure of waves acts
+    diameter: Floats  # (N,) m, over which a cell passes through the surface
+    point_mass: Floats  # (N+1,) kg, of a body at the node (part of `mass`)
+    point_drag: Floats  # (N+1,) kg/m, rho CdA/2 of a body at the node
+    point_added: Floats  # (N+1,) kg, added mass of a body at the node
+    point_buoy: Floats  # (N+1,) N, buoyancy of a body at the node where it depends on the surface (else in `force`)
+    point_displaced: Floats  # (N+1,) kg, water displaced by a body at the node
+    point_height: Floats  # (N+1,) m, over which a body passes through the surface
+    point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
+    footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
+    bits: int  # which optional forces are on (kernels.loads)
+    plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
+
+
+class Ends(NamedTuple):
+    """What the two ends impose at one moment; row 0 the start, row 1 the end."""
+
+    held: NDArray[np.int8]  # (2,) 1 where the position is given
+    position: Floats  # (2, 3) m
+    frame: Floats  # (2, 9) columns (a1, a2, tangent), row order; read only where an element sits at the end
+    spin: Floats  # (2, 3) 1/s, angular velocity of that frame
+    force: Floats  # (2, 3) N, applied to the cable
+    moment: Floats  # (2, 3) N m, applied to the cable; read where a rod ends without an element
+
+
+class Sea(NamedTuple):
+    """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
+
+    The last five are work arrays: `flow` is filled by `kernels.water.stir`, `axis` and `slip` at the start of a
+    step, `slid` and `bed` by the march.
+    """
+
+    z: Floats  # (K,) m, increasing: heights of the current profile
+    current: Floats  # (K, 3) m/s, at these heights; linear between, constant beyond
+    waves: Floats  # (W, 6) m, 1/s, 1/m, 1/m, rad, 1/m: amplitude, frequency, kx, ky, phase, k
+    depth: float  # m, for waves; infinite in deep water
+    surface: float  # m, z of still water
+    now: Floats  # (4,) time, s; grown part of the current; of the waves, and its rate, 1/s
+    normal: Floats  # (3,) unit normal of the seabed, upwards
+    offset: float  # m, normal . x on the seabed
+    stiffness: float  # N/m per m
+    damping: float  # N s/m per m
+    onset: float  # m, penetration over which contact sets in
+    friction: Floats  # (2,) axial and lateral coefficient
+    slip_length: float  # m, elastic travel before a touching cable slides
+    flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
+    axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
+    slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
+    slid: Floats  # (N+1, 3) m, at its end
+    bed: Floats  # (N+1, 3) N, force of the seabed on the nodes
+
+
+class State(NamedTuple):
+    """Where the cable is.  The only history is kinematic; tension and moment carry none."""
+
+    r: Floats  # (N+1, 3) m
+    v: Floats  # (N+1, 3) m/s
+    a: Floats  # (N+1, 3) m/s2, algorithmic acceleration of generalized-alpha
+    vd: Floats  # (N+1, 3) m/s2, true acceleration
+    e: Floats  # (N, 3) m, chords, accumulated from increments
+    T: Floats  # (N,) N
+    a1: Floats  # (N, 3) first director of the cell's frame; unit, normal to the chord where spin = 1
+    w: Floats  # (N,) 1/s, spin rate about the chord
+    wa: Floats  # (N,) 1/s2, algorithmic spin acceleration
+    wd: Floats  # (N,) 1/s2, true spin acceleration
+    slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
+    bed: Floats  # (N+1, 3) N, force of the seabed
+
+    def copy(self) -> State:
+        return State(*(x.copy() for x in self))
+
+
+def blank_state(n_cells: int) -> State:
+    """A state of zeros with room for `n_cells` cells."""
+    node, cell = (n_cells + 1, 3), (n_cells, 3)
+    z = np.zeros
+    w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
+    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node))
+
+
+def no_sea(n_cells: int) -> Sea:
+    """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
+    node, nan = (n_cells + 1, 3), float("nan")
+    return Sea(
+        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]),
+        np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
+        np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+    )  # fmt: skip

@@ -1,0 +1,184 @@
+"""When a stretch must be a rod: the kernel that weighs every criterion of the table at every step.
+
+Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
+rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
+bending out would make are lengths, and count against the tolerance (m) of the scene (docs/theory.md, 13).
+
+    symbol   meaning                                          shape  unit
+    EI       bending stiffness at a node                      -      N m2
+    lam      sqrt(EI/T), over which bending fades             -      m
+    kappa    curvature at a node                              -      1/m
+    T, ahead tension now, and as it will be                   -      N
+    turn     |d_b - d_a| of the chords at a node              -      rad
+    Mt       torque                                           -      N m
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
+from hybrid.kernels.element import relative_rotation
+from hybrid.kernels.loads import SEABED
+from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
+
+# What a ratio is where there is no tension, or no number: large, and finite.
+MOST = 1e6
+# Torque^2/(4 EI T) from which a straight cable is near to a loop: the Maxwell torque is 0.4 of the buckling one.
+TWISTED = 0.5
+# The most that a tension counts for that is only foreseen.
+FORESEEN = 2.0
+# What may sit at a node: nothing, a jump of bending stiffness, a point load.
+SMOOTH, STEP, LOAD = 0, 1, 2
+
+
+@inner
+def get3(A, i):
+    return (A[i, 0], A[i, 1], A[i, 2])
+
+
+@inner
+def put(ratios, c, ja, jb, x):
+    """Raise a ratio of the base cells on both sides of a node; what is not a number is large."""
+    if not x < MOST:
+        x = MOST
+    if x > ratios[c, ja]:
+        ratios[c, ja] = x
+    if x > ratios[c, jb]:
+        ratios[c, jb] = x
+
+
+@inner
+def get9(A, i):
+    return (A[i, 0], A[i, 1], A[i, 2], A[i, 3], A[i, 4], A[i, 5], A[i, 6], A[i, 7], A[i, 8])
+
+
+@inner
+def depth(sea, r, i):
+    return sea.offset + 0.5 * sea.onset - dot(sea.normal, get3(r, i))
+
+
+@kernel
+def weigh(
+    line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
+    turn, twisting, ratios
+):  # fmt: skip
+    """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
+
+    Returns the largest ratio among base cells that are catenary and free to change.
+
+    tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
+    change since then goes on; EI, w, bent, node, floor: (N+1,) bending stiffness, weight per length, curvature without
+    stress, what sits there, tension floor; torque: of the whole line as far as its rods do not know it, N m;
+    free: (n,) of base cells; turn, twisting: (N+1,) turns, and torques, N m, of nodes (written).
+    """
+    n = e.shape[0]
+    turn[0], turn[n] = 0.0, 0.0
+    d0 = get3(tangents, 0)
+    d1, _, _ = chord(get3(e, 0))
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[0] = math.sqrt(dot(x, x))
+    for i in range(1, n):
+        d0 = d1
+        d1, _, _ = chord(get3(e, i))
+        x = sub(d1, d0)
+        turn[i] = math.sqrt(dot(x, x))
+        twisting[i] = torque
+        if line.element[i]:
+            b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
+            angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
+            twisting[i] = line.kb[i, 2] * (angle - line.k0[i, 2])
+    d0 = get3(tangents, 1)
+    if dot(d0, d0) > 0.0:
+        x = sub(d1, d0)
+        turn[n] = math.sqrt(dot(x, x))
+    whole = 0.0
+    for i in range(n + 1):
+        whole += turn[i]
+    for i in range(n + 1):
+        ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
+        jb = base_of_cell[i] if i < n else base_of_cell[n - 1]
+        c = min(i, n - 1)
+        now, ahead = T[c], T[c] + a * (T[c] - past[c])
+        if 0 < i < n:
+            before = T[i - 1] + a * (T[i - 1] - past[i - 1])
+            ahead = before if not ahead < before else ahead
+            now = T[i - 1] if not now < T[i - 1] else now
+            if not T[i] + before < math.inf:  # a NaN must not hide behind a number
+                now = -1.0
+        ahead = min(now, ahead)
+        slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
+        if not floor[i] <= slack * now:
+            slack = floor[i] / now if now > 0.0 else MOST
+        put(ratios, SLACK, ja, jb, slack)
+        T1 = max(floor[i], 1e-300)
+        T1 = now if now > T1 else T1
+        if i == 0 or i == n:
+            put(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
+        else:
+            bend = EI[i] * (turn[i] / line.hn[i] + bent[i]) / (T1 * tolerance)
+            Mt = twisting[i]
+            put(
+                ratios,
+                TORSION,
+                ja,
+                jb,
+                max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance) / (2.0 * T1),
+            )
+            if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+                smooth = 0.0  # what is left of the turn without what the curvature on both sides makes of it
+                if i > 1:
+                    smooth = turn[i - 1] / line.hn[i - 1]
+                if i < n - 1:
+                    smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if i > 1 else turn[i + 1] / line.hn[i + 1]
+                kink = max(turn[i] - smooth * line.hn[i], 0.0)
+                put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink / tolerance)
+            else:
+                put(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
+            if line.bits & SEABED:
+                p = depth(sea, r, i) > 0.0
+                if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
+                    put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+    loudest = 0.0
+    for i in range(n):
+        j = base_of_cell[i]
+        if not line.spin[i] and free[j]:
+            for c in range(ratios.shape[0]):
+                loudest = max(loudest, ratios[c, j])
+    return loudest
+
+
+@kernel
+def end_turn(e, frames):
+    """Angle, rad, from the first end's director, carried along all chords without twist, to the second's.
+
+    frames: (2, 9) of the ends.
+    """
+    Ra, Rb = get9(frames, 0), get9(frames, 1)
+    a, d = (Ra[0], Ra[3], Ra[6]), (Ra[2], Ra[5], Ra[8])
+    b, db = (Rb[0], Rb[3], Rb[6]), (Rb[2], Rb[5], Rb[8])
+    for i in range(e.shape[0]):
+        d1, _, _ = chord(get3(e, i))
+        a = transport(a, d, d1)
+        d = d1
+    a = transport(a, d, db)
+    return math.atan2(dot(cross(a, b), db), dot(a, b))
+
+
+@kernel
+def twist_of_rods(line, frames, e, a1):
+    """Twist of all elements, rad; frames: (2, 9) of the ends."""
+    n = e.shape[0]
+    twist = 0.0
+    for i in range(n + 1):
+        if line.element[i]:
+            Ra, Rb = get9(frames, 0), get9(frames, 1)
+            if i > 0:
+                Ra = frame(get3(a1, i - 1), chord(get3(e, i - 1))[0])
+            if i < n:
+                Rb = frame(get3(a1, i), chord(get3(e, i))[0])
+            twist += log_rotation(relative_rotation(Ra, Rb))[2]
+    return twist

@@ -1,0 +1,159 @@
+"""The first shape of a search for equilibrium: an elastic catenary under any dead loads, as a convex problem.
+
+Without bending, the force in a cell follows from the force F at the start of the line and the loads f_i in
+between, t_c = F - f_1 - ... - f_c, and the span from all t_c.  The F that gives the right span minimises
+
+    sum of h_c (|t_c| + ck |t_c|^2 / 2)  -  F . span,
+
+the complementary energy, which is convex: Newton's method with a line search finds it from anywhere.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+
+# |t| is rounded off at this part of the largest load, so that a folded or slack line has a minimum too.
+ROUNDED = 1e-4
+# An inextensible cell is lent this strain at the largest load.
+LENT = 1e-4
+MOST_ITERATIONS = 100
+# Chords shorter than this part of their cells: the loads do not tauten the line, and the shape means nothing.
+SLACK = 0.5
+# Rounds of finding out how much of a line lies on the seabed: each changes it by a cell or none, but the first.
+LAYING = 20
+# A slight pull along x where nothing pulls level, as a part of all loads.
+SLIGHT = 1e-3
+# Bisections of the lift of a floating body: to 1e-9 of it.
+FLOATING = 30
+
+
+class Hanging(NamedTuple):
+    """Nodes (N+1, 3) m, tensions (N,) N."""
+
+    r: Floats
+    T: Floats
+
+
+def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> Hanging | None:
+    """The shape of a line from `start` over `span` (3,) m under loads (N+1, 3) N; None when it stays slack."""
+    scale = float(np.abs(loads[1:-1].sum(axis=0)).max() + np.linalg.norm(loads[1:-1], axis=1).sum())
+    if not scale > 0.0:
+        return None
+    eps, soft = ROUNDED * scale, np.maximum(ck, LENT / scale)
+    below = np.concatenate([np.zeros((1, 3)), np.cumsum(loads[1:-1], axis=0)])
+
+    def state(F: Floats) -> tuple[Floats, Floats, float]:
+        t = F - below
+        size = np.sqrt(np.einsum("ij,ij->i", t, t) + eps**2)
+        return t, size, float(h @ (size + 0.5 * soft * size**2) - F @ span)
+
+    F = 0.5 * below[-1] + 0.1 * scale * span / max(float(np.linalg.norm(span)), 1e-12)
+    t, size, energy = state(F)
+    for _ in range(MOST_ITERATIONS):
+        e = (h * (1.0 / size + soft))[:, None] * t
+        gradient = e.sum(axis=0) - span
+        if np.abs(gradient).max() < 1e-9 * h.sum():
+            break
+        d = t / size[:, None]
+        hessian = np.eye(3) * float(h @ (1.0 / size + soft)) - np.einsum("i,ij,ik->jk", h / size, d, d)
+        step, part = -np.linalg.solve(hessian, gradient), 1.0
+        slope = float(gradient @ step)
+        while part > 1e-9:
+            t_new, size_new, energy_new = state(F + part * step)
+            if energy_new <= energy + 1e-4 * part * slope + 1e-15 * abs(energy):
+                break
+            part *= 0.5
+        F, t, size, energy = F + part * step, t_new, size_new, energy_new
+    e = (h * (1.0 / size + soft))[:, None] * t
+    if float((np.linalg.norm(e, axis=1) / h).min()) < SLACK:
+        return None
+    r = start + np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
+    r[-1] = start + span
+    return Hanging(r, np.linalg.norm(t, axis=1))
+
+
+def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool = False) -> Hanging | None:
+    """The shape of a line held at one end (0 or 1) at `place` (3,) and free at the other; None when it is slack.
+
+    on_bed: the held end lies on a level seabed, which carries the line as far as nothing lifts it.
+    """
+    # what hangs beyond a cell pulls it
+    t = np.cumsum(loads[::-1], axis=0)[::-1][1:] if held == 0 else -np.cumsum(loads, axis=0)[:-1]
+    if on_bed:
+        away = 1.0 if held == 0 else -1.0
+        t[:, 2] = away * np.maximum(away * t[:, 2], 0.0)
+    size = np.linalg.norm(t, axis=1)
+    if not size.max() > 0.0 or size.min() < 1e-9 * size.max():
+        return None
+    e = (h * (1.0 / size + ck))[:, None] * t
+    r = np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
+    return Hanging(r + place - r[0 if held == 0 else -1], size)
+
+
+def laid(
+    loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, bed: Callable[[float, float], float]
+) -> Hanging | None:
+    """As `trail` for a line that is held above the seabed and long enough to lie on it with its free end.
+
+    bed: height (m) of the seabed at x, y.  What lies on the bed goes on the way the line came down, without tension.
+    """
+    away = range(1, h.size + 1) if held == 0 else range(h.size - 1, -1, -1)
+    lying = np.zeros(h.size + 1, bool)
+    shape = None
+    for _ in range(LAYING):
+        found = trail(np.where(lying[:, None], 0.0, loads), h, ck, held, place) if not lying.all() else None
+        if found is None:
+            if shape is None:
+                return None
+            found = shape
+        r, T = found.r.copy(), found.T.copy()
+        now = np.zeros_like(lying)
+        heading = np.array([1.0, 0.0, 0.0])
+        for i in away:
+            before, cell = (i - 1, i - 1) if held == 0 else (i + 1, i)
+            if not now[before]:
+                step = found.r[i] - found.r[before]
+                level = np.hypot(step[0], step[1])
+                if level > 1e-6 * h[cell]:
+                    heading = np.array([step[0] / level, step[1] / level, 0.0])
+                r[i] = r[before] + step
+                now[i] = r[i, 2] <= bed(r[i, 0], r[i, 1])
+            else:
+                r[i], now[i], T[cell] = r[before] + h[cell] * heading, True, 0.0
+            if now[i]:
+                r[i, 2] = bed(r[i, 0], r[i, 1])
+        shape = Hanging(r, T)
+        if (now == lying).all():
+            break
+        lying = now
+    return shape
+
+
+def moored(
+    loads: Floats, lift: float, surface: float, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool
+) -> Hanging | None:
+    """As `trail`, with a body at the free end that floats at `surface` (m) on as much of its `lift` (N) as it needs."""
+    free = -1 if held == 0 else 0
+    low, high, best = 0.0, 1.0, None
+    if not np.abs(loads[:, :2]).max() > 0.0:  # still water: any heading will do, so that what lies on the bed has one
+        loads = loads + (SLIGHT * float(np.abs(loads).sum()) / loads.shape[0]) * np.array([1.0, 0.0, 0.0])
+    for _ in range(FLOATING):
+        part = 1.0 if best is None else 0.5 * (low + high)
+        lifted = loads.copy()
+        lifted[free, 2] += part * lift
+        shape = trail(lifted, h, ck, held, place, on_bed)
+        if shape is None:
+            return best
+        best = shape
+        if shape.r[free, 2] <= surface:
+            if part == 1.0:
+                break  # it sinks, or hangs too low to reach the surface
+            low = part
+        else:
+            high = part
+    return best

@@ -1,0 +1,90 @@
+"""The same line on fewer nodes, and back: an equilibrium on a coarse mesh is a start for a fine one."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+
+from hybrid.kernels.loads import FRICTION, PLANAR, ROTARY, SEABED
+from hybrid.kernels.state import Floats, Line, State, blank_state
+from hybrid.model.build import Model
+from hybrid.model.ends import first_director
+from hybrid.model.line import line_on
+from hybrid.model.plane import planar
+
+FEWER = 4  # cells that become one
+FEWEST = 80  # cells below which a line is coarse enough
+
+
+def coarser(model: Model) -> Model | None:
+    """The model with a quarter of its cells and with its own start; None: it has few already, or folds in that start.
+
+    Zones, sections and point loads keep their nodes.
+    """
+    line, cable = model.line, model.cable
+    if model.cells <= FEWEST:
+        return None
+    kept = np.zeros(line.s.size, bool)
+    kinds = np.flatnonzero(line.spin[1:] != line.spin[:-1]) + 1
+    places = np.searchsorted(line.s, np.concatenate([cable.bounds, cable.at]) - 1e-9 * line.s[-1])
+    fixed = np.unique(np.concatenate([[0], kinds, places, [line.s.size - 1]]))
+    for a, b in pairwise(fixed):
+        kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
+    at = np.flatnonzero(kept)
+    rod = line.spin[at[:-1]] == 1
+    new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
+    if line.bits & PLANAR:
+        new = planar(new, line.plane)
+    start = picked(model.start, at)
+    if start is None:
+        return None
+    others = tuple((name, x) for name, state in model.other_starts if (x := picked(state, at)) is not None)
+    return replace(model, line=new, sea=model.sea.on(rod.size), start=start, other_starts=others, layout=None)
+
+
+def refined(state: State, coarse: Line, line: Line) -> State:
+    """A state of a coarse line on a finer one: its nodes on parabolas, joined, so that a rod begins without kinks."""
+    out = blank_state(line.h.size)
+    out.r[:] = _smooth(state.r, coarse.s, line.s)
+    out.e[:] = np.diff(out.r, axis=0)
+    middle = 0.5 * (line.s[:-1] + line.s[1:])
+    out.T[:] = np.interp(middle, 0.5 * (coarse.s[:-1] + coarse.s[1:]), state.T)
+    of = np.clip(np.searchsorted(coarse.s, middle) - 1, 0, coarse.h.size - 1)
+    _directors(out, state.a1[of])
+    return out
+
+
+def picked(state: State, at: np.ndarray) -> State | None:
+    """The state at some of its nodes; None: two of them lie at the same place."""
+    out = blank_state(at.size - 1)
+    out.r[:], out.v[:] = state.r[at], state.v[at]
+    out.e[:] = np.add.reduceat(state.e, at[:-1], axis=0)
+    if not out.e.any(axis=1).all():
+        return None
+    out.T[:] = np.add.reduceat(state.T, at[:-1]) / np.diff(at)
+    _directors(out, state.a1[at[:-1]])
+    return out
+
+
+def _directors(state: State, a: Floats) -> None:
+    """First directors: these, made normal to the chords."""
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    a = a - np.einsum("ij,ij->i", a, d)[:, None] * d
+    for i in np.flatnonzero(np.linalg.norm(a, axis=1) < 1e-3):  # along the chord: any will do
+        a[i] = first_director(d[i])
+    state.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
+
+
+def _smooth(r: Floats, s: Floats, at: Floats) -> Floats:
+    """Cubics through the nodes with the slopes of parabolas."""
+    h, d = np.diff(s), np.diff(r, axis=0) / np.diff(s)[:, None]
+    slope = np.empty_like(r)
+    slope[1:-1] = (h[1:, None] * d[:-1] + h[:-1, None] * d[1:]) / (h[:-1] + h[1:])[:, None]
+    slope[0], slope[-1] = 2.0 * d[0] - slope[1], 2.0 * d[-1] - slope[-2]
+    j = np.clip(np.searchsorted(s, at, side="right") - 1, 0, h.size - 1)
+    x, H = ((at - s[j]) / h[j])[:, None], h[j][:, None]
+    a, b = r[j], r[j + 1]
+    out = (1 + 2 * x) * (1 - x) ** 2 * a + x * (1 - x) ** 2 * H * slope[j]
+    return np.asarray(out + x * x * (3 - 2 * x) * b + x * x * (x - 1) * H * slope[j + 1])

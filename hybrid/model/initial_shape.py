@@ -1,0 +1,281 @@
+"""Where a cable starts: first positions, frames without twist, and what its ends impose."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import Literal
+
+import numpy as np
+from scipy.optimize import brentq
+
+from hybrid.kernels.loads import BODIES, DRAG, FLOW, SURFACE
+from hybrid.kernels.state import Floats, Line, Sea
+from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
+from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
+from hybrid.model.properties import net_weight
+from hybrid.model.sea import Surroundings
+from hybrid.scene.motion import EndMotion
+from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Pinned, Points, Scene, Straight
+
+SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
+DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
+
+
+def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
+    """First positions of the nodes (N+1, 3), m, and the shape's name; what hangs is refined by `hung`."""
+    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    initial, length = scene.initial, scene.length
+    if isinstance(initial, Points):
+        return along_polyline(np.array(initial.points, float), s), "the polyline given"
+    if isinstance(initial, Straight):
+        direction = np.array(initial.direction, float) / np.linalg.norm(initial.direction)
+        origin = initial.origin or start
+        first = np.array(origin, float) if origin else np.array(end, float) - length * direction
+        return first + s[:, None] * direction, "the straight line given"
+    assert isinstance(initial, Equilibrium)
+    if initial.points is not None:
+        return along_polyline(np.array(initial.points, float), s), "the polyline given"
+    down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
+    start, end = (x or getattr(e, "near", None) for x, e in ((start, scene.ends.start), (end, scene.ends.end)))
+    if start and end and initial.guess == "span":
+        return np.array(start) + (s / length)[:, None] * np.subtract(end, start), "the straight span"
+    if start and end and initial.guess != "straight":
+        return _arc(np.array(start, float), np.array(end, float), s, -1.0 if down else 1.0), "an arc"
+    if initial.direction is not None:
+        direction = np.array(initial.direction, float)
+    else:
+        tangent = getattr(scene.ends.start, "tangent", None) or getattr(scene.ends.end, "tangent", None)
+        hanging = -1.0 if down == bool(start) else 1.0
+        place, bed = start or end or (0.0, 0.0, 0.0), scene.environment.seabed
+        lies = bed is not None and down and place[2] - bed.height(place[0], place[1]) < 1e-3 * length
+        if tangent:
+            direction = np.array(tangent, float)
+        else:  # what is held on the bed lies on it, level
+            direction = _along_bed(scene) if lies else np.array([0.0, 0.0, hanging])
+    direction /= np.linalg.norm(direction)
+    first = np.array(start, float) if start else np.array(end, float) - length * direction
+    return first + s[:, None] * direction, "a straight line"
+
+
+def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+    """Shapes to start from where an elastic catenary leads nowhere: an arc and the straight span of two held ends."""
+    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    if start and end:
+        first, span = np.array(start, float), np.subtract(end, start)
+        yield "an arc", _arc(first, np.array(end, float), s, -1.0 if net_weight(scene) >= 0.0 else 1.0)
+        if float(np.linalg.norm(span)) > SHORTEST_SPAN * scene.length:
+            yield "the straight span", first + (s / s[-1])[:, None] * span
+
+
+def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
+    """A shape to start from where a line is clamped at one end alone: its first rod straight, the rest hanging."""
+    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    initial = scene.initial
+    zones: Sequence[object] = getattr(scene.model, "zones", ())
+    tangent = getattr(scene.ends.start if start else scene.ends.end, "tangent", None)
+    asked = isinstance(initial, Equilibrium) and initial.guess == "auto" and not (initial.points or initial.direction)
+    if not asked or bool(start) == bool(end) or not tangent or len(zones) < 2:
+        return
+    stiff = getattr(zones[0] if start else zones[-1], "rod", 0.0)
+    outward = np.array(tangent, float) * (1.0 if start else -1.0) / np.linalg.norm(tangent)
+    far = s if start else s[-1] - s
+    hanging = np.array([0.0, 0.0, -1.0 if net_weight(scene) >= 0.0 else 1.0])
+    along, below = np.minimum(far, stiff), np.maximum(far - stiff, 0.0)
+    r = np.array(start or end, float) + along[:, None] * outward + below[:, None] * hanging
+    yield "a line that hangs from its first joint", r
+
+
+def _along_bed(scene: Scene) -> Floats:
+    """A direction in the plane of the seabed, across its slope."""
+    bed = scene.environment.seabed
+    rise = bed.slope if bed is not None and bed.slope is not None else (0.0, 0.0)
+    if not any(rise):
+        return np.array([1.0, 0.0, 0.0])
+    return np.array([-rise[1], rise[0], 0.0])
+
+
+def along_polyline(points: Floats, s: Floats) -> Floats:
+    """Nodes (N+1, 3) spread over a polyline (K, 3) in proportion to s."""
+    knots = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(points, axis=0), axis=1))])
+    return np.column_stack([np.interp(s * knots[-1] / s[-1], knots, points[:, k]) for k in range(3)])
+
+
+def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
+    """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
+
+    All loads but contact and bending: weight, full buoyancy, attachments, end forces, and the drag of the
+    current on the shape found so far.
+    """
+    initial = scene.initial
+    if not isinstance(initial, Equilibrium) or initial.points or initial.guess not in ("auto", "catenary"):
+        return None
+    if initial.direction is not None:
+        return None
+    places = [getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end)]
+    stiff = any(getattr(e, "tangent", None) for e in (scene.ends.start, scene.ends.end))
+    if not any(places) or (stiff and not all(places)):  # what is clamped at one end starts along its clamp
+        return None
+    loads = line.force.copy()
+    if line.bits & SURFACE:
+        loads[:-1, 2] += line.buoy
+        loads[1:, 2] += line.buoy
+        if line.bits & BODIES:
+            loads[:, 2] += line.point_buoy
+    floating = _floating_end(scene, line)
+    if floating is not None:
+        loads[floating, 2] -= line.point_buoy[floating]
+    for k, end in ((0, scene.ends.start), (-1, scene.ends.end)):
+        load = getattr(end, "force", None) or getattr(end, "thrust", None)
+        if load is not None:
+            loads[k] += np.array(getattr(load, "value", load), float)
+    drag = np.zeros_like(loads)
+    found = None
+    for _ in range(1 + DRAG_ROUNDS * bool(line.bits & FLOW)):
+        if found is not None:
+            drag = 0.5 * (drag + drag_on(line, sea, found.r))
+        if all(places):
+            first = np.array(places[0], float)
+            found = hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
+        else:
+            held = 0 if places[0] else 1
+            place, bed = np.array(places[held], float), scene.environment.seabed
+            on_bed = bed is not None and place[2] - bed.height(place[0], place[1]) < 1e-3 * scene.length
+            if floating is None and (bed is None or on_bed):
+                found = trail(loads + drag, line.h, line.ck, held, place, on_bed)
+            elif floating is None:
+                assert bed is not None
+                found = laid(loads + drag, line.h, line.ck, held, place, bed.height)
+            else:
+                lift = float(line.point_buoy[floating])
+                found = moored(loads + drag, lift, sea.surface, line.h, line.ck, held, place, on_bed)
+        if found is None:
+            break
+    return found
+
+
+def _floating_end(scene: Scene, line: Line) -> int | None:
+    """The node of a free end whose body may float at the surface."""
+    if not (line.bits & SURFACE and line.bits & BODIES):
+        return None
+    for node, end in ((0, scene.ends.start), (-1, scene.ends.end)):
+        if isinstance(end, Body) and line.point_buoy[node] > 0.0:
+            return node
+    return None
+
+
+def drag_on(line: Line, sea: Sea, r: Floats) -> Floats:
+    """Drag of the current (N+1, 3) N on a line at rest with nodes r."""
+    e = np.diff(r, axis=0)
+    d = e / np.linalg.norm(e, axis=1)[:, None]
+    f = np.zeros_like(r)
+    for first in (0, 1):
+        z = r[first : r.shape[0] - 1 + first, 2]
+        U = np.column_stack([np.interp(z, sea.z, sea.current[:, k]) for k in range(3)])
+        along = np.einsum("ij,ij->i", U, d)[:, None] * d
+        across = U - along
+        if line.bits & DRAG:
+            f[first : first + line.h.size] += line.drag_n[:, None] * np.linalg.norm(across, axis=1)[:, None] * across
+            f[first : first + line.h.size] += line.drag_t[:, None] * np.linalg.norm(along, axis=1)[:, None] * along
+    if line.bits & BODIES:
+        U = np.column_stack([np.interp(r[:, 2], sea.z, sea.current[:, k]) for k in range(3)])
+        f += line.point_drag[:, None] * np.linalg.norm(U, axis=1)[:, None] * U
+    return f
+
+
+def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
+    """Nodes on a circular arc of the cable's length from start to end, bulging down (side -1) or up (+1).
+
+    A straight line when the ends are farther apart than the cable is long; a whole circle
+    when they coincide.  A collinear first shape of a cable that is too long for its ends
+    would leave Newton without a direction to go.
+    """
+    length, chord = float(s[-1]), end - start
+    span = float(np.linalg.norm(chord))
+    along = chord / span if span > 0.0 else np.array([1.0, 0.0, 0.0])
+    bulge = np.array([0.0, 0.0, side]) - side * along[2] * along
+    if np.linalg.norm(bulge) < 1e-6:  # a vertical chord: any direction across will do
+        bulge = first_director(tuple(along))
+    bulge /= np.linalg.norm(bulge)
+    if span >= length:
+        return np.asarray(start + (s / length)[:, None] * chord)
+    part = min(span / length, 1.0 - 1e-12)
+    half = np.pi  # half the arc's angle; a full circle when the ends coincide
+    if part > 0.0:
+        half = float(brentq(lambda x: np.sinc(x / np.pi) - part, 0.0, np.pi))
+    radius = 0.5 * length / half
+    angle = half * (2.0 * s / length - 1.0)
+    x = radius * (np.sin(angle) + np.sin(half))
+    y = radius * (np.cos(angle) - np.cos(half))
+    return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
+
+
+def corners(scene: Scene) -> list[float]:
+    """Arc lengths at which the initial polyline turns."""
+    if not isinstance(scene.initial, Points):
+        return []
+    knots = np.cumsum(np.linalg.norm(np.diff(np.array(scene.initial.points), axis=0), axis=1))
+    return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
+
+
+def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundings) -> tuple[EndConditions, Floats]:
+    """End conditions, and first directors of all cells, carried without twist from the start.
+
+    An end whose `normal` is given fixes the material frame there; a clamp without one
+    holds the twist that the initial shape has.  Only where both ends fix it, and rod
+    joins them, is there a twist to close, and it is spread over the line.
+    """
+    d = e / np.linalg.norm(e, axis=1)[:, None]
+    start, end = scene.ends.start, scene.ends.end
+    first = first_director(getattr(start, "tangent", None) or tuple(d[0]), getattr(start, "normal", None))
+    tangents = np.vstack([getattr(start, "tangent", None) or d[0], d, getattr(end, "tangent", None) or d[-1]])
+    carried = transported(first, tangents)
+    if isinstance(end, Clamped | Guided) and end.normal is not None:
+        wanted = first_director(end.tangent, end.normal)
+        t = tangents[-1] / np.linalg.norm(tangents[-1])
+        last = carried[-1]
+        twist = float(np.arctan2(np.dot(np.cross(last, wanted), t), np.dot(last, wanted)))
+        n = e.shape[0]
+        if not _fixes_twist(start):
+            part = np.ones(n + 2)  # the whole line takes the end's orientation
+        elif rod.all():
+            part = np.concatenate([[0.0], (np.arange(n) + 0.5) / n, [1.0]])
+        else:
+            part = np.ones(n + 2)  # the rod at the end takes it; joints let the rest be
+            part[: n - int(np.argmin(rod[::-1])) + 1] = 0.0
+        t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
+        cosine, sine = np.cos(part * twist)[:, None], np.sin(part * twist)[:, None]
+        carried = carried * cosine + np.cross(t, carried) * sine
+    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1]
+
+
+def _fixes_twist(end: object) -> bool:
+    """True for an end that says how the material frame stands, and holds it."""
+    return isinstance(end, Clamped | Guided) and end.normal is not None and not getattr(end, "swivel", False)
+
+
+def _end_conditions(
+    scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats], around: Surroundings
+) -> EndConditions:
+    position, frame = np.zeros((2, 3)), np.zeros((2, 9))
+    loads: list[EndLoad] = []
+    motions: dict[int, Moves] = {}
+    pair = (scene.ends.start, scene.ends.end)
+    for k, end in enumerate(pair):
+        t = np.array(getattr(end, "tangent", None) or chords[k], float)
+        t = t / np.linalg.norm(t)
+        base = np.column_stack([directors[k], np.cross(t, directors[k]), t])
+        frame[k] = base.ravel()
+        position[k] = getattr(end, "position", (0.0, 0.0, 0.0))
+        kinds: tuple[tuple[Literal["force", "moment"], str], ...]
+        kinds = (("force", "force"), ("force", "thrust"), ("moment", "moment"))
+        for what, key in kinds:
+            load = getattr(end, key, None)
+            if load is not None:
+                until = getattr(load, "until", None)
+                value = np.array(getattr(load, "value", load), float)
+                ramp = getattr(load, "ramp", None)
+                loads.append(EndLoad(what, k, value, np.inf if until is None else until, ramp))
+        motion = getattr(end, "motion", None)
+        if motion is not None:
+            motions[k] = EndMotion(motion, getattr(end, "position", None), base, around.elevation)
+    return EndConditions([isinstance(e, Pinned | Clamped) for e in pair], position, frame, loads, motions)

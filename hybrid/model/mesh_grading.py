@@ -1,0 +1,76 @@
+"""Where cells should be short: a density of cells along the cable, from how it has been seen to bend.
+
+Cells follow the angle they turn through (a chord that turns by theta misses its arc by theta/8 of its length), rods
+also the length over which bending fades; neighbours differ by little, so that waves pass without an echo.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+
+TURN = 0.1  # rad that a cell turns through, at fineness 1
+FEWEST = 12.0  # cells of a straight cable, at fineness 1
+# Cells to a length sqrt(EI/T) beside what disturbs a rod, and over how many such lengths: bending fades as exp(-x).
+LAYER, LAYER_WIDTH = 3.0, 2.0
+GROWTH = 0.25  # of the length of cells per length of cable: neighbours differ by about a quarter
+SAMPLES = 2000  # places at which the density is known
+LEAST_PIECE = 2  # cells of a stretch between two places where a node must lie
+
+
+@dataclass(frozen=True)
+class Grading:
+    """Cells per length (K,) 1/m at places s (K,) m, at fineness 1."""
+
+    s: Floats
+    density: Floats
+
+    def count(self, a: float, b: float, fineness: float) -> int:
+        """Cells of the stretch [a, b]."""
+        return max(LEAST_PIECE, round(fineness * float(np.diff(self._number(np.array([a, b])))[0])))
+
+    def cell(self, s: Floats) -> Floats:
+        """Length of cells, m, at s (K,) m, at fineness 1."""
+        return np.asarray(1.0 / np.interp(s, self.s, self.density))
+
+    def nodes(self, cuts: Sequence[float], fineness: float) -> Floats:
+        """Nodes (N+1,) m; one at every cut, the ends of the cable among them."""
+        out = [np.array(cuts[:1])]
+        for a, b in pairwise(cuts):
+            n = self.count(a, b, fineness)
+            x = np.linspace(a, b, max(SAMPLES // 4, 8 * n))
+            number = self._number(x)
+            at = np.interp(np.linspace(number[0], number[-1], n + 1)[1:-1], number, x)
+            out += [at, np.array([b])]
+        return np.concatenate(out)
+
+    def _number(self, x: Floats) -> Floats:
+        """Cells between the start and x."""
+        whole = np.concatenate([[0.0], np.cumsum(0.5 * (self.density[1:] + self.density[:-1]) * np.diff(self.s))])
+        return np.asarray(np.interp(x, self.s, whole))
+
+
+def grading(s: Floats, curvature: Floats, fade: Floats, disturbed: Sequence[float], length: float) -> Grading:
+    """The density for a curvature (K,) 1/m seen at s (K,) m.
+
+    fade: (K,) m, sqrt(EI/T) where the cable is a rod, zero where it is not; disturbed: m, clamps, joints and point
+    loads, beside which a rod bends within that length.
+    """
+    x = np.linspace(0.0, length, SAMPLES)
+    density = np.interp(x, s, curvature) / TURN + FEWEST / length
+    for place in disturbed:
+        width = float(np.interp(place, s, fade))
+        if width > 0.0:
+            density += LAYER / width * np.exp(-np.abs(x - place) / (LAYER_WIDTH * width))
+    cell = 1.0 / density
+    step = x[1] - x[0]
+    for i in range(1, SAMPLES):
+        cell[i] = min(cell[i], cell[i - 1] + GROWTH * step)
+    for i in range(SAMPLES - 2, -1, -1):
+        cell[i] = min(cell[i], cell[i + 1] + GROWTH * step)
+    return Grading(x, 1.0 / cell)

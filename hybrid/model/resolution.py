@@ -1,0 +1,150 @@
+"""How finely a scene is computed: what accuracy asks for becomes cells, steps and the tolerance of zones.
+
+A scene's own step, mesh and model.tolerance stand; what it leaves open follows from the accuracy it asks for.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+
+from hybrid.model.mesh_grading import Grading
+from hybrid.scene.accuracy import Accuracy, amount
+from hybrid.scene.motion import shortest_period
+from hybrid.scene.schema import AdaptiveModel, Scene
+
+USUAL = "1%"  # of a scene that asks for nothing and leaves its steps open
+# Parts of what is asked that zones may make of it; mesh and time step share the rest as they come.
+OF_ZONES = 0.1
+ONE = 0.01  # what the guesses below are for
+ZONES = 1e-3  # of a scene that asks for nothing: part of the length
+# Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
+# First guesses after runs of the examples, as are those of the step below: the error figure decides, not they.
+FOR_TENSION, FOR_POSITION = 1.5, 0.4
+# Fewer cells show no shape; more are not needed before the first error figure has said so.
+COARSEST, FINEST = 0.5, 20.0
+# What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.
+STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 5e-4
+# Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
+PER_PERIOD = 12
+# Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
+LEAST_STEPS, SHORTEST = 10, 1e-6
+
+
+@dataclass(frozen=True)
+class Asked:
+    """Errors asked for, in m and N or as parts (of the length; of the largest pull at the ends); None: not asked."""
+
+    position: float | None
+    tension: float | None
+    of_pull: float | None
+    of_curvature: float | None = None  # a part of the largest
+
+    @property
+    def text(self) -> str:
+        """In words."""
+        said = [f"{self.position:.3g} m of position"] if self.position is not None else []
+        if self.tension is not None:
+            said.append(f"{self.tension:.3g} N of pull at the ends")
+        if self.of_pull is not None:
+            said.append(f"{100 * self.of_pull:.3g} % of the pull at the ends")
+        if self.of_curvature is not None:
+            said.append(f"{100 * self.of_curvature:.3g} % of the curvature")
+        return ", ".join(said)
+
+
+@dataclass(frozen=True)
+class Effort:
+    """How finely a scene is computed.
+
+    fineness: cells, in times those of the mesh as it is; grading: where they go, None: as the scene or the program
+    places them; step: s, fixed, or the largest; local: m, error of a step, None: steps are fixed; zones: error that
+    leaving bending out may make, as a part of the length; every: outputs of the result to one of such a run.
+    follow: whether the error of leaving bending out is followed along the run.
+    """
+
+    fineness: float
+    step: float
+    local: float | None
+    zones: float
+    grading: Grading | None = None
+    every: int = 1
+    follow: bool = False
+
+    def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Effort:
+        """With cells and steps so many times as long; the error of a step is of third order."""
+        local = None if self.local is None else self.local * steps**3
+        every = round(steps) if steps > 1.0 else 1
+        return replace(self, fineness=self.fineness / cells, step=self.step * steps, local=local, every=every)
+
+    @property
+    def shortest(self) -> float:
+        """Step, s, below which one that fails is given up."""
+        return SHORTEST * self.step
+
+
+def accuracy_of(scene: Scene) -> Accuracy | None:
+    """The accuracy a scene asks for; one that leaves its steps open asks for the usual one."""
+    if scene.accuracy is None and scene.time is not None and scene.time.controlled and scene.time.tolerance is None:
+        return Accuracy(position=USUAL, tension=USUAL)
+    return scene.accuracy
+
+
+def asked(scene: Scene) -> Asked | None:
+    """The same in numbers; None if it asks for nothing."""
+    accuracy = accuracy_of(scene)
+    if accuracy is None:
+        return None
+    position = tension = of_pull = None
+    if accuracy.position is not None:
+        what, size = amount(accuracy.position)
+        position = size * scene.length if what == "part" else size
+    if accuracy.tension is not None:
+        what, size = amount(accuracy.tension)
+        tension, of_pull = (None, size) if what == "part" else (size, None)
+    of_curvature = amount(accuracy.curvature)[1] if accuracy.curvature is not None else None
+    return Asked(position, tension, of_pull, of_curvature)
+
+
+def wants_errors(scene: Scene) -> bool:
+    """Whether a result is to say how wrong it may be."""
+    if scene.output.errors is not None:
+        return scene.output.errors
+    return accuracy_of(scene) is not None
+
+
+def mesh_is_free(scene: Scene) -> bool:
+    """Whether the program places the cells."""
+    zones = getattr(scene.model, "zones", ())
+    return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
+
+
+def zones_are_free(scene: Scene) -> bool:
+    """Whether the program chooses how much bending zones may leave out."""
+    return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
+
+
+def first_effort(scene: Scene) -> Effort:
+    """What a scene's accuracy asks for, before anything is known of its errors."""
+    want = asked(scene)
+    zones = scene.model.tolerance if isinstance(scene.model, AdaptiveModel) else None
+    fineness, local, part = 1.0, 1.0, ZONES / OF_ZONES
+    if want is not None:
+        tension, position = want.of_pull or ONE, (want.position or ONE * scene.length) / scene.length
+        which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_pull or want.tension else []
+        which += [(want.of_curvature, FOR_TENSION, STEP_FOR_TENSION)] if want.of_curvature else []
+        which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
+        part = min(x for x, _, _ in which)
+        local = min(step * (x / ONE) ** 1.5 for x, _, step in which) * scene.length
+        if mesh_is_free(scene):
+            fineness = min(max(max(cells * sqrt(ONE / x) for x, cells, _ in which), COARSEST), FINEST)
+    part *= OF_ZONES
+    time = scene.time
+    if time is None:
+        return Effort(fineness, 0.0, None, zones or part)
+    if not time.controlled:
+        assert time.step is not None
+        return Effort(fineness, time.step, None, zones or part)
+    step = min(time.step or time.duration / LEAST_STEPS, time.duration)
+    step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD)
+    return Effort(fineness, step, time.tolerance or local, zones or part)

@@ -1,0 +1,107 @@
+"""From a mesh to the fixed output grid: interpolation as sparse matrices, of second order and more.
+
+Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn across it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from hybrid.kernels.state import Floats
+from hybrid.model.mesh import Zone
+
+
+def _sparse(columns: np.ndarray, weights: Floats, width: int) -> csr_array:
+    """One row per output point: its weights (ns, k) at their columns; those at the same column add up."""
+    rows, each = weights.shape
+    out = csr_array((weights.ravel(), columns.ravel(), each * np.arange(rows + 1)), shape=(rows, width))
+    out.sum_duplicates()
+    return out
+
+
+def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Interpolation along x[first] .. x[last], and beyond: the two that count, (..., 2), and their weights at `at`.
+
+    Where first = last, that one counts alone.
+    """
+    left = np.maximum(np.minimum(np.searchsorted(x, at) - 1, last - 1), first)
+    right = np.minimum(left + 1, last)
+    p = np.divide(at - x[left], x[right] - x[left], out=np.zeros(at.shape), where=left < right)
+    return np.stack([left, right], axis=-1), np.stack([1 - p, p], axis=-1)
+
+
+def _slopes(x: Floats, node: np.ndarray, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Weights (..., 4) of the derivative at a node from the parabola through the three nearest nodes of first .. last.
+
+    It is linear, and in the middle of a cell it is the slope of the secant; of one cell alone there is no other.
+    """
+    cell, share = _linear(0.5 * (x[:-1] + x[1:]), x[node], first, last - 1)
+    w = share / (x[cell + 1] - x[cell])
+    return np.concatenate([cell, cell + 1], axis=-1), np.concatenate([-w, w], axis=-1)
+
+
+def _cubic(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
+    """Weights (ns, 10) of the Hermite interpolation along the nodes x[first] .. x[last]."""
+    node, p = _linear(x, at, first, last)
+    H = np.diff(x[node])
+    of_slope = H * p[:, :1] * p[:, 1:] * p * [1.0, -1.0]
+    near, slope = _slopes(x, node, first[:, None], last[:, None])
+    columns = np.hstack([node, near.reshape(-1, 8)])
+    return columns, np.hstack([p * p * (3 - 2 * p), (of_slope[:, :, None] * slope).reshape(-1, 8)])
+
+
+def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
+    """What joints, and point loads, cut the line into: neighbours of the same kind are made one first.
+
+    loads: arc lengths (m) of floats, clumps and the like: tension jumps there, and a catenary has a kink.
+    """
+    whole: list[Zone] = []
+    for zone in zones:
+        if whole and whole[-1].kind == zone.kind:
+            whole[-1] = Zone(zone.kind, whole[-1].s_a, zone.s_b)
+        else:
+            whole.append(zone)
+    parts: list[Zone] = []
+    for zone in whole:
+        near = 1e-9 * whole[-1].s_b
+        kinks = [x for x in loads if zone.s_a + near < x < zone.s_b - near]
+        bounds = [zone.s_a, *kinks, zone.s_b]
+        parts += [Zone(zone.kind, a, b) for a, b in pairwise(bounds)]
+    return tuple(parts)
+
+
+class Grid:
+    """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
+
+    nodes: cubic, from node values (positions, velocities); cells: linear, from values at
+    the middle of the cells; held: the same with the values at both ends of the line as
+    well (tensions, which the supports know); sides: linear, from node values that may differ on the two
+    sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
+    shows the side before it.
+    """
+
+    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = ()) -> None:
+        n = nodes_s.size
+        self.s = s
+        self.loads = tuple(loads)
+        self.parts = stretches(zones, loads)
+        bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
+        cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
+        # first node, last node, offset of the stretch's sides: every joint before it has one side more
+        self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
+        self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
+
+        stretch = np.searchsorted(bounds[1:-1] + 1e-12 * nodes_s[-1], s)
+        a, b = cuts[stretch], cuts[stretch + 1]
+        middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
+        self.nodes = _sparse(*_cubic(nodes_s, s, a, b), n)
+        self.cells = _sparse(*_linear(middles, s, a, b - 1), n - 1)
+        # columns of `held`: start, cells, end; next to an end its value takes part
+        start, end = np.where(s < middles[0], 0, a + 1), np.where(s > middles[-1], n, b)
+        self.held = _sparse(*_linear(np.concatenate([nodes_s[:1], middles, nodes_s[-1:]]), s, start, end), n + 1)
+        node, share = _linear(nodes_s, s, a, b)
+        self.sides = _sparse(node + stretch[:, None], share, len(self.side_nodes))

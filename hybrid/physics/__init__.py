@@ -1,1 +1,0 @@
-"""The laws: rotations, the cell (tension), the element (bending and twist), loads.  Compiled, and blind to scenes."""

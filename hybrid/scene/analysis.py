@@ -1,0 +1,381 @@
+"""What is to be done with the cable: where it starts, which model, which mesh, how long, what is kept."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from itertools import pairwise
+from typing import Annotated, Any, Literal
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.base import (
+    Direction,
+    Finding,
+    Kinds,
+    NonNegative,
+    NonNegativePair,
+    Number,
+    Positive,
+    Table,
+    Truth,
+    Vector,
+    Whole,
+    by_kind,
+    number_or_list,
+    refuse,
+    unwrap,
+)
+
+_RATIO = "length of the last cell over the length of the first, geometric grading; absent: 1 [-]"
+
+
+def _increasing(values: tuple[float, ...]) -> bool:
+    return all(a < b for a, b in pairwise(values))
+
+
+def _doubled(points: tuple[tuple[float, float, float], ...]) -> list[Finding]:
+    """The points of a polyline that repeat the one before."""
+    total = sum(math.dist(a, b) for a, b in pairwise(points))
+    same = [i for i, (a, b) in enumerate(pairwise(points), start=1) if math.dist(a, b) <= 1e-9 * total]
+    return [Finding(("points", i), "a point other than the one before", "leave it out") for i in same]
+
+
+# --- where the cable starts --------------------------------------------------------------------
+
+
+class Straight(Table):
+    """The cable starts straight and unstretched.
+
+    It starts at a held start, or ends at a held end; without either, `origin` says where s = 0 is.
+    """
+
+    kind: Literal["straight"] = Field(default="straight", description="straight, unstretched")
+    direction: Direction = Field(description="direction of increasing s, inertial frame; any length [-]")
+    origin: Vector | None = Field(
+        default=None, description="position of s = 0, inertial frame; needed only if no end is held [m]"
+    )
+    velocity: Vector | None = Field(
+        default=None, description="velocity of the whole cable at t = 0, inertial frame; absent: at rest [m/s]"
+    )
+
+
+class Points(Table):
+    """The cable starts along a polyline, spread evenly over it, at rest."""
+
+    kind: Literal["points"] = Field(default="points", description="along a polyline")
+    points: tuple[Vector, ...] = Field(
+        min_length=2, description="corners of the polyline from s = 0 to s = length, inertial frame [m]"
+    )
+
+    @model_validator(mode="after")
+    def _corners_are_distinct(self) -> Points:
+        refuse(_doubled(self.points))
+        return self
+
+
+class Equilibrium(Table):
+    """The cable starts at rest in static equilibrium."""
+
+    kind: Literal["equilibrium"] = Field(default="equilibrium", description="static equilibrium")
+    guess: Literal["auto", "catenary", "arc", "straight", "span"] = Field(
+        default="auto",
+        description="shape to start the search from: catenary (hanging between the ends, with the seabed), arc, span "
+        "(straight between the ends), straight in a direction, or auto (catenary between two ends, else straight)",
+    )
+    direction: Direction | None = Field(
+        default=None, description="direction of increasing s of a straight guess, inertial frame; any length [-]"
+    )
+    points: tuple[Vector, ...] | None = Field(
+        default=None,
+        min_length=2,
+        description="instead of guess: corners of a polyline from s = 0 to s = length to start from, "
+        "inertial frame [m]",
+    )
+
+    friction: Literal["left_out", "settled"] = Field(
+        default="left_out",
+        description="on a seabed with friction: left_out (the equilibrium without it, where there is one, which is "
+        "one with it as well), or settled (the line comes to rest from its first shape with friction, and stays near)",
+    )
+
+    @model_validator(mode="after")
+    def _one_guess(self) -> Equilibrium:
+        if self.points is not None:
+            fix = "leave out either points or guess and direction"
+            both = [name for name, given in (("guess", self.guess != "auto"), ("direction", self.direction)) if given]
+            refuse(Finding((name,), "nothing, because points already gives the shape", fix) for name in both)
+            refuse(_doubled(self.points))
+        elif self.direction is not None and self.guess not in ("auto", "straight"):
+            expected = f"nothing, because a direction is for a straight guess and guess is {self.guess}"
+            refuse([Finding(("direction",), expected, "leave direction out, or use guess: straight")])
+        return self
+
+
+Initial = Annotated[
+    Annotated[Straight, Tag("<straight>")]
+    | Annotated[Points, Tag("<points>")]
+    | Annotated[Equilibrium, Tag("<equilibrium>")],
+    Discriminator(by_kind),
+    Kinds(("straight", "points", "equilibrium"), usual=("equilibrium",)),
+]
+
+
+# --- which model where -------------------------------------------------------------------------
+
+
+class RodZone(Table):
+    """A stretch with bending and torsion."""
+
+    rod: Positive = Field(description="unstretched length of this rod zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+class CatenaryZone(Table):
+    """A stretch that carries tension only."""
+
+    catenary: Positive = Field(description="unstretched length of this catenary zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+class CorrectedZone(Table):
+    """A stretch that carries tension only, its results corrected for the bending left out."""
+
+    corrected: Positive = Field(description="unstretched length of this corrected catenary zone [m]")
+    cells: Whole | None = Field(default=None, ge=1, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+
+
+_ZONES: dict[str, type[Table]] = {"rod": RodZone, "catenary": CatenaryZone, "corrected": CorrectedZone}
+
+
+def _zone_tag(value: Any) -> str:
+    for kind, table in _ZONES.items():
+        if kind in value if isinstance(value, Mapping) else isinstance(value, table):
+            return f"<{kind} zone>"
+    return "<catenary zone>"
+
+
+def _one_zone_kind(value: Any) -> Any:
+    """Every zone says rod, catenary or corrected: the key is its kind and the value its length."""
+    if isinstance(value, RodZone | CatenaryZone | CorrectedZone):
+        return value
+    fix = "write {rod: length} or {catenary: length}"
+    if not isinstance(value, Mapping):
+        refuse([Finding((), "a zone", fix)])
+    kinds = [kind for kind in _ZONES if kind in value]
+    if len(kinds) != 1:
+        refuse([Finding((), "either rod or catenary (or corrected), with the length of the zone in m", fix)])
+    return value
+
+
+Zone = Annotated[
+    Annotated[RodZone, Tag("<rod zone>")]
+    | Annotated[CatenaryZone, Tag("<catenary zone>")]
+    | Annotated[CorrectedZone, Tag("<corrected zone>")],
+    Discriminator(_zone_tag),
+    BeforeValidator(_one_zone_kind),
+]
+
+Slack = Literal["stop", "warn"]
+_SLACK = "what to do when a catenary zone loses its tension: stop, or warn and go on"
+
+
+class RodModel(Table):
+    """The whole cable is a Kirchhoff rod."""
+
+    kind: Literal["rod"] = Field(default="rod", description="bending and torsion everywhere")
+
+
+class CatenaryModel(Table):
+    """The whole cable is perfectly flexible."""
+
+    kind: Literal["catenary"] = Field(default="catenary", description="tension only")
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+class CorrectedModel(Table):
+    """The whole cable is a catenary, its results corrected for the bending left out."""
+
+    kind: Literal["corrected"] = Field(
+        default="corrected",
+        description="tension only; position, tension, curvature and moment corrected for the bending left out",
+    )
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+class ZonesModel(Table):
+    """Rod and catenary zones in a row, spherical joints between them."""
+
+    kind: Literal["zones"] = Field(default="zones", description="rod and catenary zones")
+    zones: tuple[Zone, ...] = Field(min_length=1, description="zones in order from s = 0 on; they fill the cable")
+    slack: Slack = Field(default="stop", description=_SLACK)
+
+
+def _are_stretches(value: Any) -> Any:
+    if isinstance(value, list | tuple) and value and all(isinstance(unwrap(x), int | float) for x in value):
+        said = ", ".join(f"{unwrap(x):g}" for x in value)
+        refuse([Finding((), "a list of stretches [s_a, s_b], in m", f"write [[{said}]]")])
+    return value
+
+
+Stretches = Annotated[tuple[NonNegativePair, ...], Field(min_length=1), BeforeValidator(_are_stretches)]
+
+
+class AdaptiveModel(Table):
+    """Zones that follow the physics: rod where bending, torsion or slack ask for it, catenary elsewhere."""
+
+    kind: Literal["adaptive"] = Field(default="adaptive", description="zones that move by themselves")
+    tolerance: Positive | None = Field(
+        default=None,
+        le=0.1,
+        description="error of position that leaving bending out may make, as a part of the length of the cable; "
+        "absent: 1e-3, or what accuracy leaves for it [-]",
+    )
+    rod_cell: Positive | None = Field(
+        default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
+    )
+    dwell: Positive | None = Field(
+        default=None,
+        description="time for which a rod must have been calm before it becomes catenary; absent: chosen [s]",
+    )
+    always_rod: Stretches | None = Field(default=None, description="stretches [s_a, s_b] that are always rod [m]")
+    always_catenary: Stretches | None = Field(
+        default=None, description="stretches [s_a, s_b] that are always catenary [m]"
+    )
+    joint: Literal["spherical", "curvature"] = Field(
+        default="spherical",
+        description="what a joint between rod and catenary passes on: no moment (spherical), or to the rod the moment "
+        "of the catenary's curvature, relaxed in time (curvature)",
+    )
+    correct: Truth = Field(
+        default=False,
+        description="results corrected for the bending that catenary zones leave out, and criteria that count what "
+        "is left after it",
+    )
+
+
+def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
+    """The model of a scene that names none: zones that move, if the cable can bend; a rod, if they cannot hold it."""
+    sections = getattr(cable, "sections", ())
+    if not any(x.bending_stiffness is not None for x in sections):
+        return CatenaryModel()
+    return RodModel() if any(x.anisotropic or x.turns for x in sections) else AdaptiveModel()
+
+
+Model = Annotated[
+    Annotated[RodModel, Tag("<rod>")]
+    | Annotated[CatenaryModel, Tag("<catenary>")]
+    | Annotated[CorrectedModel, Tag("<corrected>")]
+    | Annotated[ZonesModel, Tag("<zones>")]
+    | Annotated[AdaptiveModel, Tag("<adaptive>")],
+    Discriminator(by_kind),
+    Kinds(
+        ("rod", "catenary", "corrected", "zones", "adaptive"),
+        usual=("adaptive", "rod", "catenary"),
+        implied=(("zones", "zones"), *((key, "adaptive") for key in AdaptiveModel.model_fields if key != "kind")),
+    ),
+]
+
+
+class Mesh(Table):
+    """How the cable is cut into cells: `cells` with `ratio`, or `nodes`."""
+
+    cells: Whole | None = Field(default=None, ge=2, description="number of cells; absent: chosen [-]")
+    ratio: Positive | None = Field(default=None, description=_RATIO)
+    nodes: tuple[Number, ...] | None = Field(
+        default=None, min_length=3, description="arc length of every node, from 0 to the length of the cable [m]"
+    )
+
+    @model_validator(mode="after")
+    def _one_recipe(self) -> Mesh:
+        if self.nodes is not None:
+            fix = "leave out either nodes or cells and ratio"
+            both = [name for name in ("cells", "ratio") if getattr(self, name) is not None]
+            found = [Finding((name,), "nothing, because nodes already gives the mesh", fix) for name in both]
+            if not _increasing(self.nodes):
+                found.append(
+                    Finding(("nodes",), "numbers that increase strictly, in m", "sort them and drop duplicates")
+                )
+            refuse(found)
+        return self
+
+
+# --- how long, and what is kept ----------------------------------------------------------------
+
+
+# Steps that change need some damping of what they do not resolve (tests/solve/test_time_control.py).
+LEAST_DAMPED = 0.9
+
+
+class Time(Table):
+    """How long to compute, in which steps."""
+
+    duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
+    step: Positive | None = Field(
+        default=None,
+        description="fixed time step, shortened so that a whole number fits between outputs; with a tolerance, the "
+        "largest; absent: steps follow the motion [s]",
+    )
+    tolerance: Positive | None = Field(
+        default=None,
+        description="error of position that one time step may make: steps follow it; absent: chosen for `accuracy`, "
+        "if there is no step [m]",
+    )
+    rho_inf: Number = Field(
+        default=0.5, ge=0, le=1, description="spectral radius of generalized-alpha at high frequency; 1: no damping [-]"
+    )
+
+    @model_validator(mode="after")
+    def _step_fits(self) -> Time:
+        if self.step is not None and self.step > self.duration:
+            expected = f"at most the duration, {self.duration:.6g} s"
+            refuse([Finding(("step",), expected, "a smaller step or a longer duration")])
+        if self.controlled and self.rho_inf > LEAST_DAMPED:
+            expected = f"at most {LEAST_DAMPED:g} where steps follow the motion: above, steps that change are unstable"
+            refuse([Finding(("rho_inf",), expected, "0.5 is usual; or give a fixed step (time.step)")])
+        return self
+
+    @property
+    def controlled(self) -> bool:
+        """Whether steps follow the motion."""
+        return self.step is None or self.tolerance is not None
+
+
+OutputPoints = Annotated[
+    Annotated[Whole, Field(ge=2, le=1_000_000), Tag("<number>")]  # a million points fill 160 MB at every output
+    | Annotated[tuple[NonNegative, ...], Field(min_length=1), Tag("<list>")],
+    Discriminator(number_or_list),
+]
+
+
+class Output(Table):
+    """What is kept."""
+
+    every: Positive | None = Field(
+        default=None, description="time between outputs; absent: a hundredth of the duration [s]"
+    )
+    points: OutputPoints = Field(
+        default=101, description="number of output points, evenly spread, or a list of their arc lengths [m]"
+    )
+    history: tuple[NonNegative, ...] | None = Field(
+        default=None, min_length=1, description="arc lengths that plots follow over time [m]"
+    )
+
+    criteria: Truth = Field(
+        default=False,
+        description="also write the criteria of zones that move, as fields over time and arc length",
+    )
+    errors: Truth | None = Field(
+        default=None,
+        description="estimate how wrong the result is (mesh, time step, model) by coarser runs; absent: if accuracy is "
+        "asked for, or steps follow the motion",
+    )
+
+    @model_validator(mode="after")
+    def _points_increase(self) -> Output:
+        if isinstance(self.points, tuple) and not _increasing(self.points):
+            refuse([Finding(("points",), "arc lengths that increase strictly, in m", "sort them and drop duplicates")])
+        return self

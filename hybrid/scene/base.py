@@ -1,0 +1,278 @@
+"""The base of every table of a scene: what a number is, what a vector is, how nonsense is refused.
+
+A table refuses on three levels, all of them pydantic errors until `hybrid.scene.read`
+turns them into complaints: a value of the wrong form (here), a value out of bounds
+(`Field(gt=0)` where the field is written), and values that contradict each other
+(`refuse`, with the path of the key concerned).
+
+Units stand in square brackets at the end of a field's description; messages, the
+JSON schema and the docs all take them from there.
+"""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from typing import Annotated, Any, NoReturn
+
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic.functional_validators import AfterValidator
+from pydantic_core import CoreSchema, PydanticCustomError, core_schema
+
+from hybrid.scene.suggestions import nearest
+
+Place = tuple[str | int, ...]
+
+# No length, time, mass, force or stiffness of a cable is larger in SI units; products of several such numbers, and
+# their squares, are still far from where a double overflows (1e308).
+LARGEST_NUMBER = 1e20
+# What cannot be negative is nothing or at least this: smaller numbers are slips, and what is divided by them overflows.
+SMALLEST_NUMBER = 1e-30
+# No mesh and no output needs more; numpy and JSON stop at 2^63.
+LARGEST_COUNT = 10**9
+
+# A direction is of order one; outside these bounds its square could under- or overflow.
+SHORTEST_DIRECTION, LONGEST_DIRECTION = 1e-9, 1e9
+
+# Below this sine two directions cannot be told apart in the eight digits people write.
+PARALLEL = 1e-6
+
+
+class Table(BaseModel):
+    """Base of all tables: frozen, unknown keys refused, numbers finite."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+
+@dataclass(frozen=True)
+class Words:
+    """How messages call a type whose Python annotation says too little."""
+
+    text: str
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A contradiction: the key (relative to the table that found it), what would fit, what to do.
+
+    `given` replaces the value as written where that alone would not tell what is wrong.
+    """
+
+    at: Place
+    expected: str
+    fix: str = ""
+    given: str | None = None
+
+
+def refuse(findings: Iterable[Finding]) -> None:
+    """Raise one pydantic error that carries all `findings`; none, and nothing happens."""
+    found = tuple(findings)
+    if found:
+        text = "; ".join(f"{dotted(f.at)}: expected {f.expected}{'; try: ' + f.fix if f.fix else ''}" for f in found)
+        raise PydanticCustomError("findings", "{text}", {"text": text, "findings": found})
+
+
+def dotted(path: Iterable[str | int]) -> str:
+    """``("cable", "sections", 0, "mass")`` -> ``cable.sections[0].mass``."""
+    text = ""
+    for part in path:
+        name = part if isinstance(part, int) or part.isprintable() else repr(part)[1:-1]
+        text += f"[{part}]" if isinstance(part, int) else f".{name}" if text else str(name)
+    return text
+
+
+# --- numbers, words, vectors -------------------------------------------------------------------
+
+
+def unwrap(value: Any) -> Any:
+    """Numpy scalars and arrays as plain Python, so that Python users need not convert."""
+    return value.tolist() if hasattr(value, "tolist") else value
+
+
+def _a_number(value: Any) -> float:
+    value = unwrap(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        raise PydanticCustomError("number", "a number is needed")
+    if LARGEST_NUMBER < abs(value) < math.inf:
+        raise PydanticCustomError("large_number", "the number is too large", {"most": LARGEST_NUMBER})
+    return float(value)
+
+
+def _not_tiny(value: float) -> float:
+    if 0.0 < value < SMALLEST_NUMBER:
+        raise PydanticCustomError("tiny_number", "the number is too small", {"least": SMALLEST_NUMBER})
+    return value
+
+
+def _a_whole_number(value: Any) -> int:
+    value = unwrap(value)
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value or value != math.floor(value):
+        raise PydanticCustomError("whole_number", "a whole number is needed")
+    if abs(value) > LARGEST_COUNT:
+        raise PydanticCustomError("large_number", "the number is too large", {"most": LARGEST_COUNT})
+    return int(value)
+
+
+def _no_infinity(value: Any) -> Any:
+    """Infinity has no floor; say so before `_a_whole_number` asks for it."""
+    if isinstance(value, float) and math.isinf(value):
+        raise PydanticCustomError("whole_number", "a whole number is needed")
+    return value
+
+
+def numbers(n: int) -> Callable[[Any], Any]:
+    def check(value: Any) -> Any:
+        value = unwrap(value)
+        if not isinstance(value, list | tuple) or len(value) != n:
+            raise PydanticCustomError("vector", "{n} numbers are needed", {"n": n})
+        return value
+
+    return check
+
+
+def _a_truth(value: Any) -> Any:
+    # pydantic would take "yes", "on" and 1, which YAML 1.2 no longer calls booleans
+    if not isinstance(value, bool):
+        raise PydanticCustomError("truth", "true or false is needed")
+    return value
+
+
+def _one_line(value: str) -> str:
+    value = value.strip()
+    if not value.isprintable():
+        raise PydanticCustomError("one_line", "one line of printable text is needed")
+    return value
+
+
+def _points_somewhere(value: tuple[float, float, float]) -> tuple[float, float, float]:
+    if not SHORTEST_DIRECTION <= math.hypot(*value) <= LONGEST_DIRECTION:
+        raise PydanticCustomError("direction", "a direction needs a length that is neither zero nor immense")
+    return value
+
+
+Text = Annotated[str, Field(strict=True), AfterValidator(_one_line), Words("one line of text")]
+Number = Annotated[float, BeforeValidator(_a_number), Field(allow_inf_nan=False)]
+Positive = Annotated[Number, Field(gt=0), AfterValidator(_not_tiny)]
+NonNegative = Annotated[Number, Field(ge=0), AfterValidator(_not_tiny)]
+Whole = Annotated[int, BeforeValidator(_a_whole_number), BeforeValidator(_no_infinity)]
+Truth = Annotated[bool, BeforeValidator(_a_truth)]
+Vector = Annotated[tuple[Number, Number, Number], BeforeValidator(numbers(3)), Words("three numbers [x, y, z]")]
+Direction = Annotated[
+    tuple[Number, Number, Number],
+    BeforeValidator(numbers(3)),
+    AfterValidator(_points_somewhere),
+    Words("a direction [x, y, z], not all zero"),
+]
+Pair = Annotated[tuple[Number, Number], BeforeValidator(numbers(2)), Words("two numbers")]
+NonNegativePair = Annotated[tuple[NonNegative, NonNegative], BeforeValidator(numbers(2)), Words("two numbers >= 0")]
+
+
+def parallel(a: tuple[float, float, float], b: tuple[float, float, float]) -> bool:
+    """Whether two directions (or their opposites) are the same line."""
+    u, v = unit(a), unit(b)
+    cross = (u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0])
+    return math.hypot(*cross) < PARALLEL
+
+
+def unit(a: tuple[float, float, float]) -> tuple[float, float, float]:
+    length = math.hypot(*a)
+    return (a[0] / length, a[1] / length, a[2] / length)
+
+
+# --- unions: the branch meant is chosen by what was written, so errors speak of that branch only --
+
+
+def value_or_table(value: Any) -> str:
+    """Discriminator of `value | Table` unions."""
+    return "<table>" if isinstance(value, Mapping | Table) else "<value>"
+
+
+def table_or_list(value: Any) -> str:
+    """Discriminator of `Table | list of tables` unions."""
+    return "<list>" if isinstance(unwrap(value), list | tuple) else "<table>"
+
+
+def number_or_list(value: Any) -> str:
+    """Discriminator of `number | list of numbers` unions."""
+    return "<list>" if isinstance(unwrap(value), list | tuple) else "<number>"
+
+
+def by_kind(value: Any) -> str | None:
+    """Discriminator of tables that say their `kind`."""
+    kind = value.get("kind") if isinstance(value, Mapping) else getattr(value, "kind", None)
+    return f"<{kind}>"
+
+
+@dataclass(frozen=True)
+class Kinds:
+    """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
+
+    `usual` names what to advise someone who says nothing; `implied`: keys that only one kind has, and that kind.
+    """
+
+    names: tuple[str, ...]
+    usual: tuple[str, ...]
+    implied: tuple[tuple[str, str], ...] = ()
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.check, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        tables = handler(schema)
+        said = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
+        alone = [table["properties"]["kind"]["const"] for table in said if not table.get("required")]
+        if not alone:  # every kind needs more than its name
+            return tables
+        return {"anyOf": [tables, {"enum": alone, "description": "short for {kind: ...}"}]}
+
+    def check(self, value: Any) -> Any:
+        if isinstance(value, Table):
+            if getattr(value, "kind", None) not in self.names:
+                self._refuse_table(f"a {type(value).__name__}")
+            return value
+        if isinstance(value, str):
+            value = {"kind": value}
+        if not isinstance(value, Mapping):
+            self._refuse_table(None)
+        if "kind" not in value:
+            implied = [kind for key, kind in self.implied if key in value]
+            value = {"kind": implied[0], **value} if implied else value
+        kind = value.get("kind")
+        expected = f"one of: {', '.join(self.names)}"
+        if kind is None:
+            fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
+            refuse([Finding(("kind",), expected, fix)])
+        elif kind not in self.names:
+            refuse([Finding(("kind",), expected, nearest(str(kind), self.names) or "write one of these")])
+        return value
+
+    def _refuse_table(self, given: str | None) -> NoReturn:
+        expected = f"a table with kind: {' | '.join(self.names)}"
+        refuse([Finding((), expected, f"write {{kind: {self.names[0]}, ...}}", given)])
+        raise AssertionError("unreachable: refuse raises when there is a finding")
+
+
+@dataclass(frozen=True)
+class PlainNumber:
+    """Annotation of a table for which a bare number may stand: ``2.0`` is ``{key: 2.0}``, for each of the keys."""
+
+    keys: tuple[str, ...]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.expand, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        return {"anyOf": [handler(schema), {"type": "number", "description": f"short for {self._table()}"}]}
+
+    def expand(self, value: Any) -> Any:
+        value = unwrap(value)
+        if not isinstance(value, int | float) or isinstance(value, bool):
+            return value
+        if len(self.keys) > 1 and not 0.0 <= value <= sys.float_info.max:  # one mistake, one complaint
+            refuse([Finding((), f"a finite number >= 0, or a table {self._table()}", "check the number")])
+        return dict.fromkeys(self.keys, value)
+
+    def _table(self) -> str:
+        return "{" + ", ".join(f"{key}: ..." for key in self.keys) + "}"

@@ -1,0 +1,337 @@
+"""The text of a scene as a tree that remembers where everything was written.
+
+YAML 1.2: `on`, `no` and `yes` are words, 1e-3 is a number.  The tree carries line and column
+(from 1) of every key and value, so that a complaint can point at its cause.
+"""
+
+from __future__ import annotations
+
+import re
+import warnings
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+from ruamel.yaml import YAML
+from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
+from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
+from ruamel.yaml.reader import ReaderError
+
+from hybrid.errors import Complaint
+from hybrid.scene.base import Place, Table, dotted
+from hybrid.scene.schema_messages import keys_at, shorthand_keys
+from hybrid.scene.suggestions import decimal_comma, did_you_mean
+
+Spot = tuple[int, int]
+
+# A table or list as written may be long; a complaint shows its beginning.
+SHOWN = 60
+
+# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh is far below, and a
+# few lines of aliases of aliases are far above.
+MOST_VALUES = 200_000
+
+_PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
+_WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
+_QUOTE = "write one word before the colon; close brackets and braces"
+_EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
+
+
+@dataclass
+class Node:
+    """A value of the scene: a scalar, ``{key: Node}`` or ``[Node]``, with its place and its text.
+
+    `note` says where it comes from if not from the text.
+    """
+
+    value: Any
+    place: Spot | None = None
+    written: str = ""
+    key_places: dict[str, Spot] = field(default_factory=dict)
+    note: str = ""
+
+    def plain(self) -> Any:
+        """The value without places: dicts, lists and scalars."""
+        if isinstance(self.value, dict):
+            return {key: node.plain() for key, node in self.value.items()}
+        if isinstance(self.value, list):
+            return [node.plain() for node in self.value]
+        return self.value
+
+    def show(self) -> str:
+        """The value as it was written, on one line."""
+        text = "".join(c if c.isprintable() else ascii(c)[1:-1] for c in " ".join(self._flow().split()))
+        if len(text) > SHOWN:
+            text = text[: SHOWN - 4] + " ..."
+        return (text or "nothing") + (f" ({self.note})" if self.note else "")
+
+    def _flow(self) -> str:
+        if isinstance(self.value, dict):
+            return "{" + ", ".join(f"{key}: {node._flow()}" for key, node in self.value.items()) + "}"
+        if isinstance(self.value, list):
+            return "[" + ", ".join(node._flow() for node in self.value) + "]"
+        return self.written
+
+
+class Unreadable(Exception):
+    """The text is not YAML; `complaint` says where and why."""
+
+    def __init__(self, complaint: Complaint) -> None:
+        self.complaint = complaint
+        super().__init__(complaint.text())
+
+
+def from_text(text: str) -> tuple[Node, list[Complaint]]:
+    """The tree of a YAML text, and complaints about its keys; Unreadable if it is not YAML."""
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("error", ReusedAnchorWarning)
+            top = YAML(typ="safe", pure=True).compose(text)
+    except MarkedYAMLError as error:
+        raise Unreadable(_not_yaml(text, error)) from None
+    except ReusedAnchorWarning as warning:
+        raise Unreadable(_anchor_twice(str(warning))) from None
+    except ReaderError as error:
+        raise Unreadable(_odd_character(text, error)) from None
+    except (YAMLError, RecursionError, ValueError) as error:
+        why = "nested too deeply" if isinstance(error, RecursionError) else str(error).splitlines()[0]
+        raise Unreadable(Complaint("YAML", why, "a text that YAML can read", _WRITE_OUT, 1, 1)) from None
+    if top is None:
+        raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
+    complaints: list[Complaint] = []
+    try:
+        return _build(top, (), complaints, (), iter(range(MOST_VALUES))), complaints
+    except RecursionError:
+        raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
+
+
+def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
+    mark = error.problem_mark or error.context_mark
+    line, column = (mark.line, mark.column) if mark is not None else (0, 0)
+    lines = text.splitlines()
+    given = lines[line].strip() if line < len(lines) else "the end of the text"
+    problem = (error.problem or "").strip()
+    fix = "indent with spaces, not tabs" if "\\t" in problem or "\t" in given else ""
+    if "mapping values are not allowed" in problem:
+        fix = "check the indentation, and put text that contains a colon in quotes"
+    elif "could not find expected ':'" in problem:
+        fix = "a key needs a colon and a space behind it"
+    elif "expected ',' or" in problem:
+        fix = "close the bracket, or put a comma between the entries"
+    elif "undefined alias" in problem:
+        fix = "give the anchor (&name) before the alias (*name)"
+    if not fix:
+        fix = "check indentation, brackets and quotes here and in the line before"
+    problem = problem.replace("<stream end>", "the end of the text").replace("\\t", "tab")
+    return Complaint("YAML", given or "nothing", f"a text that YAML can read; {problem}", fix, line + 1, column + 1)
+
+
+def _anchor_twice(warning: str) -> Complaint:
+    """`warning` names both places, the later one last."""
+    line, column = map(int, re.findall(r"line (\d+), column (\d+)", warning)[-1])
+    name = re.findall(r"duplicate anchor '(.*)'", warning)[0]
+    return Complaint("YAML", f"the anchor &{name} twice", "every anchor once", "give it another name", line, column)
+
+
+def _odd_character(text: str, error: ReaderError) -> Complaint:
+    """A character that no YAML text may have."""
+    before = text[: error.position]
+    line, column = before.count("\n") + 1, error.position - before.rfind("\n")
+    given = f"the character U+{ord(text[error.position]):04X}"
+    return Complaint("YAML", given, "a text that YAML can read; it has no such characters", "take it out", line, column)
+
+
+def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...], room: Iterator[int]) -> Node:
+    """The tree below a node of YAML, aliases written out; `room`: one for each value that there may still be."""
+    place = (node.start_mark.line + 1, node.start_mark.column + 1)
+    if next(room, None) is None:
+        given = f"more than {MOST_VALUES} values, aliases written out"
+        raise Unreadable(Complaint("YAML", given, "a scene of fewer", "write it without aliases of aliases", *place))
+    if id(node) in inside:
+        complaints.append(Complaint(dotted(path), "an alias of itself", "a value", "write it out", *place))
+        return Node(None, place)
+    inside = (*inside, id(node))
+    if isinstance(node, SequenceNode):
+        entries = [_build(entry, (*path, i), complaints, inside, room) for i, entry in enumerate(node.value)]
+        return Node(entries, place)
+    if isinstance(node, MappingNode):
+        return _build_table(node, path, complaints, inside, room, place)
+    written = f'"{node.value}"' if node.style in ("'", '"') else str(node.value)
+    return Node(_scalar(node), place, written)
+
+
+def _build_table(
+    node: MappingNode,
+    path: Place,
+    complaints: list[Complaint],
+    inside: tuple[int, ...],
+    room: Iterator[int],
+    place: Spot,
+) -> Node:
+    table = Node({}, place)
+    merged: dict[str, Node] = {}
+    for i, (key_node, value_node) in enumerate(node.value):
+        spot = (key_node.start_mark.line + 1, key_node.start_mark.column + 1)
+        if not isinstance(key_node, ScalarNode):
+            complaints.append(
+                Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", _QUOTE, *spot)
+            )
+            continue
+        key = str(key_node.value)
+        before = str(node.value[i - 1][0].value) if i else ""
+        if before in table.value and _is_behind_comma(node.value[i - 1][1], key_node, value_node):
+            written = f"{node.value[i - 1][1].value},{key}"
+            number = Node(float(written.replace(",", ".")), table.value[before].place, written)
+            fix, there = decimal_comma(written), number.place or spot
+            complaints.append(Complaint(dotted((*path, before)), written, "a number", fix, *there))
+            table.value[before] = number
+            continue
+        if key_node.tag == "tag:yaml.org,2002:merge":
+            built = _build(value_node, path, complaints, inside, room)
+            for source in built.value if isinstance(built.value, list) else [built]:
+                if isinstance(source.value, dict):
+                    merged = {**source.value, **merged}
+                else:
+                    complaints.append(
+                        Complaint(
+                            dotted((*path, key)),
+                            source.show(),
+                            "a table to merge",
+                            "`<<` takes an alias of a table; or leave it out",
+                            *spot,
+                        )
+                    )
+            continue
+        if key in table.value:
+            first = table.key_places[key]
+            fix = f"keep one of them; the first is in line {first[0]}"
+            complaints.append(Complaint(dotted((*path, key)), f"{key} twice", "every key once", fix, *spot))
+            continue
+        value = _build(value_node, (*path, key), complaints, inside, room)
+        if value.value is None and not value.written:
+            value.place = spot  # an empty value stands nowhere; its key does
+        table.value[key] = value
+        table.key_places[key] = spot
+    for key, value in merged.items():
+        table.value.setdefault(key, value)
+    return table
+
+
+def _is_behind_comma(before: Any, key: ScalarNode, value: Any) -> bool:
+    """Whether a key is what stands behind a decimal comma: YAML reads {mass: 2,5} as mass: 2 and a key 5."""
+    return (
+        isinstance(before, ScalarNode)
+        and not isinstance(value.value, list)
+        and value.value == ""
+        and before.end_mark.index + 1 == key.start_mark.index
+        and re.fullmatch(r"[-+]?\d+", str(before.value)) is not None
+        and re.fullmatch(r"\d+([eE][-+]?\d+)?", str(key.value)) is not None
+    )
+
+
+def _scalar(node: ScalarNode) -> Any:
+    text, tag = str(node.value), str(node.tag).rpartition(":")[2]
+    try:
+        if tag == "null":
+            return None
+        if tag == "bool":
+            return text.lower() == "true"
+        if tag == "int":
+            digits = text.replace("_", "")
+            return int(digits, 0) if re.match(r"[-+]?0[xob]", digits) else int(digits)
+        if tag == "float":
+            return float(text.replace("_", "").lower().replace(".inf", "inf").replace(".nan", "nan"))
+    except ValueError:
+        pass  # an explicit tag that does not fit, or a number of thousands of digits: the schema refuses text
+    return text
+
+
+def from_data(data: Any) -> Node:
+    """The tree of Python data, without places."""
+    if isinstance(data, Table):
+        data = {name: getattr(data, name) for name in type(data).model_fields}
+    if hasattr(data, "tolist"):
+        data = data.tolist()
+    if isinstance(data, Mapping):
+        return Node({str(key): from_data(value) for key, value in data.items()})
+    if isinstance(data, list | tuple):
+        return Node([from_data(value) for value in data])
+    return Node(data, None, repr(data))
+
+
+# --- overrides ---------------------------------------------------------------------------------
+
+
+def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
+    """Set one value of the tree, ``cable.sections[0].mass=2``; the complaint if that cannot be."""
+    name, equals, value_text = text.partition("=")
+    name = name.strip()
+    if not equals or not _PATH.fullmatch(name):
+        return Complaint("override", text or "nothing", _EXAMPLE, "name the key as `hybrid plan` and docs/scene.md do")
+    path: Place = tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", name))
+    try:
+        value, complaints = from_text(value_text) if value_text.strip() else (Node(None), [])
+    except Unreadable as error:
+        return Complaint(name, value_text.strip(), error.complaint.expected, error.complaint.fix)
+    if complaints:
+        first = complaints[0]
+        return Complaint(name, first.value, first.expected, first.fix)
+    _annotate(value, "override")
+
+    here = root
+    for depth, part in enumerate(path):
+        _open(here, schema, path[:depth])
+        if isinstance(part, int):
+            refusal = _no_entry(here, path[:depth], part)
+        else:
+            refusal = _no_key(here, path[:depth], part, keys_at(schema, path[:depth]))
+        if refusal is not None:
+            return Complaint(name, text, *refusal)
+        if depth == len(path) - 1:
+            here.value[part] = value
+            here.key_places.pop(str(part), None)
+        elif isinstance(part, str) and part not in here.value:
+            here.value[part] = Node({}, None, note="override")
+        here = here.value[part]
+    return None
+
+
+def _no_entry(here: Node, path: Place, index: int) -> tuple[str, str] | None:
+    """Why there is no entry `index` at `path`: what was expected, and the fix."""
+    count = len(here.value) if isinstance(here.value, list) else 0
+    if index < count:
+        return None
+    number = f"{count} entr{'y' if count == 1 else 'ies'}, counted from 0" if count else "no entries"
+    return f"an entry that exists: {dotted(path)} has {number}", "change the entry in the file, or count again"
+
+
+def _no_key(here: Node, path: Place, key: str, known: list[str]) -> tuple[str, str] | None:
+    """Why there is no `key` in the table at `path`: what was expected, and the fix."""
+    table = dotted(path) or "a scene"
+    if not known:
+        return f"a key that exists; {table} has none below it", f"{table}=value"
+    if key not in known:
+        return f"a key of {table}", did_you_mean(key, known)
+    if not isinstance(here.value, dict):
+        return f"{table} to be a table; it is {here.show()}", f"mend {table} in the file first"
+    return None
+
+
+def _open(node: Node, schema: type[Table], path: Place) -> None:
+    """Turn nothing, or a word that stands for a table, into that table."""
+    if node.value is None:
+        node.value = {}
+    elif not isinstance(node.value, dict | list):
+        keys = shorthand_keys(schema, path)
+        if keys:
+            node.value = {key: Node(node.value, node.place, node.written) for key in keys}
+
+
+def _annotate(node: Node, note: str) -> None:
+    node.place, node.note = None, note
+    node.key_places = {}
+    children = (
+        node.value.values() if isinstance(node.value, dict) else node.value if isinstance(node.value, list) else ()
+    )
+    for child in children:
+        _annotate(child, note)

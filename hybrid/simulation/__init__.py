@@ -1,0 +1,1 @@
+"""Runs: statics, motion, restart, error control."""

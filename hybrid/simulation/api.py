@@ -1,0 +1,344 @@
+"""What people call: computes a scene, as often as its accuracy takes, and leaves one file.
+
+run      integrate a scene over its duration
+static   find its equilibrium
+"""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import threading
+import time as clock
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.adapt.manager import UserCriterion
+from hybrid.errors import ResultError, SceneError
+from hybrid.model.mesh import Zone
+from hybrid.model.resolution import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
+from hybrid.scene.motion import check_motions
+from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
+from hybrid.simulation.case import Job
+from hybrid.simulation.error_control import Climb, Errors, Sketch, summary
+from hybrid.simulation.freeze import freeze
+from hybrid.simulation.restart import Remainder, remainder
+from hybrid.simulation.transient import Motion
+from hybrid.simulation.undersampling import unseen_pulls
+from hybrid.store.checkpoint import claimed
+from hybrid.store.format import Field
+from hybrid.store.reader import Result, open_result
+from hybrid.store.writer import amend, check_target
+
+Record = Callable[[Effort, Path | io.BytesIO], Sketch]
+REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is: time and duration (s), step number, Newton iterations of the last step, zones, wall time (s).
+
+    stage: which run, where several tell the error: "looking" how the cable bends, "comparing", "result"; else empty.
+    """
+
+    t: float
+    duration: float
+    step: int
+    iterations: int
+    zones: tuple[Zone, ...]
+    wall: float
+    stage: str = ""
+
+
+def run(
+    scene: Scene,
+    output: str | Path | None = None,
+    *,
+    progress: bool | Callable[[Progress], None] = False,
+    overwrite: bool = True,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Integrate a scene over its duration.
+
+    output: the HDF5 file to write; None keeps the result in memory.  progress: True for a
+    live line, or a function called about ten times a second.  overwrite: replace an
+    existing result (never another program's file).  criterion: for zones that move, one more: it gets a
+    `hybrid.Look` at every step and gives a number (N+1,) per node, 1 or more where the cable must be a rod.
+
+    Raises SceneError when the scene is refused and ComputationError when the computation
+    stops; what was computed until then is in the file, and the last good state beside it.
+    """
+    if scene.time is None:
+        raise SceneError([missing_time(scene)])
+    check_motions(scene)
+    if scene.solver == "shooting":
+        from hybrid.simulation.arbiter import run_shooting
+
+        with claimed(_path(output)):
+            return run_shooting(scene, output, overwrite)
+    if criterion is not None and not isinstance(scene.model, AdaptiveModel):
+        raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
+    job, target = Job(scene, criterion), _target(output, overwrite)
+    with claimed(_path(output)), _working(job, progress):
+        if isinstance(target, Path):
+            _beside(target).unlink(missing_ok=True)  # of a run that was cut off
+        _run(job, target)
+    return open_result(target)
+
+
+def resume(
+    source: str | Path,
+    output: str | Path | None = None,
+    *,
+    until: float | None = None,
+    settings: Sequence[str] = (),
+    start: float | None = None,
+    progress: bool | Callable[[Progress], None] = False,
+    criterion: UserCriterion | None = None,
+) -> Result:
+    """Go on with a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
+
+    What comes out is, to the last bit, what the run would have been had it not been stopped (but for processor
+    times).  output: another file; None: the same.  until: s, a later end.  settings: changes such as
+    ``environment.fluid.current=[0.5, 0, 0]`` (currents, waves, and what moves and loads the ends) from `start` (s) on;
+    None: from the checkpoint; before it the run is computed anew, into another file.  criterion: as `run` was given.
+
+    Raises ResultError when there is nothing to go on with or the file is another program's, and else as `run`.
+    """
+    path = Path(source).expanduser().resolve()
+    target = path if output is None else Path(output).expanduser().resolve()
+    if not path.is_file():
+        open_result(path)  # which says what is there instead
+    if target != path:
+        check_target(target, True)
+    with claimed(path), claimed(target if target != path else None):
+        left = remainder(path, until, settings, start)
+        if left.anew and target == path:
+            why = "a change before the checkpoint computes the run anew"
+            raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
+        job = Job(left.scene, criterion, left.changes)
+        with _working(job, progress):
+            _run(job, target, path, left)
+    return open_result(target)
+
+
+def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: Remainder | None = None) -> None:
+    """Compute a result, and its errors if they are wanted; source, left: what to go on with."""
+    scene, begin = job.scene, clock.process_time()
+    assert scene.time is not None
+    anew = left is None or left.anew
+    climb = left.climb if left is not None else None
+
+    def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if anew or source is None or isinstance(to, io.BytesIO):
+            return job.record(effort, to, kept())
+        return job.go_on(source, to, kept())
+
+    def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+        if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
+            return job.go_on(to, to, kept())
+        return job.record(effort, to, kept())
+
+    def kept() -> bytes:
+        return freeze(climb) if climb is not None else b""
+
+    effort = first_effort(scene) if left is None else left.effort
+    if not wants_errors(scene):
+        first(effort, target)
+        return
+    compute = _kept(target, first, later)
+    try:
+        if climb is not None:
+            climb.sketch, climb.result = job.sketch, compute
+            final, errors = climb.go_on()
+        else:
+            steps_are_free = scene.time.controlled and scene.time.tolerance is None
+            climb = Climb(
+                asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
+            )
+            if left is None and asked(scene):
+                effort = replace(effort, grading=job.survey(effort))
+            final, errors = climb.reach(effort)
+    except KeyboardInterrupt:
+        if climb is not None and climb.estimate is not None:
+            # stopped in a finer run: the result before it stands, with its figure
+            final, errors = climb.stopped()
+            _amend(target, scene, final, errors, climb, clock.process_time() - begin, done=False)
+        raise
+    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+
+
+@contextmanager
+def _working(job: Job, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
+    """Hear of interrupts, and tell of the progress, until a run is done."""
+    assert job.scene.time is not None
+    with _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
+        job.told, job.interrupted = told, interrupted
+        yield
+
+
+def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
+    """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.  Errors as of `run`."""
+    check_motions(scene)
+    if scene.solver == "shooting":
+        from hybrid.simulation.arbiter import static_shooting
+
+        with claimed(_path(output)):
+            return static_shooting(scene, output, overwrite)
+    job, begin = Job(scene, None), clock.process_time()
+    target, effort = _target(output, overwrite), first_effort(scene)
+    with claimed(_path(output)):
+        if not wants_errors(scene):
+            job.record_rest(effort, target)
+            return open_result(target)
+        compute = _kept(target, job.record_rest, job.record_rest)
+        climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
+        final, errors = climb.reach(effort)
+        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    return open_result(target)
+
+
+def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], Sketch]:
+    """Record results one after the other: a finer one takes the place of that before it when it is complete."""
+    done = False
+
+    def compute(effort: Effort) -> Sketch:
+        nonlocal done
+        if not done:
+            found, done = first(effort, target), True
+            return found
+        if isinstance(target, io.BytesIO):
+            new = io.BytesIO()
+            found = later(effort, new)
+            target.seek(0)
+            target.truncate()
+            target.write(new.getvalue())
+            return found
+        beside = _beside(target)
+        try:
+            found = later(effort, beside)
+            os.replace(beside, target)
+        finally:
+            for left in (beside, beside.with_suffix(".snapshot.npz")):
+                left.unlink(missing_ok=True)
+        return found
+
+    return compute
+
+
+def _amend(
+    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float,
+    done: bool = True,
+) -> None:  # fmt: skip
+    """Write how wrong a result may be, how finely it was computed, and what went into that, into its file.
+
+    done: nothing is left to go on with; else the file keeps what a finer result goes on from.
+    """
+    effort = final.effort
+    attributes: dict[str, str | float | int] = {
+        "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
+        "effort_cpu": cpu, "effort_step": effort.step,
+    }  # fmt: skip
+    if effort.local is not None:
+        attributes["effort_step_error"] = effort.local
+    if isinstance(scene.model, AdaptiveModel):
+        attributes["effort_zones"] = effort.zones
+    if climb.asked is not None:
+        attributes["accuracy_asked"] = climb.asked.text
+    fields: list[tuple[Field, np.ndarray]] = []
+    if errors is not None:
+        attributes |= summary(errors)
+        for kind, quantities in errors.fields.items():
+            for name, values in quantities.items():
+                unit, dims = UNITS_OF_ERRORS[name], ("s",) if values.ndim == 2 else ()
+                text = f"{WORDS_OF_ERRORS[kind]} of {name.replace('_', ' ')}, estimated"
+                if kind == "model" and final.model_error:
+                    continue  # the run has written it itself
+                fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
+    with open_result(target) as result:
+        unseen = unseen_pulls(result, errors.fields.get("total", {})) if climb.moves and errors is not None else []
+    amend(target, fields, attributes, [*dict(reversed(climb.notes)).items(), *unseen], done)
+
+
+UNITS_OF_ERRORS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", "pull_start": "N", "pull_end": "N",
+}  # fmt: skip
+WORDS_OF_ERRORS = {
+    "mesh": "error by the mesh", "time": "error by the time step", "model": "error by bending that is left out",
+    "total": "error by all causes",
+}  # fmt: skip
+
+
+class _Told:
+    """Calls `progress` now and then, and closes a live line however the run ends."""
+
+    def __init__(self, progress: bool | Callable[[Progress], None], duration: float) -> None:
+        self._tell: Callable[[Progress], None] | None = None
+        if progress is True:
+            from hybrid.cli.console import live_line
+
+            self._tell = live_line()
+        elif progress:
+            self._tell = progress
+        self._duration, self.stage = duration, ""
+        self._begin: float | None = None  # s of the clock, at the first call
+        self._last = 0.0
+
+    def __enter__(self) -> _Told:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        close = getattr(self._tell, "close", None)
+        if close is not None:
+            close()
+
+    def __call__(self, motion: Motion, finished: bool = False) -> None:
+        if self._tell is None:
+            return
+        if self._begin is None:
+            self._begin = clock.perf_counter()
+        now = clock.perf_counter() - self._begin
+        if finished or now - self._last > REPORT_EVERY:
+            self._last = now
+            zones = motion.model.zones
+            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
+
+
+def _beside(target: Path) -> Path:
+    """Where a finer result is computed, until it is complete."""
+    return target.with_name(f".{target.name}.finer")
+
+
+def _path(output: str | Path | None) -> Path | None:
+    return None if output is None else Path(output).expanduser().resolve()
+
+
+def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:
+    """Where the result goes; ResultError, before anything is computed, if it cannot go there."""
+    path = _path(output)
+    if path is None:
+        return io.BytesIO()
+    check_target(path, overwrite)
+    return path
+
+
+@contextmanager
+def _interrupts() -> Iterator[Callable[[], bool]]:
+    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is whole."""
+    if threading.current_thread() is not threading.main_thread():
+        yield lambda: False
+        return
+    seen: list[int] = []
+    before = {}
+    for number in (signal.SIGINT, signal.SIGTERM):
+        before[number] = signal.signal(number, lambda got, _frame: seen.append(got))
+    try:
+        yield lambda: bool(seen)
+    finally:
+        for number, handler in before.items():
+            signal.signal(number, handler)

@@ -1,0 +1,84 @@
+"""Equilibria of a scene: found at once, or from a coarser mesh, and with zones where these move."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from hybrid.adapt.manager import UserCriterion
+from hybrid.errors import ComputationError
+from hybrid.kernels.loads import FRICTION
+from hybrid.model.build import Model, given_zones
+from hybrid.model.coarsen import coarser, refined
+from hybrid.model.equilibrium_hints import reasons_against
+from hybrid.model.resolution import Effort
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.zone_switching import Zoning, first_zones, manager_for, zones_of_start
+from hybrid.solve.statics import Equilibrium, solve_statics
+
+
+def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
+    """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
+    try:
+        return _by_coarser(scene, model, t) or _statics(scene, model, t)
+    except ComputationError as failed:
+        flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
+        reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
+        if not reasons:
+            raise
+        roads = failed.detail.splitlines()
+        ways = f"{len(roads)} ways to an equilibrium were" if len(roads) > 1 else "1 way to an equilibrium was"
+        tried = f"{ways} tried, the last: {roads[-1].strip()}"
+        because = "\n              ".join([*reasons, tried])
+        raise ComputationError(failed.outcome, None, failed.s, because) from None
+
+
+def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
+    return solve_statics(
+        model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
+        model.slack_floor, take_slack=model.slack == "warn" and not quick, shape=model.start_shape,
+        others=model.other_starts, settle=getattr(scene.initial, "friction", "") == "settled", quick=quick,
+    )  # fmt: skip
+
+
+def _settles(scene: Scene, model: Model, t: float) -> bool:
+    """Whether friction holds the cable where it starts, so that no other start will do."""
+    asked = getattr(scene.initial, "friction", "") == "settled"
+    return bool(model.line.bits & FRICTION) and (asked or not model.ends.at(t).held.any())
+
+
+def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
+    """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
+
+    None: neither is, or there are few cells.
+    """
+    fewer = coarser(model)
+    if fewer is None or _settles(scene, model, t):
+        return None
+    try:
+        return _statics(scene, model, t, quick=True)
+    except ComputationError:
+        pass
+    try:
+        coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
+        start = refined(coarse.state, fewer.line, model.line)
+        shape = f"the equilibrium with {fewer.cells} cells"
+        return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
+    except ComputationError:
+        return None
+
+
+def zones_and_rest(
+    scene: Scene, model: Model, effort: Effort, t: float, criterion: UserCriterion | None, at_rest: bool = False
+) -> tuple[Model, Equilibrium | None, Zoning]:
+    """Zones, equilibrium if one is asked for, and what will move the zones."""
+    wanted = scene.model
+    assert isinstance(wanted, AdaptiveModel) and model.layout is not None
+    given = given_zones(scene, model.layout)
+    step = effort.step if effort.local is None else 0.0
+    manager = manager_for(model, effort.zones, wanted.dwell, given, step, criterion)
+    equilibrium = None
+    if at_rest or scene.initial.kind == "equilibrium":
+        model, equilibrium = first_zones(model, manager, t, equilibrium_of(scene, model, t))
+    else:
+        model = zones_of_start(model, manager)
+    return model, equilibrium, Zoning(model, manager, loaded=wanted.joint == "curvature")

@@ -1,0 +1,193 @@
+"""What a result leaves to be done: the rest of a run that was cut off, more of it, or other loads from some time on."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import Complaint, ResultError, SceneError
+from hybrid.model.build import build
+from hybrid.model.ends import EndConditions
+from hybrid.model.plan import output_interval
+from hybrid.model.resolution import Effort
+from hybrid.scene.motion import check_motions
+from hybrid.scene.read import parse_scene, scene_text
+from hybrid.scene.schema import Scene
+from hybrid.simulation.error_control import Climb
+from hybrid.simulation.freeze import program, thaw
+from hybrid.store.checkpoint import Checkpoint, climb_of, read_checkpoint
+from hybrid.store.reader import open_result, opened
+
+# What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
+MAY_CHANGE = (
+    "environment.fluid.current", "environment.fluid.waves", "time.duration",
+    *(f"ends.{end}.{key}" for end in ("start", "end") for key in ("motion", "force", "thrust", "moment")),
+)  # fmt: skip
+# Of the length, and of the length in the time of a transverse wave: what an end may jump by, and its velocity.
+SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
+
+
+@dataclass(frozen=True)
+class Phase:
+    """From time t (s) on, this scene holds."""
+
+    t: float
+    scene: Scene
+
+
+@dataclass(frozen=True)
+class Remainder:
+    """What is to be done: a scene, what changes later, and where to begin.
+
+    climb: what the run is part of, as it was; None: it begins anew, with `effort`.  anew: from t = 0, not from the
+    checkpoint; reached: s, where it begins.
+    """
+
+    scene: Scene
+    changes: tuple[Phase, ...]
+    effort: Effort
+    climb: Climb | None
+    anew: bool
+    reached: float
+
+
+def remainder(
+    path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
+) -> Remainder:
+    """What a result leaves to be done, if it is to go on until then, with these settings from `start` (s) on.
+
+    ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
+    """
+    scene, changes, status, climb, point = _found(path)
+    if point.program != program():
+        wrote, this = (x.split()[0] for x in (point.program, program()))
+        said = f"{path} was computed by hybrid-cable {wrote}" + " in another state" * (wrote == this)
+        why = f"this is {this}, whose numbers may differ: a run goes on with the program that began it"
+        raise ResultError(f"{said}\n    detail:   {why}\n    try:      that version, or run its scene again")
+    effort = thaw(point.effort)
+    before = thaw(climb) if climb else None
+    if not (isinstance(effort, Effort) and isinstance(before, Climb | None)):
+        raise ResultError(f"{path} has a checkpoint that is no run\n    try:      run its scene again")
+    if start is not None and not settings:
+        raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
+    if until is None and not settings:
+        if status == "complete" and not climb:
+            fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
+            raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
+        return Remainder(scene, changes, effort, before, False, point.t)
+    if until is not None:
+        scene, changes = _longer(scene, changes, until, point.t)
+    anew = False
+    if settings:
+        begin = point.t if start is None else start
+        last = changes[-1] if changes else Phase(0.0, scene)
+        changed = parse_scene(scene_text(last.scene), overrides=settings)
+        end = changed.require_time().duration
+        if until is not None and end != until:
+            raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
+        _check(last, changed, effort, begin, end)
+        if end != scene.require_time().duration:
+            scene, changes = _longer(scene, changes, end, point.t)
+        changes, anew = (*changes, Phase(begin, changed)), begin < point.t
+    return Remainder(scene, changes, effort, None, anew, 0.0 if anew else point.t)
+
+
+def changes_text(changes: Sequence[Phase]) -> str:
+    """Phases as JSON, for the file; empty if there are none."""
+    return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
+
+
+def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, bytes, Checkpoint]:
+    with opened(path) as file:
+        climb, point = climb_of(file), read_checkpoint(file)
+        with open_result(path) as result:
+            scene = parse_scene(result.scene_text)
+            status = result.status
+            try:
+                told = json.loads(result.changes_text or "[]")
+                changes = tuple(Phase(float(x["t"]), parse_scene(x["scene"])) for x in told)
+            except (ValueError, TypeError, KeyError) as error:
+                advice = f"    detail:   {error}\n    try:      run its scene again"
+                raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
+    if point is None:
+        why = "it is an equilibrium, was kept in memory first, or ended before its first output"
+        raise ResultError(
+            f"{path} has no checkpoint to go on from\n    detail:   {why}\n    try:      run its scene again"
+        )
+    return scene, changes, status, climb, point
+
+
+def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float) -> tuple[Scene, tuple[Phase, ...]]:
+    """The same until another time, with outputs as often as before."""
+    if not (until >= reached and math.isfinite(until)):
+        fix = "the file holds everything before: hybrid.open(path).at(t=...)"
+        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    later = [x.t for x in changes if x.t >= until]
+    if later:
+        fix = "a later end; a change that was asked for cannot be taken back"
+        raise _refused("until", f"{until:g} s", f"a time after the change at {later[0]:g} s", fix)
+    every = output_interval(scene)
+
+    def other(scene: Scene) -> Scene:
+        data = scene.model_dump(mode="json", exclude_none=True)
+        data["time"]["duration"] = until
+        data.setdefault("output", {})["every"] = every
+        return parse_scene(scene_text(Scene.model_validate(data)))
+
+    return other(scene), tuple(Phase(x.t, other(x.scene)) for x in changes)
+
+
+def _check(last: Phase, changed: Scene, effort: Effort, begin: float, end: float) -> None:
+    """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
+    if not last.t <= begin < end:
+        fix = "a later end as well, --until T" if begin == end else ""
+        raise _refused("from", f"{begin:g} s", f"a time from {last.t:g} s on and before the end, {end:g} s", fix)
+    for where, value in _differences(_plain(last.scene), _plain(changed)):
+        if not any(where == x or where.startswith((f"{x}.", f"{x}[")) for x in MAY_CHANGE):
+            fix = "run the changed scene from its start"
+            raise _refused(where, value, f"one of {', '.join(MAY_CHANGE)}: a run in progress keeps the rest", fix)
+    check_motions(changed)
+    model = build(changed, effort)
+    before, after = build(last.scene, effort).ends, model.ends
+    after.take_frames(before)
+    for k, name in enumerate(("start", "end")):
+        held = bool(before.values.held[k])
+        one, other = (_place(ends, k, begin) for ends in (before, after))
+        apart, faster, turned, spun = (float(np.linalg.norm(a - b)) for a, b in zip(one, other, strict=True))
+        jumps = held and (apart > SAME_PLACE * model.length or faster > SAME_SPEED * model.length / model.time_scale)
+        if jumps or turned > SAME_PLACE or spun > SAME_SPEED / model.time_scale:
+            sizes = ((apart, "m"), (faster, "m/s"), (turned, "rad"), (spun, "rad/s"))
+            by = ", ".join(f"{x:.3g} {unit}" for x, unit in sizes if x > 1e-9)
+            given = f"one that jumps by {by} at t = {begin:g} s"
+            fix = "times count from the start of the run: travel {by, over, begin} starts from rest where the end is"
+            expected = "a motion that goes on where the one before it is"
+            raise _refused(f"ends.{name}.motion", given, expected, fix)
+
+
+def _place(ends: EndConditions, k: int, t: float) -> tuple[np.ndarray, ...]:
+    """Position (3,) m, velocity (3,) m/s, frame (9,) and its spin (3,) rad/s of an end."""
+    now = ends.at(t)
+    return now.position[k].copy(), ends.velocity[k].copy(), now.frame[k].copy(), now.spin[k].copy()
+
+
+def _plain(scene: Scene) -> dict[str, Any]:
+    return dict(scene.model_dump(mode="json", exclude_none=True))
+
+
+def _differences(old: Any, new: Any, where: str = "") -> list[tuple[str, str]]:
+    """Keys that differ, and what they are now."""
+    if isinstance(old, Mapping) and isinstance(new, Mapping):
+        keys = [*old, *(k for k in new if k not in old)]
+        found = [_differences(old.get(k), new.get(k), f"{where}.{k}" if where else k) for k in keys]
+        return [x for each in found for x in each]
+    return [] if old == new else [(where, str(new))]
+
+
+def _refused(where: str, given: str, expected: str, fix: str) -> SceneError:
+    return SceneError([Complaint(where, given, expected, fix)])

@@ -1,0 +1,367 @@
+"""Zones that move: carries out what the domain manager proposes on a model, its state and its books."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
+from hybrid.adapt.moment_joints import Joints
+from hybrid.adapt.state_transfer import Clamp, Remapped, balance, remap
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.energies import observe
+from hybrid.kernels.loads import FRICTION, PLANAR, SEABED
+from hybrid.kernels.seabed import stored
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.stiffness_ramp import freed, soften, still_lacking
+from hybrid.kernels.zone_criteria import twist_of_rods
+from hybrid.model.bending_reference import LEFT
+from hybrid.model.build import Model
+from hybrid.model.coarsen import picked
+from hybrid.model.layout import Layout
+from hybrid.model.line import line_on
+from hybrid.model.plane import planar, untwist
+from hybrid.simulation.bending_correction import Correction
+from hybrid.solve.statics import Equilibrium, solve_statics
+from hybrid.solve.stepper import Stepper
+
+# A stretch that has become chords, or arcs, is let go to its true length over this many paces.
+LETTING_GO = 1.0
+# Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
+DWELL, LEAST_DWELL = 0.25, 20
+# Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
+SLOWEST, FASTEST = 2.0, 10
+# Times the tension floor above which tension, not bending, says where new nodes are in balance.
+TAUT = 2.0
+NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
+# Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
+STRICTER = (1.0, 0.5, 0.25)
+# Rounds of zones and equilibrium at the start: each only adds rod, so they end.
+MOST_ROUNDS = 10
+
+
+@dataclass
+class Relaxing:
+    """Cells on their way to their true length: what they lacked (N,) m, its rate (N,) m/s, when it began (N,) s.
+
+    Cells of catenaries keep (N,) what they lack: it is what the chord of an arc is shorter by.
+    """
+
+    lack: Floats
+    rate: Floats
+    since: Floats
+    keeps: np.ndarray
+
+    def speed(self, t: float, duration: float) -> Floats:
+        """Rate (N,) m/s at which what they lack grows."""
+        x = np.clip((t - self.since) / duration, 0.0, 1.0)
+        value = np.where(self.keeps, 0.0, -30.0 * x * x * (1.0 - x) ** 2)
+        slope = (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
+        return np.asarray(self.lack * value / duration + self.rate * slope)
+
+
+def manager_for(
+    model: Model,
+    tolerance: float,
+    dwell: float | None,
+    given: np.ndarray,
+    step: float,
+    user: UserCriterion | None = None,
+) -> DomainManager:
+    """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
+    assert model.layout is not None
+    pace = max(DWELL * model.time_scale, LEAST_DWELL * step)
+    wait = dwell if dwell is not None else pace
+    manager = DomainManager(
+        model.cable,
+        model.layout,
+        tolerance * model.length,
+        wait,
+        given,
+        model.tension_scale,
+        user,
+        min(max(wait, FASTEST * step), SLOWEST * pace),
+        LEFT if model.corrected else 1.0,
+    )
+    manager.moments = model.ends.moments
+    manager.loaded = bool(manager.moments.any())
+    return manager
+
+
+def on_layout(model: Model, layout: Layout) -> Model:
+    """The same model with other zones; its start is not touched."""
+    more = model.line.bits & (SEABED | FRICTION)
+    line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
+    if model.line.bits & PLANAR:
+        line = planar(line, model.line.plane)
+    return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
+
+
+def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:
+    """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
+
+    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than
+    the tolerance (criteria are estimates, and slack has many equilibria) criteria become stricter, for all of the run;
+    where that does not help, zones stay rod.
+    """
+    assert model.layout is not None
+    most, equilibrium = model, found
+    free = manager.given >= 0
+    if not free.all():  # the most rod that the scene lets it have
+        most = on_layout(model, model.layout._replace(rod=free))
+        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.rubbed)
+    assert most.layout is not None
+    allowed = manager.tolerance
+    try:
+        for part in STRICTER:
+            manager.follow(model.layout)
+            manager.tolerance = part * allowed
+            answer = _zones_within(model, found, manager, t)
+            if answer is None:
+                break
+            if _apart(equilibrium.state, most.layout, answer, t) <= allowed:
+                return answer
+        else:
+            manager.held = True
+    except ComputationError:
+        manager.held = True
+    if manager.held:
+        manager.tolerance = allowed
+    manager.follow(most.layout)
+    return most, equilibrium
+
+
+def zones_of_start(model: Model, manager: DomainManager) -> Model:
+    """A start that is no equilibrium is rod, but for what the scene wants to be catenary."""
+    assert model.layout is not None
+    free = manager.given >= 0
+    if free.all():
+        return model
+    new = on_layout(model, model.layout._replace(rod=free))
+    manager.follow(model.layout._replace(rod=free))
+    return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
+
+
+def _zones_within(
+    model: Model, found: Equilibrium, manager: DomainManager, t: float
+) -> tuple[Model, Equilibrium] | None:
+    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
+    assert model.layout is not None
+    full = found.state
+    manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
+    rod = manager.first(full)
+    for _ in range(MOST_ROUNDS):
+        if rod[manager.given >= 0].all():
+            return None
+        layout = model.layout._replace(rod=rod)
+        new = on_layout(model, layout)
+        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.rubbed)
+        manager.follow(layout)
+        manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
+        more = rod | manager.first(answer.state)
+        if (more == rod).all():
+            return new, answer
+        rod = more
+    return None
+
+
+def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
+    """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
+    model, found = answer
+    assert model.layout is not None
+    r = found.state.r
+    if model.corrected:
+        correction = Correction(model)
+        correction.begin(model.ends.at(t), found.state, at_rest=True, rubbed=found.rubbed)
+        r = r + correction.corrector.position
+    return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
+
+
+def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
+    """rubbed: whether friction took part in what it is compared with."""
+    return solve_statics(
+        model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
+        shape=model.start_shape, settle=rubbed,
+    )  # fmt: skip
+
+
+def _on_fewer(state: State, s: Floats, line: Line) -> State:
+    """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
+    found = picked(state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
+    if found is None:
+        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
+    return found
+
+
+class Zoning:
+    """The zones of one motion."""
+
+    def __init__(self, model: Model, manager: DomainManager, loaded: bool = False) -> None:
+        """loaded: whether joints carry the moment of the catenary's curvature."""
+        self.model, self.manager = model, manager
+        self.stiff = model.line.kb.copy()  # N m, with all bending
+        self.true = model.line.h.copy()
+        self.lengths = self.true.copy()  # m, at the end of the last step
+        self.relaxing: Relaxing | None = None
+        self.letting_go = False
+        self.strain = NO_STRAIN  # of the last step, while bending is being blended
+        self.joints = Joints(model.line) if loaded else None
+
+    def torque(self, ends: Ends, state: State) -> float:
+        """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
+        return self.manager.torque
+
+    def begin(self, ends: Ends, state: State) -> None:
+        """Weigh the criteria of the first state."""
+        self.manager.begin()
+        self.weigh(0.0, 0.0, ends, state)
+
+    def prepare(self, end: float, dt: float, state: State) -> None:
+        """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
+        line = self.model.line
+        if self.relaxing is not None:
+            x = self.relaxing
+            self.letting_go = still_lacking(
+                x.lack, x.rate, x.since, x.keeps, end, LETTING_GO * self.manager.pace, self.true, line.h
+            )
+        if self.manager.blending:
+            soften(self.manager.parts(dt), self.stiff, line.kb)
+        if self.joints is not None:
+            self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.pace)
+
+    def weigh(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
+        """Weigh the criteria after a step of dt to t; catenary cells that are beyond their hard bound."""
+        loudest = self.manager.weigh(self.model.line, self.model.sea.values, ends, state, dt, t)
+        return self.manager.catenary_beyond if loudest > HARD else NONE
+
+    def settle(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
+        """After an accepted step: energy (J) that lengths, bending and joints put in, and what should change."""
+        manager, line = self.manager, self.model.line
+        booked = 0.0
+        if self.relaxing is not None:
+            booked -= 0.5 * float((before.T + state.T) @ (line.h - self.lengths))
+            self.lengths[:] = line.h
+            if not self.letting_go:
+                self.relaxing = None
+        if manager.blending:
+            if self.strain.shape != line.kb.shape:
+                self.strain = _strain(line, ends, before)
+            now = _strain(line, ends, state)
+            booked += freed(line.kb, manager.parts(), self.stiff, self.strain, now)
+            self.strain = now
+            manager.blend(dt)
+        else:
+            self.strain = NO_STRAIN
+        if self.joints is not None:
+            booked += self.joints.unload(line, state.r - before.r)
+        manager.remember(state)
+        return booked, manager.review(t, state) if manager.due(t) else None
+
+    def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
+        """The model and the state with other zones, and the energy (J) that the switch puts in."""
+        old, manager, model = self.manager.layout, self.manager, self.model
+        new = old._replace(rod=change.rod)
+        line = model.line
+        if self.joints is not None:
+            self.joints.unload(line, np.zeros_like(state.r))
+        soften(manager.parts(), self.stiff, line.kb)  # a step that was refused has left others
+        line.h[:] = self.lengths
+        was = _energy(line, sea, ends, state)
+        changed = on_layout(model, new)
+        target = changed.line
+        carried = self._carried(old, new, line, target, ends, state)
+        if target.bits & PLANAR:
+            untwist(target, ends, model.cable.held_tangent, carried.state)
+        fresh = new.rod & ~old.rod
+        manager.take(new, change, t)
+        self.stiff, self.true = target.kb.copy(), target.h.copy()
+        soften(manager.parts(), self.stiff, target.kb)
+        cells = np.repeat(fresh, new.counts)
+        limp = np.append(cells, False) | np.append(False, cells)
+        loose = target._replace(kb=np.where(limp[:, None], 0.0, target.kb))
+        left = Stepper(loose, model.length, model.tension_scale).unbalanced(changed.sea.values, ends, carried.state)
+        bed = _bed_stiffness(target, changed.sea.values, carried.state)
+        taut = TAUT * manager.floor[:-1] < carried.state.T
+        balance(old, new, target, carried, left, bed, taut)
+        target.h[:] = carried.lengths
+        self.lengths = carried.lengths.copy()
+        # new cells go on with the length, and the change of length, that their ends and tension imply, but for what
+        # tension makes of it
+        kept_now, kept_then = (np.repeat(old.rod == new.rod, x.counts) for x in (new, old))
+        shares = target.h / np.diff(new.base)[new.base_of_cell]
+        elastic = _lengthening(state)
+        if self.relaxing is not None:
+            elastic += (1.0 + line.ck * state.T) * self.relaxing.speed(t, LETTING_GO * manager.pace)
+        elastic = np.add.reduceat(elastic, old.first[:-1])[new.base_of_cell] * shares
+        rate = (elastic - _lengthening(carried.state)) / (1.0 + target.ck * carried.state.T)
+        lack, since = self.true - carried.lengths, np.full(target.h.size, t)
+        rate[kept_now], since[kept_now] = 0.0, -np.inf
+        if self.relaxing is not None:  # what was on its way goes on
+            for mine, its in ((lack, self.relaxing.lack), (rate, self.relaxing.rate), (since, self.relaxing.since)):
+                mine[kept_now] = its[kept_then]
+        self.relaxing = Relaxing(lack, rate, since, ~new.rod_cells)
+        self.model, self.strain = changed, NO_STRAIN
+        if self.joints is not None:
+            self.joints = self.joints.on(target)
+        return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
+
+    def settle_joints(self, state: State) -> None:
+        """Take what joints carry off the line, for another line to be put in its place."""
+        if self.joints is not None:
+            self.joints.unload(self.model.line, np.zeros_like(state.r))
+
+    def _carried(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Remapped:
+        """The state on the new nodes, with the twist that the cable has had since its ends lost each other."""
+        manager, cable = self.manager, self.model.cable
+        kinks = np.zeros(new.rod.size + 1, bool)
+        kinks[np.searchsorted(new.base, cable.at - 1e-9 * new.base[-1])] = True
+        frames = ends.frame.reshape(2, 3, 3)
+        clamps: list[Clamp | None] = [
+            (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None
+            for k in (0, 1)
+        ]
+        twist = np.zeros(new.rod.size)
+        carried = remap(old, new, line, target, state, kinks, twist, clamps)
+        fresh = new.rod & ~old.rod
+        if not (manager.twisted and new.rod.all() and fresh.any()):
+            return carried
+        length = float(np.diff(new.base)[fresh].sum())
+        for _ in range(2):  # in whole turns; what is between them the clamps say
+            missing = manager.total_twist - twist_of_rods(target, ends.frame, carried.state.e, carried.state.a1)
+            twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
+            carried = remap(old, new, line, target, state, kinks, twist, clamps)
+        return carried
+
+
+def _lengthening(state: State) -> Floats:
+    """Rate (N,) m/s at which cells grow longer."""
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    return np.asarray(np.einsum("ij,ij->i", d, np.diff(state.v, axis=0)))
+
+
+def _bed_stiffness(line: Line, sea: Sea, state: State) -> Floats:
+    """Stiffness (N+1,) N/m that the seabed has under every node."""
+    if not line.bits & SEABED:
+        return np.zeros(line.s.size)
+    deep = sea.offset + 0.5 * sea.onset - state.r @ sea.normal > 0.0
+    return np.where(deep, sea.stiffness * line.hn, 0.0)
+
+
+def _strain(line: Line, ends: Ends, state: State) -> Floats:
+    """Strains (N+1, 3) rad of all elements, from what has no stress."""
+    return (_observed(line, ends, state)[0] - line.k0) * line.element[:, None]
+
+
+def _observed(line: Line, ends: Ends, state: State) -> tuple[Floats, Floats]:
+    """Log strains (N+1, 3) rad of all elements, and energies (4,) J."""
+    n = line.h.size
+    M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
+    observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
+    return strain, energy
+
+
+def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:
+    """All energy of a state, J."""
+    contact = stored(line, sea, state.r) if line.bits & SEABED else 0.0
+    return float(_observed(line, ends, state)[1].sum() - np.sum(line.force * state.r) + contact)

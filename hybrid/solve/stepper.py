@@ -1,0 +1,232 @@
+"""Generalized-alpha in time: sets up a step, takes it, and gives the accelerations a consistent start.
+
+Chung & Hulbert 1993; Arnold & Bruels 2007; docs/theory.md section 2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels.assembly import march, workspace
+from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels.loads import FRICTION, PLANAR, SEABED, WAVES
+from hybrid.kernels.newton import advance, lay
+from hybrid.kernels.seabed import contact, pressure, stored
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.water import stir
+from hybrid.solve.plane_stability import NOTHING, Push
+
+MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
+# Share of the line's length that a node may move in one Newton iteration of a step.
+REACH = 0.1
+# dvd'/dr' of the solve for consistent accelerations, 1/s2: so large that no stiffness of a real cable
+# (EI/(m h^4) is 1e20 at the very worst) shows beside inertia, and far from overflow.
+HEAVY = 1e36
+# report of the march -> powers: start, end (reactions and given moments), applied forces and
+# moments, drag, mass-proportional damping, stiffness-proportional damping, added mass, waves with
+# buoyancy at the surface, contact with the seabed, friction on it, zones that change
+POWERS = (
+    "start", "end", "applied", "drag", "mass_damping", "stiffness_damping", "added_mass", "waves", "contact",
+    "friction", "zones",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Taken:
+    """How one step went: outcome, Newton iterations, predicted next correction (relative), the cell or node where
+    it was worst, the largest force out of balance before the last correction (N), and the local error (m)."""
+
+    outcome: Outcome
+    iterations: int
+    correction: float
+    where: int
+    residual: float
+    error: float = 0.0
+
+
+def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
+    """Elastic travel (N+1, 3) m whose friction takes up the forces (N+1, 3) N along the seabed, or all it can of them.
+
+    sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
+    """
+    p = sea.offset + 0.5 * sea.onset - r @ sea.normal
+    N = np.zeros(r.shape[0])
+    for near, far in ((slice(0, -1), slice(1, None)), (slice(1, None), slice(0, -1))):
+        for c, (a, b) in enumerate(zip(p[near], p[far], strict=True)):
+            if a > 0.0 or b > 0.0:
+                N[near][c] += contact(a, b, 0.0, 0.0, line.h[c], sea.stiffness, sea.damping, sea.onset)[0]
+    for i in np.flatnonzero((line.footing > 0.0) & (p > 0.0)):
+        N[i] += line.footing[i] * pressure(0.0, p[i], p[i], 0.0, 0.0, sea.stiffness, sea.damping, sea.onset)[0]
+    side = np.cross(sea.normal, sea.axis)
+    parts = []
+    for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):
+        along = np.einsum("ij,ij->i", force, direction)
+        parts.append(np.divide(along, mu * N, out=np.zeros_like(along), where=mu * N > 0.0))
+    size = np.maximum(np.hypot(*parts), 1.0)
+    return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
+
+
+# Work arrays by name, and those of them that hold nothing from one step to the next.
+WORKSPACE, SCRATCH = ("W", "X", "x", "report", "rows", "gaps"), ("W", "X", "x", "rows")
+OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
+
+
+class Stepper:
+    """Takes steps of one line; owns the work arrays, not the state."""
+
+    def __init__(
+        self, line: Line, length: float, tension_scale: float, slack_floor: float = -np.inf, keep: bool = False
+    ) -> None:
+        """keep: whether the factors of the last matrix stay for another right-hand side (solve.bending_corrector)."""
+        self.line = line
+        self.reach, self.scale = REACH * length, tension_scale
+        self.floor = slack_floor  # N; a catenary cell not above it refuses the step
+        n, self.keep = line.h.size, keep
+        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n, keep)
+        self.u = np.zeros((n + 1, 3))
+        self.push: Push | None = None  # out of the plane, of a planar motion that is watched
+        self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
+
+    def __getstate__(self) -> dict[str, object]:
+        """All but what every step writes before it reads it, which is most of it."""
+        return {name: x for name, x in vars(self).items() if name not in SCRATCH}
+
+    def __setstate__(self, state: dict[str, object]) -> None:
+        vars(self).update(state)
+        made = dict(zip(WORKSPACE, workspace(self.line.h.size, self.keep), strict=True))
+        vars(self).update({name: made[name] for name in SCRATCH})
+
+    def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
+        """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
+
+        before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
+        """
+        was, now = self.push.pair(old, new) if self.push is not None else (NOTHING, NOTHING)
+        outcome, iterations, left, where = advance(
+            self.line, sea, ends, old, new, self.u, dt, before, rho, self.reach, self.scale, MOST_ITERATIONS,
+            self.gaps, self.W, self.X, self.x, self.report, self.rows, was, now,
+        )  # fmt: skip
+        self.told = told = self.report.tolist()
+        if outcome == OK and not told[26] > self.floor:
+            outcome, where = Outcome.SLACK, int(told[27])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[15], told[31])
+
+    def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
+        """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
+        if not self.line.bits & FRICTION:
+            return
+        n = self.line.s.size
+        rows = np.zeros((n, SIZE * WIDTH))
+        state.slip[:] = 0.0
+        still = np.zeros_like(state.r)
+        stretch = np.linalg.norm(state.e, axis=1) / self.line.h - 1.0
+        tension = np.divide(stretch, self.line.ck, out=np.zeros_like(stretch), where=self.line.ck > 0.0)
+        line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
+        march(
+            line, sea, ends, state.e, still, state.r, state.v, still, tension, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
+        )  # fmt: skip
+        force = -rows.reshape(n, SIZE, WIDTH)[:, 1:4, -1]
+        force[np.flatnonzero(ends.held) * (n - 1)] = 0.0
+        lay(sea, state.e, state.slip)
+        state.slip[:] = travel_that_holds(self.line, sea, state.r, force)
+
+    def ignite(self, sea: Sea, ends: Ends, acceleration: Floats, state: State) -> Taken:
+        """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
+
+        One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
+        the correction is the acceleration; an inextensible cell asks for the change of
+        length that keeps it so, d.(a_{c+1} - a_c) = -|n part of v_{c+1} - v_c|^2 / l.
+        acceleration: (2, 3) m/s2 of the held ends.
+        """
+        state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
+        l = np.linalg.norm(state.e, axis=1)
+        d = state.e / l[:, None]
+        e1 = np.diff(state.v, axis=0)
+        across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
+        gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
+        self.u[:], self.X[:] = 0.0, 0.0  # steps in a plane leave in X what the march in space takes for nought
+        self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
+        held = ends._replace(position=state.r[[0, -1]])
+        if self.line.bits & WAVES:
+            stir(sea, state.r, self.u)
+        if self.line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
+        bad = march(
+            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, gaps, self.W, self.X, self.report, self.rows,
+        )  # fmt: skip
+        if bad >= 0 or not substitute(self.X, self.x):
+            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[15]))
+        state.vd[:] = HEAVY * self.x[:, 1:4]
+        if self.line.bits & PLANAR:  # round-off across the plane would stay there
+            state.vd[:] -= np.outer(state.vd @ self.line.plane[2], self.line.plane[2])
+        state.a[:] = state.vd
+        state.T[:] += self.x[1:, 0]
+        turning = (
+            (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)
+        )  # a spin without inertia has no acceleration
+        state.wd[turning] = HEAVY * self.x[:-1, 4][turning]
+        state.wa[:] = state.wd
+        self.u[:] = 0.0
+        march(  # once more for the forces that go with them
+            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
+        )  # fmt: skip
+        if self.line.bits & SEABED:
+            self.report[28] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
+        self.told = self.report.tolist()
+        return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
+
+    def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
+        """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
+        rows = np.zeros((self.line.s.size, SIZE * WIDTH))
+        self._march_as_it_is(sea, ends, state, rows)
+        return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+
+    def feel(self, sea: Sea, ends: Ends, state: State) -> None:
+        """The forces and the report of a state as it is, for the books of the step that follows."""
+        self._march_as_it_is(sea, ends, state, self.rows)
+        if self.line.bits & SEABED:
+            self.report[28] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
+        self.told = self.report.tolist()
+
+    def _march_as_it_is(self, sea: Sea, ends: Ends, state: State, rows: Floats) -> None:
+        self.u[:] = 0.0
+        if self.line.bits & WAVES:
+            stir(sea, state.r, self.u)
+        if self.line.bits & FRICTION:
+            lay(sea, state.e, state.slip)
+        march(
+            self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
+            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
+        )  # fmt: skip
+
+    def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
+        """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""
+        f, n = self.told, self.line.h.size
+        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18]]
+        for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
+            if ends.held[k]:
+                out[k] -= _dot(f[3 * k : 3 * k + 3], velocity[k])
+            elif ends.force[k].any():
+                out[2] += _dot(ends.force[k].tolist(), state.v[node])
+            if self.line.element[node]:
+                moment = _dot(f[6 + 3 * k : 9 + 3 * k], ends.spin[k])
+                out[k] += moment if k else -moment
+            elif self.line.spin[cell] and ends.moment[k].any():
+                e = state.e[cell]
+                e1 = state.v[cell + 1] - state.v[cell]
+                omega = np.cross(e, e1) / (e @ e) + state.w[cell] * e / np.sqrt(e @ e)
+                out[2] += float(ends.moment[k] @ omega)
+        return out
+
+
+def _dot(a: list[float], b: Floats) -> float:
+    x, y, z = b.tolist()
+    return float(a[0] * x + a[1] * y + a[2] * z)

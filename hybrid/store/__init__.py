@@ -1,0 +1,1 @@
+"""HDF5 files of results: written, read, checked."""

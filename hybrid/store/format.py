@@ -1,0 +1,208 @@
+"""What a result file is made of: fields, the tables they form, and how HDF5 gets them.
+
+The layout is described in `read`; `record` fills it.
+"""
+
+from __future__ import annotations
+
+import platform
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+
+import h5py
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.store.reader import FORMAT, FORMAT_VERSION
+
+# Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
+_CHUNK_BYTES = 16384
+# Bytes of chunks that HDF5 keeps of every dataset: what is written is not read again, and its own 8 MB of each would
+# make a long run grow by 80 MB in a million steps (tests/harden/test_harden_long.py).
+CACHE = 4 * _CHUNK_BYTES
+# Rows of the step log held back before they are written: 1 ms of writing then costs 2 us a step.
+BLOCK = 512
+# Widths of fixed texts (bytes): a kind is a word, an event a sentence or two.
+_KIND, _TEXT = "S32", "S512"
+_RESERVED = {"t", "s", "xyz", "scene", "steps", "zones", "events", "changes", "checkpoint"}
+
+
+@dataclass(frozen=True)
+class Field:
+    """One recorded quantity.
+
+    `shape` and `dims` are those at one output time, without t: (ns, 3) and ("s", "xyz").
+    A name with a slash (``energy/kinetic``) goes into a group.  `frame` is "inertial",
+    "body" or empty.  `dtype` is float64, int64 or S<n> (UTF-8 text of n bytes at most).
+    """
+
+    name: str
+    unit: str
+    description: str
+    shape: tuple[int, ...] = ()
+    dims: tuple[str, ...] = ()
+    frame: str = ""
+    nan_ok: bool = False
+    dtype: str = "float64"
+
+
+TIME = Field("t", "s", "output times")
+ZONES = (
+    Field("t", "s", "time of the first output with these zones"),
+    Field("output", "", "number of that output, from 0", dtype="int64"),
+    Field("kind", "", "kind of the zone", dtype=_KIND),
+    Field("s_a", "m", "begin of the zone, unstretched arc length"),
+    Field("s_b", "m", "end of the zone, unstretched arc length"),
+)
+EVENTS = (
+    Field("t", "s", "time of the event"),
+    Field("s_a", "m", "begin of the stretch concerned, unstretched arc length"),
+    Field("s_b", "m", "end of the stretch concerned, unstretched arc length"),
+    Field("kind", "", "kind of the event", dtype=_KIND),
+    Field("text", "", "what happened and why", dtype=_TEXT),
+    Field("criterion", "", "of a change of zones: the criterion that asks, or held the rod longest", dtype=_KIND),
+    Field("value", "", "what that criterion has there: its ratio", nan_ok=True),
+    Field("threshold", "", "above which it asks, or below which it lets go", nan_ok=True),
+    Field("energy", "J", "energy that all changes of zones at this moment put in, on the first of them", nan_ok=True),
+)
+
+
+def tables_of(fields: Sequence[Field], step_fields: Sequence[Field]) -> dict[str, Sequence[Field]]:
+    """Columns of the tables of a file, by group."""
+    return {"/": (TIME, *fields), "steps": step_fields, "zones": ZONES, "events": EVENTS}
+
+
+def write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int]) -> None:
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    file.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
+    file.attrs["version_python"] = platform.python_version()
+    for package in ("hybrid-cable", "numpy", "h5py", "numba"):
+        try:
+            file.attrs[f"version_{package}"] = version(package)
+        except PackageNotFoundError:  # run from a checkout that was not installed
+            file.attrs[f"version_{package}"] = "unknown"
+    for name, text, width in (("status", "running", 32), ("message", "", 2048)):
+        dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
+        file.attrs.create(name, fixed_text(text, dtype), dtype=dtype)
+    for name, value in attributes.items():
+        if name in file.attrs:
+            raise ResultError(f"the attribute '{name}' is written by the recorder itself")
+        file.attrs[name] = value
+
+
+def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
+    """Texts as datasets of their own, instead of older ones; empty ones are left out."""
+    for name, text in texts.items():
+        if name in file:
+            del file[name]
+        if text:
+            file.create_dataset(name, data=text, dtype=h5py.string_dtype())
+
+
+def create_scales(
+    file: h5py.File, grid_s: np.ndarray, fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
+) -> None:
+    """The datasets that do not grow: dimension scales first, then the fixed quantities."""
+    if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
+        raise ResultError("the output grid must be increasing finite arc lengths")
+    scales: dict[str, tuple[Field, np.ndarray]] = {
+        "s": (Field("s", "m", "unstretched arc length from the start, of the output grid"), grid_s)
+    }
+    scales |= {f.name: (f, checked(f, np.asarray(v), None)) for f, v in fixed if f.dims == (f.name,)}
+    for field in (*fields, *(f for f, _ in fixed)):
+        for dim, size in zip(field.dims, field.shape, strict=True):
+            if dim == "xyz":
+                axes = np.array([b"x", b"y", b"z"])
+                scales.setdefault(dim, (Field("xyz", "", "axes of the inertial frame, z up", dtype="S1"), axes))
+            index = Field(dim, "", "index", dtype="int64")
+            known = scales.setdefault(dim, (index, np.arange(size)))[1]
+            if len(known) != size:
+                raise ResultError(f"field '{field.name}' has {size} along {dim}, others have {len(known)}")
+    for name, (field, values) in scales.items():
+        data = file.create_dataset(name, data=values)
+        annotate(data, field.unit, field.description, field.frame)
+        data.make_scale(name)
+        data.dims[0].label = name
+    for field, values in fixed:
+        if field.name not in scales:
+            array = checked(field, np.asarray(values, dtype=field.dtype), None)
+            data = file.create_dataset(field.name, data=array)
+            annotate(data, field.unit, field.description, field.frame)
+            attach(data, field.dims, [file[d] for d in field.dims])
+
+
+def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int | None) -> None:
+    """Datasets that grow along their first dimension, whose scale is the first of them."""
+    parent = file.require_group(group)
+    for k, field in enumerate(fields):
+        is_text = field.dtype.startswith("S")
+        dtype = h5py.string_dtype("utf-8", int(field.dtype[1:])) if is_text else np.dtype(field.dtype)
+        size = int(dtype.itemsize * np.prod(field.shape, dtype=int))
+        chunk = max(1, min(_CHUNK_BYTES // max(size, 1), BLOCK, rows or BLOCK))
+        data = parent.create_dataset(
+            field.name, (0, *field.shape), dtype, maxshape=(None, *field.shape), chunks=(chunk, *field.shape)
+        )
+        annotate(data, field.unit, field.description, field.frame)
+        if k == 0:
+            scale = data
+            scale.make_scale(field.name)
+            data.dims[0].label = data.name.lstrip("/")
+        else:
+            attach(data, (scale.name.lstrip("/"), *field.dims), [scale, *(file[d] for d in field.dims)])
+
+
+def attach(data: h5py.Dataset, dims: Sequence[str], scales: Sequence[h5py.Dataset]) -> None:
+    for k, (dim, scale) in enumerate(zip(dims, scales, strict=True)):
+        data.dims[k].label = dim
+        data.dims[k].attach_scale(scale)
+
+
+def annotate(data: h5py.Dataset, unit: str, description: str, frame: str = "") -> None:
+    data.attrs["units"], data.attrs["description"] = unit, description
+    data.attrs["long_name"] = description  # this and "units" are what netCDF programs look for
+    if frame:
+        data.attrs["frame"] = frame
+
+
+def check_names(
+    fields: Sequence[Field], step_fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
+) -> None:
+    both = [*fields, *(f for f, _ in fixed)]
+    for names in ([f.name for f in both], [f.name for f in step_fields]):
+        if len(set(names)) < len(names):
+            raise ResultError(f"fields given twice: {', '.join(sorted({n for n in names if names.count(n) > 1}))}")
+    for field in both:
+        if field.name.split("/")[0] in _RESERVED:
+            raise ResultError(f"the name '{field.name}' is taken by the recorder itself")
+        if len(field.shape) != len(field.dims):
+            raise ResultError(f"field '{field.name}' has shape {field.shape} but dims {field.dims}")
+    for field in step_fields:
+        if field.shape:
+            raise ResultError(f"field '{field.name}' of the step log must be a number, not of shape {field.shape}")
+
+
+def checked(field: Field, values: np.ndarray, t: float | None) -> np.ndarray:
+    """The values, or ResultError when their shape is wrong or one of them is not finite."""
+    if values.shape != field.shape:
+        raise ResultError(f"field '{field.name}' has shape {values.shape}, expected {field.shape}")
+    if not (field.nan_ok or values.dtype.kind != "f" or np.isfinite(values).all()):
+        bad = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0]
+        at = f" at t = {float(t):.9g} s" if t is not None else ""
+        raise ResultError(f"field '{field.name}' is not finite{at} (first at index {tuple(int(k) for k in bad)})")
+    return values
+
+
+def fixed_text(text: str, dtype: np.dtype) -> np.ndarray:
+    return np.array(cut(text, dtype.itemsize), dtype=dtype)
+
+
+def cut(text: str, width: int) -> bytes:
+    """UTF-8 of at most `width` bytes, cut between characters."""
+    return str(text).encode()[:width].decode("utf-8", "ignore").encode()
+
+
+def set_status(file: h5py.File, status: str, message: str) -> None:
+    for name, text in (("status", status), ("message", message)):
+        file.attrs.modify(name, fixed_text(text, file.attrs.get_id(name).dtype))

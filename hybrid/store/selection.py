@@ -1,0 +1,273 @@
+"""What of a result goes into another file, and how that file comes to be whole or not at all.
+
+A `Part` is a choice: some fields, outputs of some time, the grid of the result or given arc lengths.  All formats
+start from one, so that `--names`, `--times` and `--at` mean the same in each.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from importlib import import_module
+from importlib.metadata import PackageNotFoundError, version
+from math import inf
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import h5py
+import numpy as np
+
+from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
+from hybrid.store.reader import ALIASES
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+Numbers = Sequence[float] | np.ndarray
+Window = tuple[float | None, float | None]
+
+# The first words of everything that is written here, so that a file of somebody else is never replaced.  Not the
+# format of a result: what is exported cannot be opened, plotted or resumed as one.
+MARK = "hybrid-cable export"
+# Kinds of numpy types that other formats have as well: numbers and text.  What lies over named dimensions is either.
+_KINDS = "fiuU"
+
+
+@dataclass(frozen=True)
+class Part:
+    """Fields `names` of a result, at its outputs `rows`, on its own grid or at the arc lengths `at` (m)."""
+
+    result: Result
+    names: tuple[str, ...]
+    rows: slice
+    at: np.ndarray | None
+
+    @property
+    def times(self) -> np.ndarray:
+        """Output times, s."""
+        return np.asarray(self.result["t"][self.rows])
+
+    @property
+    def s(self) -> np.ndarray:
+        """Arc lengths, m."""
+        return np.asarray(self.result["s"] if self.at is None else self.at)
+
+    @property
+    def zones(self) -> list[Any]:
+        """Zones at every output."""
+        return list(self.result.zones[self.rows])
+
+    def array(self, name: str) -> np.ndarray:
+        """A field, or the scale of one of its dimensions."""
+        if name == "s":
+            return self.s
+        dims = self.result.dims(name)
+        if self.at is not None and "s" in dims:
+            array = np.asarray(self.result.at(s=self.at, names=[name])[name])
+        else:
+            array = np.asarray(self.result[name])
+        first = dims[0] if dims else ""
+        if first == "t":
+            return array[self.rows]
+        if first.endswith("/t"):
+            return array[self._rows_of(first)]
+        return array
+
+    def zone_kinds(self, s: np.ndarray) -> tuple[np.ndarray, list[str]]:
+        """Kind of the zone at arc lengths s (m): numbers (nt, len(s)), and what they mean.
+
+        Between two zones the one that begins there counts.
+        """
+        kinds = sorted({zone.kind for zones in self.zones for zone in zones})
+        found = np.zeros((len(self.times), len(s)), dtype=np.int8)
+        before: Any = None
+        for i, zones in enumerate(self.zones):
+            if i and zones == before:
+                found[i] = found[i - 1]
+                continue
+            starts = [zone.s_a for zone in zones]
+            which = np.clip(np.searchsorted(starts, s, side="right") - 1, 0, len(zones) - 1)
+            found[i], before = np.array([kinds.index(zone.kind) for zone in zones])[which], zones
+        return found, kinds
+
+    def _rows_of(self, scale: str) -> np.ndarray:
+        """Rows of a table within the time that was chosen; of zones those that hold then."""
+        t = self.result[scale]
+        if len(self.times) == len(self.result["t"]):
+            return np.arange(len(t))
+        if scale == "zones/t":
+            begun = t[t <= self.times[0]]
+            return np.flatnonzero((t >= (begun[-1] if len(begun) else -inf)) & (t <= self.times[-1]))
+        return np.flatnonzero((t >= self.times[0]) & (t <= self.times[-1]))
+
+
+def part_of(
+    result: Result, names: Sequence[str] | None = None, times: Window | None = None, at: Numbers | None = None
+) -> Part:
+    """Choose: names of fields or groups (None: all), times from and to (s, both included), arc lengths (m).
+
+    ResultError when there is no such name, no output in that time, or no such place.
+    """
+    t = result["t"]
+    if not len(t):
+        raise ResultError(f"the result holds no output yet: there is nothing to export ({result.status_text})")
+    first, last = times or (None, None)
+    a, b = -inf if first is None else first, inf if last is None else last
+    slack = 1e-9 * max(t[-1] - t[0], abs(t[-1]))  # what writing a time in decimals loses
+    rows = np.flatnonzero((t >= a - slack) & (t <= b + slack))
+    if not len(rows):
+        raise ResultError(
+            f"no output lies between t = {a:.9g} and {b:.9g} s\n"
+            f"    expected: a window in {t[0]:.9g} ... {t[-1]:.9g} s, wide enough for one of {len(t)} outputs"
+        )
+    places = None
+    if at is not None:
+        places = np.unique(np.asarray(at, dtype=float))
+        if not len(places):
+            raise ResultError("at = [] is no list of arc lengths\n    try:      at=[0.0]")
+        result.at(s=places, t=t[0], names=["s"])  # refuses what is outside
+    known = _exportable(result)
+    chosen: list[str] = []
+    for name in known if names is None else names:
+        value = None if name in known else result[name]  # refuses what is not there, and says what is near
+        inside = [f"{name}/{key}" for key in value] if isinstance(value, Mapping) else [ALIASES.get(name, name)]
+        if not set(inside) <= set(known):
+            raise ResultError(f"'{name}' is no array of numbers or text over named dimensions: it stays where it is")
+        chosen += [n for n in inside if n not in chosen]
+    if not chosen:
+        raise ResultError("no field was chosen\n    try:      names=['tension']")
+    return Part(result, tuple(chosen), slice(int(rows[0]), int(rows[-1]) + 1), places)
+
+
+def _exportable(result: Result) -> list[str]:
+    """Names of all arrays whose dimensions have names, and of single numbers and texts."""
+    scales = {name for name in result.names if result.dims(name) == (name,)}
+    named = (name for name in result.names if set(result.dims(name)) <= scales)
+    return [name for name in named if result.dims(name) or np.asarray(result[name]).dtype.kind in _KINDS]
+
+
+# ---- what every file says of itself ---------------------------------------------------------------
+
+
+def facts(part: Part) -> dict[str, Any]:
+    """Attributes of a file: those of the result, what was done to it, and what is missing."""
+    result = part.result
+    own = {k: v for k, v in result.attributes.items() if k not in ("format", "format_version")}
+    made = {"format": MARK, "exported_from": result.file.name if result.file else "a result in memory"}
+    said = {"noted": ", ".join(noted(part)), "left_out": "; ".join(shortfalls(part))}
+    return made | own | {"exported_by": f"hybrid-cable {_version()}"} | said
+
+
+def noted(part: Part) -> list[str]:
+    """Kinds of events of the run that call its answer into question, the worst first."""
+    kinds = {event.kind for event in part.result.events}
+    return [kind for kind in EVENTS_BY_WEIGHT if kind in kinds]
+
+
+def shortfalls(part: Part) -> list[str]:
+    """What a reader of the file must know: the run is not complete, or only some of it is there."""
+    said, t, whole = [], part.times, part.result["t"]
+    if part.result.status != "complete":
+        said.append(f"the run is not complete ({part.result.status_text}): t ends at {whole[-1]:.9g} s")
+    if len(t) < len(whole):
+        said.append(f"only t = {t[0]:.9g} to {t[-1]:.9g} s of {whole[0]:.9g} to {whole[-1]:.9g} s")
+    return said
+
+
+def head_lines(part: Part) -> list[str]:
+    """The beginning of a text file, without the marks of a comment: title, origin, status."""
+    result, own = part.result, facts(part)
+    lines = [f"title: {result.title}", f"result: {own['exported_from']}, {result.status_text}"]
+    lines += [f"note: {text}" for text in shortfalls(part)]
+    lines += [f"the run noted: {', '.join(noted(part))}; see its events"] if noted(part) else []
+    lines.append("computed by: " + ", ".join(f"{k} {v}" for k, v in result.versions.items()))
+    lines.append(f"computed: {own['created']}; exported by: {own['exported_by']}")
+    return lines
+
+
+def scene_lines(part: Part) -> list[str]:
+    return ["scene:", *(f"  {line}".rstrip() for line in part.result.scene_text.splitlines())]
+
+
+def error_name(part: Part, name: str) -> tuple[str, str]:
+    """The field of the estimated error of a field, and which error it is; ("", "") where none was estimated."""
+    for kind, said in (("total", "estimated"), ("model", "of the model alone")):
+        if f"errors/{kind}/{name}" in part.result:
+            return f"errors/{kind}/{name}", said
+    return "", ""
+
+
+def needed(package: str, what: str) -> Any:
+    """A package that only an export needs; ResultError with the command that installs it when it is not there."""
+    try:
+        return import_module(package)
+    except ImportError as error:
+        raise ResultError(
+            f"{what} needs the package '{package}', which cannot be imported\n"
+            f'    detail:   {error}\n    try:      pip install "hybrid-cable[export]"'
+        ) from error
+
+
+def _version() -> str:
+    try:
+        return version("hybrid-cable")
+    except PackageNotFoundError:  # run from a checkout that was not installed
+        return "unknown"
+
+
+# ---- whole or not at all --------------------------------------------------------------------------
+
+
+def write_whole(files: Mapping[Path, bytes | memoryview], overwrite: bool) -> None:
+    """Write all files or none, each beside its place first.  ResultError when that cannot be done.
+
+    The files are made in memory: where a disk is full, HDF5 cannot close what it writes, and takes the interpreter
+    down with it.
+    """
+    for path in files:
+        check_place(path, overwrite)
+    new = {path: path.with_name(f".{path.name}.{os.getpid()}.new") for path in files}
+    try:
+        for path, content in files.items():
+            new[path].write_bytes(content)
+        for path in files:
+            os.replace(new[path], path)
+    except OSError as error:
+        advice = "a folder you may write to, with free space; close programs that hold the file"
+        names = " and ".join(map(str, files))
+        raise ResultError(f"{names} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
+    finally:
+        for path in new.values():
+            with suppress(OSError):
+                path.unlink(missing_ok=True)
+
+
+def check_place(path: Path, overwrite: bool) -> None:
+    """ResultError if nothing can or may be written there."""
+    why, advice = "", "another name, or delete the file yourself"
+    if path.is_dir():
+        why, advice = "is a folder", "name a file in it"
+    elif not path.parent.is_dir():
+        raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
+    elif path.exists():
+        if not overwrite:
+            why, advice = "exists", "another name, or allow overwriting"
+        elif not os.access(path, os.W_OK):
+            why = "exists and is write-protected"
+        elif path.stat().st_size and not is_export(path):
+            why = "exists and was not exported by hybrid"
+    if why:
+        raise ResultError(f"{path} {why}\n    try:      {advice}")
+
+
+def is_export(path: Path) -> bool:
+    """Whether a file was written by an export."""
+    with path.open("rb") as file:
+        if file.read(2 + len(MARK)) == f"# {MARK}".encode():
+            return True
+    with suppress(OSError), h5py.File(path, "r", locking="best-effort") as file:
+        mark = file.attrs.get("format", "")
+        return (mark.decode() if isinstance(mark, bytes) else str(mark)) == MARK
+    return False

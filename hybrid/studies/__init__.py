@@ -1,0 +1,1 @@
+"""Many runs: error against cost, and other programs on the same scene."""

@@ -1,0 +1,107 @@
+"""Other people's cable codes on a scene of ours: an adapter for each, which runs in a process of its own.
+
+    CableDyn   finite elements, implicit                      decks.py
+    MoorDyn    lumped masses, explicit                        decks.py
+    Exudyn     planar cable elements (ANCF), implicit         ancf.py
+
+What they all can do is a uniform line between two points that are held or moved as prescribed, in still water, on a
+level seabed; of anything else `unfit` says why not.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import importlib.util
+import json
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from importlib.metadata import version
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.scene.ends import Pinned
+from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
+from hybrid.studies.peers.ancf import Exudyn
+from hybrid.studies.peers.decks import CableDyn, MoorDyn
+from hybrid.studies.peers.seam import Answer, Failed, Guest, Peer
+
+CANNOT = "cannot do"
+PATIENCE = 900.0  # s of wall time for one run: what takes longer is no choice
+PEERS: Mapping[str, Peer] = {"CableDyn": CableDyn(), "MoorDyn": MoorDyn(), "Exudyn": Exudyn()}
+
+
+def unfit(scene: Scene) -> str:
+    """Why other codes cannot do a scene; "" if they can."""
+    if scene.initial.kind != "equilibrium":
+        return f"the cable starts {scene.initial.kind}, not in equilibrium"
+    if len(scene.cable.sections) > 1:
+        return "the cable has more than one section"
+    if scene.cable.attachments:
+        return "something is attached to the cable"
+    section = scene.cable.sections[0].model_dump(exclude_none=True)
+    known = {"length", "mass", "diameter", "axial_stiffness", "bending_stiffness", "torsional_stiffness", "drag"}
+    other = sorted(set(section) - known - {"added_mass", "rotary_inertia"})
+    if other:
+        return f"the section has {', '.join(other)}"
+    if "axial_stiffness" not in section or "diameter" not in section:
+        return "the cable is inextensible, or has no diameter"
+    if isinstance(section.get("bending_stiffness"), tuple) or section.get("added_mass", {}).get("tangential"):
+        return "the cable bends differently in two directions, or has added mass along it"
+    if not all(isinstance(end, Pinned) for end in (scene.ends.start, scene.ends.end)):
+        return "an end is not pinned"
+    fluid, bed = scene.environment.fluid, scene.environment.seabed
+    if fluid is None:
+        return "there is no water"
+    if fluid.waves is not None or fluid.flows():
+        return "the water moves"
+    if bed is not None and (bed.friction is not None or (bed.slope is not None and any(bed.slope))):
+        return "the seabed has friction or a slope"
+    return ""
+
+
+def ladder(scene: Scene) -> list[Guest]:
+    """Runs of those codes that are installed; of a scene they cannot do one each, that says why."""
+    installed = [code for code, peer in PEERS.items() if importlib.util.find_spec(peer.package) is not None]
+    reason = unfit(scene)
+    if reason:
+        return [Guest(code, PEERS[code].model, PEERS[code].package, cannot=reason) for code in installed]
+    return [
+        Guest(code, PEERS[code].model, PEERS[code].package, *how) for code in installed for how in PEERS[code].settings
+    ]
+
+
+def versions(guests: Sequence[Guest]) -> str:
+    """Of the programs in a ladder."""
+    names = dict.fromkeys(guest.package for guest in guests if not guest.cannot)
+    return ", ".join(f"{name} {version(name)}" for name in names)
+
+
+def driver(guest: Guest) -> str:
+    """What decides its answer besides the scene: these files, and its version."""
+    digest = hashlib.sha256()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.hexdigest() if guest.cannot else f"{digest.hexdigest()} {versions([guest])}"
+
+
+def answer(guest: Guest, scene: Scene) -> Answer:
+    """Run it, in a process of its own; Failed if it does not come to an end."""
+    with tempfile.TemporaryDirectory() as folder:
+        task = {"scene": scene_text(scene), "guest": asdict(guest)}
+        Path(folder, "task.json").write_text(json.dumps(task), encoding="utf-8")
+        command = [sys.executable, "-m", "hybrid.studies.peers", folder]
+        try:
+            done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+        except subprocess.TimeoutExpired:
+            raise Failed(f"not done after {PATIENCE:g} s") from None
+        if done.returncode:
+            last = (done.stderr.strip().splitlines() or [f"it left with code {done.returncode}"])[-1]
+            raise Failed(last[:200])
+        cost = json.loads(Path(folder, "cost.json").read_text(encoding="utf-8"))
+        with np.load(Path(folder, "values.npz")) as file:
+            return Answer({name: file[name] for name in file.files}, **cost)

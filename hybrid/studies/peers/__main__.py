@@ -1,0 +1,47 @@
+"""The process of another program: `python -m hybrid.peers FOLDER` does the task in the folder."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.model.plan import output_times
+from hybrid.scene.read import parse_scene
+from hybrid.studies.peers import PEERS
+from hybrid.studies.peers.seam import Failed, Guest, line_of
+
+
+@contextmanager
+def silence() -> Iterator[None]:
+    """Some of them report on the standard output, past Python's own."""
+    sys.stdout.flush()
+    kept = os.dup(1)
+    with open(os.devnull, "w") as hole:
+        os.dup2(hole.fileno(), 1)
+    try:
+        yield
+    finally:
+        os.dup2(kept, 1)
+        os.close(kept)
+
+
+def main(folder: Path) -> None:
+    """Do it, and leave values.npz and cost.json."""
+    task = json.loads((folder / "task.json").read_text(encoding="utf-8"))
+    scene, guest = parse_scene(task["scene"]), Guest(**task["guest"])
+    with silence():
+        found = PEERS[guest.code].march(line_of(scene), guest, [0.0, *output_times(scene)])
+    if not all(np.isfinite(x).all() for x in found.values.values()):
+        raise Failed("its answer is not finite")
+    np.savez(folder / "values.npz", **found.values)  # type: ignore[arg-type]
+    (folder / "cost.json").write_text(json.dumps({"cpu": found.cpu, "steps": found.steps}), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))

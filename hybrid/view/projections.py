@@ -1,0 +1,167 @@
+"""What to look at: planes that suit a cable's shape, how much of its surroundings, which times and points tell most."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.store.reader import Result, Zone
+
+Numbers = Sequence[float] | np.ndarray
+STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
+_SHAPES = 9  # earlier shapes on a page; more become a blur
+_NEAR = 0.4  # of the height of a shape: a seabed or a surface so close to it is shown with it
+
+
+class View(NamedTuple):
+    """A plane to look at: two unit vectors (inertial) and what to write on the axes."""
+
+    across: np.ndarray
+    up: np.ndarray
+    across_label: str
+    up_label: str
+
+    def project(self, position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        return position @ self.across, position @ self.up
+
+    @property
+    def upright(self) -> bool:
+        return bool(self.up[2] == 1.0)
+
+
+def views_of(result: Result) -> list[View]:
+    """One plane if the cable stays in one, else two projections: of a line across x and y, along it and across."""
+    x, y, z = extents = np.ptp(result.position, axis=(0, 1))
+    normal = min((1, 0, 2), key=lambda k: extents[k])
+    if _is_flat(result.position, np.eye(3)[normal]):
+        return [view_named("xyz".replace("xyz"[normal], ""))]
+    level = result.position[..., :2].reshape(-1, 2)
+    ahead = np.linalg.eigh(np.cov(level.T))[1][:, 1]  # the direction of the largest horizontal extent
+    ahead *= math.copysign(1.0, ahead[np.argmax(np.abs(ahead))])
+    sideways, angle = np.array([-ahead[1], ahead[0], 0.0]), math.degrees(math.atan2(ahead[1], ahead[0]))
+    along = View(np.array([*ahead, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")
+    if _is_flat(result.position, sideways):
+        return [along]
+    if z >= max(x, y) and not touches_bed(result):
+        return [view_named("xz"), view_named("yz")]
+    if np.ptp(level @ sideways[:2]) < 0.08 * min(x, y):  # in x-y it would be a mere line
+        return [along, along._replace(up=sideways, up_label="across")]
+    return [view_named("xz"), view_named("xy")] if x >= y else [view_named("yz"), view_named("yx")]
+
+
+def _is_flat(position: np.ndarray, normal: np.ndarray) -> bool:
+    """Whether what leaves the plane is below 2 % of the extent, and little beside the sag and the motion in it."""
+    out = position @ normal
+    inside = (position - out[..., None] * normal).reshape(-1, 3)
+    across = np.ptp(inside @ np.linalg.eigh(np.cov(inside.T))[1][:, 1])  # of three axes: normal, across, along
+    largest, moves = np.ptp(inside, axis=0).max(), np.ptp(position, axis=0).max()
+    flat, still = (max(x, STILL * largest) for x in (min(0.02 * largest, 0.1 * across), 0.2 * moves))
+    return bool(np.ptp(out) <= flat and np.ptp(out, axis=0).max() <= still)
+
+
+def view_named(plane: str) -> View:
+    if len(plane) != 2 or not set(plane) <= set("xyz") or plane[0] == plane[1]:
+        raise ResultError(f"view '{plane}' is not a plane\n    expected: two of the letters x, y, z, such as 'xz'")
+    return View(*(np.eye(3)["xyz".index(c)] for c in plane), *plane)
+
+
+def whole_zones(zones: list[Zone]) -> list[Zone]:
+    """Zones with neighbours of one kind made one, since nothing happens between them."""
+    whole: list[Zone] = []
+    for zone in zones:
+        if whole and whole[-1].kind == zone.kind:
+            zone = zone._replace(s_a=whole.pop().s_a)
+        whole.append(zone)
+    return whole
+
+
+def touches_bed(result: Result) -> bool:
+    """Whether the cable ever touches a seabed."""
+    return "contact" in result and "touchdown" in result and bool(np.isfinite(result["touchdown"]).any())
+
+
+def free_edges(result: Result) -> list[int]:
+    """First and last contact with a seabed, 0 and 1: those that there ever are, and not only where the cable ends."""
+    edges, s = result["touchdown"] if "touchdown" in result else np.full((0, 2), np.nan), result.s
+    known = np.isfinite(edges).all(axis=1)
+    if not known.any():
+        return []
+    held = np.abs(edges[known] - s[[0, -1]]).max(axis=0) < 0.005 * (s[-1] - s[0])  # lies to its very end
+    return [0, 1] if held.all() else [int(k) for k in np.flatnonzero(~held)]
+
+
+def bed_in(view: View, result: Result) -> tuple[float, float] | None:
+    """The seabed in an upright view, where the cable lies: height at the origin, and rise per metre across."""
+    if "seabed" not in result or not view.upright:
+        return None
+    *normal, offset = result["seabed"]
+    out, last = np.cross(view.across, view.up), result.position[-1]
+    lying = result["contact"][-1] > 0.0 if "contact" in result else np.zeros(len(last), bool)
+    depth = float((last[lying] if lying.any() else last).mean(axis=0) @ out)  # of the bed, behind the paper
+    return (offset - depth * (normal @ out)) / normal[2], -(normal @ view.across) / normal[2]
+
+
+def extent_in(view: View, result: Result) -> np.ndarray:
+    """What is to be seen, low and high, across and up (2, 2): the cable, and a seabed or a surface near to it."""
+    across, up = view.project(result.position)
+    box = np.array([[across.min(), across.max()], [up.min(), up.max()]])
+    room = _NEAR * max(np.ptp(box[1]), 0.3 * np.ptp(box[0]))
+    bed = bed_in(view, result)
+    if bed is not None and np.min(up - bed[0] - bed[1] * across) < room:
+        box[1, 0] = min(box[1, 0], max(bed[0] + min(bed[1] * box[0]), box[1, 0] - room)) - 0.1 * room  # a strip of sand
+    if "surface" in result and view.upright and box[1, 0] < float(result["surface"]) < box[1, 1] + room:
+        box[1, 1] = max(box[1, 1], float(result["surface"]) + 0.1 * room)  # and of air
+    return box
+
+
+def magnification(view: View, result: Result) -> tuple[float, float]:
+    """Factors across and up: 1, but a round number that opens the smaller one where it would be a mere line."""
+    across, up = np.ptp(extent_in(view, result), axis=1).tolist()
+    ratio = min(across, up) / max(across, up, 1e-300)
+    if not STILL < ratio < 0.08:  # straighter than that is straight; less straight needs no help
+        return 1.0, 1.0
+    most = 0.32 / ratio  # about the shape of the flattest panel
+    power = 10.0 ** math.floor(math.log10(most))
+    factor = power * max(m for m in (1, 1.5, 2, 3, 4, 5, 7) if m * power <= most)
+    return (1.0, factor) if up < across else (factor, 1.0)
+
+
+def aspect_of(views: list[View], result: Result) -> float:
+    """Width over height as drawn; the geometric mean of the views; of a straight line, something large or small."""
+    sizes = np.array([np.ptp(extent_in(v, result), axis=1) * magnification(v, result) for v in views])
+    sizes += 1e-9 * sizes.max() + 1e-300
+    return float(np.exp(np.mean(np.log(sizes[:, 0] / sizes[:, 1]))))
+
+
+def telling_times(result: Result) -> np.ndarray:
+    """Times of the earlier shapes that show the motion: the first, then always the one farthest from all taken.
+
+    Even steps of time show nothing of a quick relaxation, and even steps of time or of
+    distance travelled fall on the same phases of a periodic motion; this finds its extremes.
+    """
+    if len(result.times) < 2:
+        return np.zeros(0)
+    position = result.position[:, :: 1 + len(result.s) // 50]  # 50 points tell shapes apart
+    least = STILL * float(np.max(np.ptp(position.reshape(-1, 3), axis=0)))
+    away = np.linalg.norm(position - position[-1], axis=2).max(axis=1)
+    taken: list[int] = []
+    while len(taken) < _SHAPES and away.max() > least:
+        taken.append(int(away.argmax()) if taken else 0)
+        away = np.minimum(away, np.linalg.norm(position - position[taken[-1]], axis=2).max(axis=1))
+    return np.sort(result.times[taken])
+
+
+def history_points(result: Result, history: Numbers | None) -> np.ndarray:
+    """By default the middle and the ends, or where an end is held the quarter point beside it; on a seabed the ends."""
+    moves = np.ptp(result.position, axis=0).max(axis=1)
+    start, end = (bool(m <= 1e-3 * moves.max()) and not touches_bed(result) for m in moves[[0, -1]])  # held
+    quarters = np.linspace(result.s[0], result.s[-1], 5)[[start, 2, 4 - end]]
+    given = result["history"] if history is None and "history" in result else history
+    points = np.asarray(quarters if given is None else given, dtype=float)
+    if points.ndim != 1 or len(points) == 0:
+        raise ResultError(f"history = {history!r} is no list of arc lengths\n    try:      history=[0.0]")
+    return points

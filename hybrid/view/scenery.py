@@ -1,0 +1,181 @@
+"""The cable in space for a report: frames of its shape, what colours it, and what is around it.
+
+Numbers only; the page turns them into a picture that moves.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybrid.store.reader import Result
+from hybrid.view.decimate import Kept, Store
+from hybrid.view.figures import colour_scale
+from hybrid.view.projections import STILL
+from hybrid.view.style import BED, BODY, INK, KIND_COLOURS, LEVEL, SAND, WATER, prefix
+from hybrid.view.zone_plot import COLOURS
+
+# Pale shades would be lost on white: of nine, those from here on.
+_FROM_SHADE = 2
+_SPAN, _DECADES = 10.0, 2.0  # a curvature that varies by more is shown by its logarithm, over so many decades at most
+_THIN = 0.12  # of the largest extent: the least depth of the box around a flat cable, so that planes in it are seen
+_OPEN = 0.45  # of the largest extent: what a thin direction is opened to where axes are stretched
+_NEAR = 1.0  # of the largest extent: a seabed or a surface farther from the cable is not drawn
+
+
+def scenery(result: Result, store: Store, shown: Kept) -> dict[str, Any]:
+    """Everything the moving picture needs; {} without outputs."""
+    if not len(shown.frames):
+        return {}
+    position = result.position
+    box = np.array([position.min(axis=(0, 1)), position.max(axis=(0, 1))])
+    planes = _planes(result, box)
+    extent = np.ptp(box, axis=0)
+    size = float(extent.max()) or 1.0
+    room = np.maximum(0.5 * (_THIN * size - extent), 0.03 * size)  # thin directions get some depth, others a margin
+    box += np.array([-room, room])
+    factors = np.maximum(_OPEN * np.ptp(box, axis=0).max() / np.ptp(box, axis=0), 1.0)
+    rows = np.ix_(shown.frames, shown.points)
+    frames = position[rows].transpose(2, 0, 1)
+    return {
+        "times": [float(t) for t in result.times[shown.frames]],
+        "s": store.add(result.s[shown.points]),
+        **{axis: store.add(frames[k]) for k, axis in enumerate("xyz")},
+        "colours": _colours(result, store, shown),
+        "marks": _marks(result, store, shown),
+        "planes": [_plane(plane, box) for plane in planes],
+        "far": [plane["text"] for plane in planes if plane["far"]],
+        "box": box.T.tolist(), "factors": factors.tolist(), "ink": INK,
+        "speed": speed_of(result),
+    }  # fmt: skip
+
+
+def speed_of(result: Result, seconds: float = 12.0) -> float:
+    """How much faster than real time the motion is played: a round number near so many seconds for all of it."""
+    span = float(np.ptp(result.times)) if len(result.times) > 1 else 0.0
+    if span == 0.0:
+        return 1.0
+    power = 10.0 ** np.floor(np.log10(span / seconds))
+    return float(f"{max(m * power for m in (1, 2, 5) if m * power <= span / seconds * (1 + 1e-9)):.6g}")
+
+
+# ---- colours --------------------------------------------------------------------------------------
+
+
+def _colours(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
+    """Ways to colour the cable: by zone, tension, curvature."""
+    rows = np.ix_(shown.frames, shown.points)
+    kinds = list(dict.fromkeys(zone.kind for zones in result.zones for zone in zones))
+    out: list[dict[str, Any]] = []
+    if kinds:
+        of = np.array([_kinds(result.zones[i], kinds, result.s[shown.points]) for i in shown.frames])
+        steps = [[(k + d) / len(kinds), KIND_COLOURS.get(kind, INK)] for k, kind in enumerate(kinds) for d in (0, 1)]
+        legend = [[kind, KIND_COLOURS.get(kind, INK)] for kind in kinds]
+        out.append(
+            {"key": "zone", "label": "zone", "values": store.add(of, "u1"), "scale": steps, "legend": legend}
+            | {"low": -0.5, "high": len(kinds) - 0.5}
+        )
+    straight = STILL / (float(np.ptp(result.s)) or 1.0)
+    for name, shades in (("tension", COLOURS["catenary"]), ("curvature", COLOURS["rod"])):
+        if name not in result:
+            continue
+        values = result[name]
+        factor, unit = prefix(result.units[name], float(np.abs(values).max()))
+        low, high, log = span_of(values * factor, bends=name == "curvature", straight=straight * factor)
+        out.append(
+            {"key": name, "label": f"{name} ({unit})", "values": store.add(values[rows] * factor), "unit": unit}
+            | {"scale": colour_scale(shades[_FROM_SHADE:]), "low": low, "high": high, "log": log}
+        )
+    return out
+
+
+def _kinds(zones: list[Any], kinds: list[str], s: np.ndarray) -> np.ndarray:
+    """Number of the kind of the zone at every point; on a joint that before it."""
+    ends = np.array([zone.s_b for zone in zones[:-1]])
+    order = np.array([kinds.index(zone.kind) for zone in zones])
+    return order[np.searchsorted(ends + 1e-9 * s[-1], s)] if len(order) else np.zeros(len(s), int)
+
+
+def span_of(values: np.ndarray, *, bends: bool, straight: float = 0.0) -> tuple[float, float, bool]:
+    """From where to where colours run, and whether by the logarithm: bends that span much; tension from zero."""
+    seen = values[np.isfinite(values)]
+    if not len(seen):
+        return 0.0, 1.0, False
+    low, high = float(seen.min()), float(seen.max())
+    if bends:
+        if high <= straight:
+            return 0.0, straight or 1.0, False
+        usual = float(np.percentile(seen, 5))
+        return (max(usual, 10.0**-_DECADES * high), high, True) if usual < high / _SPAN else (0.0, high, False)
+    low = 0.0 if 0.0 < low < 0.5 * high else low
+    least = 1e-3 * max(abs(low), abs(high)) or 1.0  # less would show round-off
+    return low, max(high, low + least), False
+
+
+# ---- what is on the cable, and around it ----------------------------------------------------------
+
+
+def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
+    """Points that move with the cable: its ends, what is attached, touchdown."""
+    s, position = result.s, result.position[shown.frames]
+
+    def at(where: np.ndarray) -> np.ndarray:
+        """Positions (nf, n, 3) at arc lengths, between grid points."""
+        k = np.clip(np.searchsorted(s, where), 1, len(s) - 1)
+        p = ((where - s[k - 1]) / (s[k] - s[k - 1]))[:, None]
+        return np.asarray(position[:, k - 1] * (1 - p) + position[:, k] * p)
+
+    def mark(name: str, places: np.ndarray, symbol: str, colour: str, size: float) -> dict[str, Any]:
+        moves = places.transpose(2, 0, 1)
+        return {"name": name, "symbol": symbol, "colour": colour, "size": size} | {
+            axis: store.add(moves[k]) for k, axis in enumerate("xyz")
+        }
+
+    marks = [mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 5)]
+    if "attached" in result and len(s) > 1:
+        marks.append(mark("float, clump, body", at(result["attached"]), "circle", BODY, 8))
+    if "touchdown_position" in result:
+        places, edges = result["touchdown_position"][shown.frames].copy(), result["touchdown"][shown.frames]
+        places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
+        if np.isfinite(places).any():
+            marks.append(mark("touchdown", places, "diamond", BED, 5))
+    return marks
+
+
+def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
+    """Seabed and still water; the box (2, 3) grows to hold those that are near."""
+    size = float(np.ptp(box, axis=0).max()) or 1.0
+    planes = []
+    if "seabed" in result:
+        *normal, offset = result["seabed"].tolist()
+        planes.append({"name": "seabed", "normal": normal, "offset": offset, "fill": SAND, "line": BED, "solid": 0.85})
+    if "surface" in result:
+        surface = float(result["surface"])
+        planes.append(
+            {"name": "still water", "normal": [0.0, 0.0, 1.0], "offset": surface, "fill": WATER}
+            | {"line": LEVEL, "solid": 0.45}
+        )
+    for plane in planes:
+        normal, offset = plane["normal"], plane["offset"]
+        corners = [(offset - normal[0] * x - normal[1] * y) / normal[2] for x in box[:, 0] for y in box[:, 1]]
+        low, high = min(corners), max(corners)
+        gap = max(box[0, 2] - high, low - box[1, 2], 0.0)
+        plane["far"] = gap > _NEAR * size
+        plane["text"] = f"{plane['name']} at z = {offset / normal[2]:.4g} m"
+    for plane in (x for x in planes if not x["far"]):
+        level = plane["offset"] / plane["normal"][2] if plane["normal"][:2] == [0.0, 0.0] else None
+        if level is not None:
+            box[:, 2] = min(box[0, 2], level), max(box[1, 2], level)
+    return planes
+
+
+def _plane(plane: dict[str, Any], box: np.ndarray) -> dict[str, Any]:
+    """Its four corners in the box, and how it looks."""
+    if plane["far"]:
+        return {}
+    normal, offset = plane["normal"], plane["offset"]
+    x, y = box[[0, 1, 1, 0], 0], box[[0, 0, 1, 1], 1]
+    z = (offset - normal[0] * x - normal[1] * y) / normal[2]
+    look = {key: plane[key] for key in ("name", "fill", "line", "solid", "text")}
+    return look | {"x": x.tolist(), "y": y.tolist(), "z": z.tolist()}

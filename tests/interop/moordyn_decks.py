@@ -1,0 +1,25 @@
+"""The decks of tests/data/moordyn, and one small deck that tests change."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from hybrid.interop.moordyn import ImportedDeck, import_moordyn
+
+FOLDER = Path(__file__).parents[1] / "data" / "moordyn"
+DECKS = sorted(path.stem for path in FOLDER.glob("*.txt"))
+
+
+def text_of(name: str) -> str:
+    return (FOLDER / f"{name}.txt").read_text(encoding="utf-8")
+
+
+def imported(name: str, line: int | None = None) -> ImportedDeck:
+    return import_moordyn(FOLDER / f"{name}.txt", line)
+
+
+def from_text(text: str, folder: Path) -> ImportedDeck:
+    """Import a text; the deck is called deck.txt."""
+    path = folder / "deck.txt"
+    path.write_bytes(text.encode("utf-8", errors="surrogateescape"))
+    return import_moordyn(path)

@@ -1,0 +1,140 @@
+"""Machine code on disk: an edited kernel is compiled anew, wherever it stands; other people's caches are left alone."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hybrid
+
+PACKAGE = Path(hybrid.__file__).parent
+
+# The law that is edited stands in another file than the kernels that use it: numba alone would not notice.
+LAW, TWICE = "    l = math.sqrt(dot(e, e))\n", "    l = 2.0 * math.sqrt(dot(e, e))\n"
+
+# Twice the bending stiffness, in the law and in its derivative.
+STIFF = "    n = (kb[0] * (k[0] - k0[0]), "
+TWICE_AS_STIFF = "    kb = (2.0 * kb[0], 2.0 * kb[1], 2.0 * kb[2])\n" + STIFF
+
+SPIN = """
+import numpy as np
+from hybrid.model.material import POINT
+from hybrid.kernels.state import Ends, Line, blank_state
+from hybrid.kernels.energies import observe
+
+WET = ("drag_n", "drag_t", "added_n", "added_t", "buoy", "displaced", "diameter")
+# one cell of a rod, 1 m long, whose two ends swing against each other: rotary energy ~ (turn rate)^2 ~ 1/l^2
+line = Line(
+    s=np.array([0.0, 1.0]), h=np.ones(1), ck=np.zeros(1), mass=np.zeros(2), force=np.zeros((2, 3)),
+    element=np.zeros(2, np.int8), spin=np.ones(1, np.int8), kb=np.zeros((2, 3)), k0=np.zeros((2, 3)),
+    hn=np.full(2, 0.5), rotary=np.ones(1), polar=np.ones(1), damp=np.zeros(2), tau=np.zeros(1),
+    **{x: np.zeros(1) for x in WET}, footing=np.zeros(2), **{x: np.zeros(2) for x in POINT}, bits=16,
+)
+z = np.zeros((2, 3))
+ends = Ends(np.zeros(2, np.int8), z, np.zeros((2, 9)), z, z, z)
+state = blank_state(1)
+state.e[0], state.v[1], state.a1[0] = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 1.0, 0.0)
+energy = np.zeros(5)
+observe(line, ends, state.e, state.v, state.a1, state.w, np.zeros((2, 3)), np.zeros((2, 3)), energy)
+print(energy[0])
+"""
+
+SCENE = """
+import hybrid
+section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_stiffness": 1.0}
+scene = hybrid.validate_scene({
+    "cable": {"sections": [section]},
+    "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
+    "initial": "equilibrium", "model": "rod", "mesh": {"cells": 4},
+})
+print(hybrid.static(scene).position[0, -1, 2])
+"""
+
+
+def answer(folder: Path, script: str) -> float:
+    """What a script prints with the copy of the package in `folder` and the cache beside it; a warning fails it."""
+    environment = os.environ | {
+        "PYTHONPATH": str(folder),
+        "HYBRID_CACHE_DIR": str(folder / "cache"),
+        "PYTHONWARNINGS": "error",
+        "PYTHONDONTWRITEBYTECODE": "1",
+    }
+    command = [sys.executable, "-c", script]
+    done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return float(done.stdout)
+
+
+def compiled(folder: Path) -> set[Path]:
+    """Machine code of the copy in `folder`."""
+    return set((folder / "cache").rglob("*.nbc"))
+
+
+@pytest.fixture
+def copy(tmp_path: Path) -> Path:
+    """A folder with a copy of the package to edit."""
+    shutil.copytree(PACKAGE, tmp_path / "hybrid", ignore=shutil.ignore_patterns("__pycache__"))
+    return tmp_path
+
+
+def edit(folder: Path, file: str, old: str, new: str) -> None:
+    path = folder / "hybrid" / file
+    text = path.read_text()
+    assert text.count(old) == 1, f"{file} holds {text.count(old)} times {old!r}"
+    path.write_text(text.replace(old, new))
+
+
+def test_an_edit_in_another_file_compiles_anew(copy: Path) -> None:
+    assert answer(copy, SPIN) == pytest.approx(2.0)
+    kept = compiled(copy)
+    assert kept
+    assert answer(copy, SPIN) == pytest.approx(2.0)
+    assert compiled(copy) == kept, "a second process compiles nothing"
+    edit(copy, "kernels/cell.py", LAW, TWICE)
+    assert answer(copy, SPIN) == pytest.approx(0.5)
+    assert compiled(copy) > kept
+
+
+@pytest.mark.slow
+def test_a_scene_follows_an_edited_kernel_and_starts_warm_otherwise(copy: Path) -> None:
+    sag = answer(copy, SCENE)
+    kept = compiled(copy)
+    assert answer(copy, SCENE) == sag
+    assert compiled(copy) == kept, "a second process compiles nothing"
+    edit(copy, "kernels/element.py", STIFF, TWICE_AS_STIFF)
+    assert answer(copy, SCENE) == pytest.approx(0.5 * sag, rel=1e-3)
+
+
+def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
+    """The user's setting of numba's cache folder is the same before and after, and honoured."""
+    (tmp_path / "mine.py").write_text("import numba\n@numba.njit(cache=True)\ndef twice(x):\n    return 2.0 * x\n")
+    script = (
+        "import numba.core.config as config\nbefore = config.CACHE_DIR\n"
+        "import hybrid.kernels.energies\nassert config.CACHE_DIR == before\n"
+        "import mine\nprint(mine.twice(1.5))"
+    )
+    own, ours = tmp_path / "own", tmp_path / "ours"
+    environment = os.environ | {
+        "NUMBA_CACHE_DIR": str(own),
+        "HYBRID_CACHE_DIR": str(ours),
+        "PYTHONPATH": f"{tmp_path}{os.pathsep}{PACKAGE.parent}",
+    }
+    done = subprocess.run([sys.executable, "-c", script], env=environment, cwd=tmp_path, capture_output=True, text=True)
+    assert done.stdout == "3.0\n", done.stderr
+    assert [p.name.split(".")[0] for p in own.rglob("*.nbc")] == ["mine"]
+    assert not any("mine" in p.name for p in ours.rglob("*.nbc"))
+
+
+def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from hybrid.kernels.compile import cache_folder, kernel_hash
+
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    monkeypatch.delenv("HYBRID_CACHE_DIR", raising=False)
+    assert cache_folder() == tmp_path / "xdg" / "hybrid-cable" / kernel_hash()
+    monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path / "here"))
+    assert cache_folder() == tmp_path / "here" / "hybrid-cable" / kernel_hash()

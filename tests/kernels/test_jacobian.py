@@ -1,0 +1,162 @@
+"""Every hand-written derivative against differences of the residual, on random three-dimensional states.
+
+Tolerance: the residual is smooth and of order one; a fourth-order central difference
+with step 1e-4 has round-off near 1e-11, and is small enough to stay clear of the kinks of |ut| ut, so 1e-6 of the
+largest entry catches any wrong term while a correct Jacobian passes with room to spare.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+
+from hybrid.kernels.assembly import march, workspace
+from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels.loads import (
+    ADDED_MASS,
+    BODIES,
+    DRAG,
+    FLOW,
+    FRICTION,
+    MASS_DAMPING,
+    ROTARY,
+    SEABED,
+    STIFFNESS_DAMPING,
+    SURFACE,
+    WAVES,
+)
+from hybrid.kernels.newton import update
+from hybrid.kernels.state import Ends, Line, Sea, blank_state
+
+N = 7
+CV, CA = 3.0, 7.0
+ZONES = {
+    "rod": [1] * (N + 1),
+    "catenary": [0] * (N + 1),
+    "rod-catenary": [1, 1, 1, 0, 0, 0, 0, 0],
+    "catenary-rod": [0, 0, 0, 0, 0, 1, 1, 1],
+    "three": [0, 0, 1, 1, 0, 0, 1, 0],
+}
+LAND = DRAG | ADDED_MASS | MASS_DAMPING | STIFFNESS_DAMPING | ROTARY
+BITS = [
+    0, DRAG, ADDED_MASS, MASS_DAMPING, STIFFNESS_DAMPING, ROTARY, LAND, DRAG | FLOW, WAVES | ADDED_MASS | DRAG, SURFACE,
+    BODIES | FLOW, SEABED, SEABED | FRICTION, 2047,
+]  # fmt: skip
+
+
+def random_case(seed, element, bits, held=(0, 0)):
+    """A line of N cells in a random, strongly bent and moving configuration with all parameters of order one."""
+    g = np.random.default_rng(seed)
+    h = g.uniform(0.5, 1.5, N)
+    hn = np.zeros(N + 1)
+    hn[:-1] += h / 2
+    hn[1:] += h / 2
+    element = np.array(element, np.int8)
+    spin = np.array([element[i] or element[i + 1] for i in range(N)], np.int8)
+
+    def p(*shape):
+        return g.uniform(0.5, 1.5, shape)
+
+    line = Line(
+        s=np.concatenate([[0], np.cumsum(h)]), h=h, ck=0.3 * p(N), mass=p(N + 1), force=g.normal(size=(N + 1, 3)),
+        element=element, spin=spin, kb=p(N + 1, 3), k0=0.2 * g.normal(size=(N + 1, 3)), hn=hn, rotary=p(N),
+        polar=p(N), drag_n=p(N), drag_t=p(N), added_n=p(N), added_t=p(N), damp=p(N + 1), tau=0.2 * p(N),
+        buoy=p(N), displaced=p(N), diameter=3.0 * p(N), point_mass=p(N + 1), point_drag=p(N + 1), point_added=p(N + 1),
+        point_buoy=p(N + 1), point_displaced=p(N + 1), point_height=4.0 * p(N + 1), point_upright=np.arange(N + 1) % 2.0,
+        footing=p(N + 1), bits=bits,
+    )  # fmt: skip
+    sea = random_sea(g)
+    frames = [np.linalg.qr(g.normal(size=(3, 3)))[0] for _ in range(2)]
+    ends = Ends(
+        np.array(held, np.int8), g.normal(size=(2, 3)),
+        np.array([(f * np.sign(np.linalg.det(f))).ravel() for f in frames]),
+        g.normal(size=(2, 3)), g.normal(size=(2, 3)), g.normal(size=(2, 3)),
+    )  # fmt: skip
+    st = blank_state(N)
+    d = np.array([1.0, 0.3, -0.2]) + 0.35 * g.normal(size=(N, 3))
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    st.e[:] = d * h[:, None] * g.uniform(0.9, 1.1, N)[:, None]
+    st.r[1:] = np.cumsum(st.e, axis=0)
+    for x in (st.v, st.vd, st.w, st.wd, st.T):
+        x[:] = g.normal(size=x.shape)
+    a = np.cross(d, g.normal(size=(N, 3)))
+    st.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
+    return line, sea, ends, st
+
+
+def random_sea(g):
+    """Everything that can surround a line near the origin, with the surface and the seabed running through it."""
+    normal = np.array([0.1, -0.2, 1.0])
+    axis = g.normal(size=(N + 1, 3))
+    normal /= np.linalg.norm(normal)
+    axis -= np.outer(axis @ normal, normal)
+    slip = 0.3 * g.normal(size=(N + 1, 3))  # some stick and some slide
+    slip -= np.outer(slip @ normal, normal)
+    return Sea(
+        z=np.array([-9.0, 9.0]), current=g.normal(size=(2, 3)), waves=np.zeros((0, 6)), depth=np.inf, surface=0.3,
+        now=np.array([0.0, 0.7, 1.0, 0.0]), normal=normal, offset=0.2, stiffness=3.0, damping=0.5, onset=50.0,
+        friction=np.array([0.3, 0.6]), slip_length=0.4, flow=0.1 * g.normal(size=(N + 1, 7)),
+        axis=axis / np.linalg.norm(axis, axis=1)[:, None], slip=slip, slid=np.zeros((N + 1, 3)), bed=np.zeros((N + 1, 3)),
+    )  # fmt: skip
+
+
+def assembled(line, sea, ends, st, u, cv=CV, ca=CA):
+    """Dense Jacobian and right-hand side of the rows that the march eliminates."""
+    n = st.e.shape[0] + 1
+    W, X, _, report, _, gaps = workspace(n - 1)
+    rows = np.zeros((n, SIZE * WIDTH))
+    march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
+    J, b = np.zeros((5 * n, 5 * n + 25)), np.zeros(5 * n)
+    for i in range(n):
+        block = rows[i].reshape(SIZE, WIDTH)
+        J[5 * i : 5 * i + 5, 5 * i : 5 * i + 20] = block[:, :20]
+        J[5 * i : 5 * i + 5, 5 * i + 21 : 5 * i + 24] = block[:, 20:23]
+        b[5 * i : 5 * i + 5] = block[:, 23]
+    return J[:, 10 : 10 + 5 * n], b
+
+
+def residual_at(line, sea, ends, st, x):
+    """Right-hand side after the configuration is moved by x (shape (N+1, 5))."""
+    s, u = st.copy(), np.zeros_like(st.r)
+    update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0, False)
+    return assembled(line, sea, ends, s, u)[1]
+
+
+@pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
+def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
+    line, sea, ends, st = random_case(3, ZONES[zones], bits)
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric = np.zeros_like(J)
+    t = 1e-4
+    for j in range(J.shape[1]):
+        x = np.zeros(J.shape[1])
+        x[j] = t
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    exact = J.copy()
+    identity = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
+    numeric[identity, identity] = 1.0  # rows of unknowns that are not there are replaced by the identity
+    for i in range(N):
+        if line.spin[i]:
+            soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
+            exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
+    assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+@pytest.mark.parametrize("zones", ZONES)
+@pytest.mark.parametrize("held", [(0, 0), (1, 0), (1, 1)])
+@pytest.mark.parametrize("inextensible", [False, True])
+def test_elimination_equals_a_dense_solve(zones, held, inextensible):
+    """The march and the substitution back against LAPACK on the same rows; bound: condition number times round-off."""
+    line, sea, ends, st = random_case(5, ZONES[zones], 2047, held)
+    if inextensible:
+        line = line._replace(ck=np.zeros(N))
+    u = np.zeros_like(st.r)
+    J, b = assembled(line, sea, ends, st, u)
+    W, X, x, report, rows, gaps = workspace(N)
+    assert (
+        march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows)
+        == -1
+    )
+    assert substitute(X, x)
+    assert np.abs(x.ravel() - np.linalg.solve(J, b)).max() < 1e-14 * np.linalg.cond(J) * np.abs(x).max()

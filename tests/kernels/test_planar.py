@@ -1,0 +1,208 @@
+"""The march in the plane against the one in space, its Jacobian, and the push out of the plane.
+
+Tolerances: what the two marches solve is the same up to round-off, so steps and equilibria agree to Newton's
+tolerance, 1e-9 of the length and of the largest tension; derivatives as in test_jacobian.
+"""
+
+import itertools
+
+import numpy as np
+import pytest
+from test_jacobian import BITS, CA, CV, ZONES, random_case
+
+from hybrid.kernels import loads
+from hybrid.kernels.assembly import march, workspace
+from hybrid.kernels.assembly_plane import WIDE, march_planar, substitute_planar, update_planar
+from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels.loads import PLANAR
+from hybrid.kernels.out_of_plane import BAND, step_aside
+from hybrid.kernels.state import State
+
+N = 7
+
+
+def axes(seed, vertical):
+    """A random plane (3, 3), rows p, q, normal; where buoyancy changes at the surface it has to be vertical."""
+    g = np.random.default_rng(seed)
+    if vertical:
+        x, y = np.cos(seed + 0.3), np.sin(seed + 0.3)
+        return np.array([[x, y, 0.0], [0.0, 0.0, 1.0], [y, -x, 0.0]])
+    q = np.linalg.qr(g.normal(size=(3, 3)))[0]
+    return q * np.sign(np.linalg.det(q))
+
+
+def flat_case(seed, element, bits, held=(0, 0), anisotropic=False):
+    """The random line of test_jacobian, moved into a random plane with all that acts on it."""
+    line, sea, ends, st = random_case(seed, element, bits, held)
+    g = np.random.default_rng(seed + 100)
+    plane = axes(seed, bits & loads.SURFACE)
+    inside = plane[:2].T @ plane[:2]
+    n = plane[2]
+
+    def put(x):
+        return np.ascontiguousarray(x @ inside)
+
+    e = put(st.e)
+    e *= (np.linalg.norm(st.e, axis=1) / np.linalg.norm(e, axis=1))[:, None]
+    d = e / np.linalg.norm(e, axis=1)[:, None]
+    m = np.cross(n, d)
+    angle = 0.5 * np.pi * g.integers(0, 4) if anisotropic else g.uniform(0, 6)
+    a1 = np.cos(angle) * n + np.sin(angle) * m
+    r = np.vstack([np.zeros(3), np.cumsum(e, axis=0)])
+    st = State(
+        r,
+        put(st.v),
+        put(st.a),
+        put(st.vd),
+        e,
+        st.T,
+        a1,
+        *(0 * x for x in (st.w, st.wa, st.wd)),
+        put(st.slip),
+        0 * st.bed,
+    )
+    kb = line.kb.copy()
+    k0 = 0.0 * line.k0
+    if anisotropic:  # bent about the normal
+        k0[:, 0], k0[:, 1] = 0.2 * np.cos(angle), 0.2 * np.sin(angle)
+        k0[np.abs(k0) < 1e-9] = 0.0
+    else:
+        kb[:, 1] = kb[:, 0]
+    line = line._replace(force=put(line.force), kb=kb, k0=k0, bits=bits | PLANAR, plane=plane)
+    frames = []
+    for f in ends.frame.reshape(2, 3, 3):
+        t = put(f[:, 2])
+        t /= np.linalg.norm(t)
+        a = np.cos(angle) * n + np.sin(angle) * np.cross(n, t)
+        frames.append(np.column_stack([a, np.cross(t, a), t]).ravel())
+    along = np.outer(n, n)
+    ends = ends._replace(
+        position=put(ends.position), force=put(ends.force), moment=ends.moment @ along, spin=ends.spin @ along,
+        frame=np.array(frames),
+    )  # fmt: skip
+    normal = put(sea.normal)
+    normal /= np.linalg.norm(normal)
+    axis = np.cross(n, normal) * g.choice([-1.0, 1.0], (N + 1, 1))
+    slip = axis * np.einsum("ij,ij->i", axis, sea.slip)[:, None]
+    flow = np.column_stack([put(sea.flow[:, :3]), put(sea.flow[:, 3:6]), sea.flow[:, 6]])
+    sea = sea._replace(current=put(sea.current), normal=normal, axis=axis, slip=slip, flow=flow)
+    return line, sea, ends, st
+
+
+def in_space(line, sea, ends, st, u, cv=CV, ca=CA):
+    """Rows, correction and report of the march in space."""
+    W, X, x, report, _, gaps = workspace(N)
+    rows = np.zeros((N + 1, SIZE * WIDTH))
+    bad = march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
+    return rows, x if bad < 0 and substitute(X, x) else None, report
+
+
+def in_plane(line, sea, ends, st, u):
+    _, X, x, report, _, _ = workspace(N)
+    rows = np.zeros((N + 1, 3 * WIDE))
+    bad = march_planar(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, CV, CA, X, report, rows)
+    return rows, x if bad < 0 and substitute_planar(line.plane, X, x) else None, report
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("held", [(0, 0), (1, 0), (1, 1)])
+@pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
+def test_both_marches_give_the_same_correction(zones, bits, held, seed):
+    """Also across the plane, where that in space finds nothing; and the same forces, moments and powers."""
+    case = flat_case(seed, ZONES[zones], bits, held, anisotropic=seed == 1)
+    u = np.zeros_like(case[-1].r)
+    _, x, told = in_space(*case, u)
+    _, y, said = in_plane(*case, u)
+    assert x is not None and y is not None
+    assert np.abs(x[:, 1:4] @ case[0].plane[2]).max() < 1e-9 * np.abs(x).max()
+    assert np.abs(x[:, :4] - y[:, :4]).max() < 1e-8 * np.abs(x).max()
+    told[15:17] = said[15:17]  # the largest component of a force depends on the axes
+    assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
+
+
+def dense(rows):
+    J, b = np.zeros((3 * N + 3, 3 * N + 3 + 16)), np.zeros(3 * N + 3)
+    for i in range(N + 1):
+        block = rows[i].reshape(3, WIDE)
+        o = 3 * i + 6
+        for columns, places in (
+            ((0, 1), (-5, -4)), ((2, 3), (-2, -1)), ((4, 5, 6), (0, 1, 2)), ((7, 8, 9), (3, 4, 5)), ((10, 11), (7, 8)),
+        ):  # fmt: skip
+            J[3 * i : 3 * i + 3, [o + k for k in places]] = block[:, list(columns)]
+        b[3 * i : 3 * i + 3] = block[:, 12]
+    return J[:, 6 : 6 + 3 * N + 3], b
+
+
+@pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
+def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
+    line, sea, ends, st = flat_case(3, ZONES[zones], bits)
+    J, _ = dense(in_plane(line, sea, ends, st, np.zeros_like(st.r))[0])
+    numeric, t = np.zeros_like(J), 1e-4
+
+    def residual(j, way):
+        x = np.zeros((N + 1, 5))
+        x[j // 3, 0] = way if j % 3 == 0 else 0.0
+        if j % 3:
+            x[j // 3, 1:4] = way * line.plane[j % 3 - 1]
+        s, u = st.copy(), np.zeros_like(st.r)
+        update_planar(line, s.e, u, s.v, s.vd, s.T, s.a1, x, CV, CA, 1.0)
+        return dense(in_plane(line, sea, ends, s, u)[0])[1]
+
+    for j in range(3 * N + 3):
+        f = [residual(j, k * t) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    numeric[0, 0] = 1.0  # there is no cell before the start
+    assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+def test_a_singular_block_is_named():
+    line, sea, ends, st = flat_case(2, ZONES["catenary"], 0)
+    line = line._replace(mass=np.zeros(N + 1), ck=np.zeros(N))
+    st.T[:] = 0.0
+    assert in_plane(line, sea, ends, st, np.zeros_like(st.r))[1] is None
+
+
+@pytest.mark.parametrize("zones", ZONES)
+@pytest.mark.parametrize("seed", range(4))
+def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
+    """One step of the push equals the linear answer of the march in space to it, frames and spins included."""
+    bits = sum(getattr(loads, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
+    line, sea, ends, st = flat_case(seed, ZONES[zones], bits, (1, 0), anisotropic=seed > 1)
+    st.vd[0] = st.v[0] = 0.0
+    n, dt, rho = line.plane[2], 0.2, 0.5
+    g = np.random.default_rng(seed)
+    was, now, A = np.zeros((N + 1, 4)), np.zeros((N + 1, 4)), np.zeros(45 * (N + 1))
+    was[1:, 1] = g.normal(size=N)
+    step_aside(line, sea, ends, st.r, st.e, st.v, st.vd, st.T, st.a1, dt, dt, rho, was, now, A)
+    am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
+    ga = 0.5 - am + af
+    be = 0.25 * (ga + 0.5) ** 2
+    cv, ca = ga / (be * dt), (1 - am) / ((1 - af) * be * dt * dt)
+    # the same step in space: J x = b, once as it is and once with the push's prediction in rates and accelerations
+    small = 1e-6
+    pushed = st._replace(
+        v=st.v + small * np.outer(was[:, 1] - cv * dt * was[:, 1], n), vd=st.vd - small * ca * dt * np.outer(was[:, 1], n)
+    )  # fmt: skip
+    J, b0 = _assembled(line, sea, ends, st, cv, ca)
+    _, b1 = _assembled(line, sea, ends, pushed, cv, ca)
+    x = np.linalg.solve(J, b1 - b0).reshape(-1, 5) / small
+    w = x[:, 1:4] @ n
+    assert np.abs(w - now[:, 0]).max() < 1e-5 * np.abs(w).max()
+    assert np.abs(now[:, 1] - (was[:, 1] + cv * (now[:, 0] - dt * was[:, 1]))).max() < 1e-9 * np.abs(now[:, 1]).max()
+
+
+def _assembled(line, sea, ends, st, cv, ca):
+    rows = in_space(line, sea, ends, st, np.zeros_like(st.r), cv, ca)[0]
+    n = N + 1
+    J, b = np.zeros((5 * n, 5 * n + 25)), np.zeros(5 * n)
+    for i in range(n):
+        block = rows[i].reshape(SIZE, WIDTH)
+        J[5 * i : 5 * i + 5, 5 * i : 5 * i + 20] = block[:, :20]
+        J[5 * i : 5 * i + 5, 5 * i + 21 : 5 * i + 24] = block[:, 20:23]
+        b[5 * i : 5 * i + 5] = block[:, 23]
+    return J[:, 10 : 10 + 5 * n], b
+
+
+def test_band_of_the_push_fits_its_work_array():
+    assert workspace(N)[1].size >= (2 * (N + 1) + 4) * BAND
+    assert workspace(1)[1].size >= (2 * 2 + 4) * BAND

@@ -1,0 +1,74 @@
+"""Interpolation to the output points, against one that is made point by point."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from scipy.interpolate import CubicHermiteSpline
+
+from hybrid.model.mesh import Zone
+from hybrid.outputs.output_grid import Grid
+
+Floats = np.ndarray
+
+
+def slope(x: Floats, y: Floats, i: int) -> Floats:
+    """Derivative at node i of the parabola through the three nearest nodes, of the line where there are only two."""
+    near = sorted(sorted(range(x.size), key=lambda j: abs(j - i))[:3])
+    return np.polyfit(x[near] - x[i], y[near], len(near) - 1)[-2]
+
+
+def line(x: Floats, y: Floats, at: float) -> Floats:
+    """Through the two next to `at`, or the nearest two."""
+    if x.size == 1:
+        return y[0]
+    k = min(max(int(np.searchsorted(x, at)), 1), x.size - 1)
+    return y[k - 1] + (y[k] - y[k - 1]) * (at - x[k - 1]) / (x[k] - x[k - 1])
+
+
+def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats) -> dict[str, Floats]:
+    """The matrices, as what interpolation makes of the values 1, 0, 0, ... and 0, 1, 0, ... and so on."""
+    n, sides = nodes.size, sum(b - a + 1 for a, b, _ in spans)
+    middles = 0.5 * (nodes[:-1] + nodes[1:])
+    with_ends = np.concatenate([[0.0], middles, nodes[-1:]])
+    rows: dict[str, list[Floats]] = {"nodes": [], "cells": [], "held": [], "sides": []}
+    for at in s.tolist():
+        a, b, offset = next(span for span in spans if at <= nodes[span[1]] * (1 + 1e-13))
+        x, own = nodes[a : b + 1], np.eye(n)[a : b + 1]
+        slopes = np.array([slope(x, own, i) for i in range(x.size)])
+        rows["nodes"].append(CubicHermiteSpline(x, own, slopes)(at))
+        rows["cells"].append(line(middles[a:b], np.eye(n - 1)[a:b], at))
+        near_end = at < middles[0] or at > middles[-1]
+        first, last = (0, n + 1) if near_end else (a + 1, b + 1)
+        rows["held"].append(line(with_ends[first:last], np.eye(n + 1)[first:last], at))
+        rows["sides"].append(line(x, np.eye(sides)[offset : offset + x.size], at))
+    return {name: np.array(x) for name, x in rows.items()}
+
+
+@pytest.mark.parametrize("seed", range(60))
+def test_matrices_are_those_of_a_plain_interpolation(seed: int) -> None:
+    """Stretches of one, two and more cells, cut by joints and by loads; points on nodes, middles and in between."""
+    random = np.random.default_rng(seed)
+    cells = random.integers(1, 2 + seed % 5, random.integers(1, 7))
+    nodes = np.concatenate([[0.0], np.cumsum(random.uniform(0.3, 2.0, cells.sum()))])
+    cuts = [0, *np.cumsum(cells).tolist()]
+    is_joint = [True, *(random.random(len(cuts) - 2) < 0.5), True]
+    joints = [k for k, joint in zip(cuts, is_joint, strict=True) if joint]
+    loads = [float(nodes[k]) for k, joint in zip(cuts, is_joint, strict=True) if not joint]
+    kinds = ("rod", "catenary") if seed % 2 else ("catenary", "rod")
+    zones = [Zone(kinds[i % 2], float(nodes[a]), float(nodes[b])) for i, (a, b) in enumerate(pairwise(joints))]
+    s = np.unique([*nodes, *(0.5 * (nodes[:-1] + nodes[1:])), *random.uniform(0.0, nodes[-1], 20)])
+
+    grid = Grid(nodes, zones, s, loads)
+
+    assert grid.spans == [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts))]
+    assert grid.side_nodes == [k for a, b in pairwise(cuts) for k in range(a, b + 1)]
+    assert [(part.s_a, part.s_b) for part in grid.parts] == [(nodes[a], nodes[b]) for a, b in pairwise(cuts)]
+    assert grid.loads == tuple(loads)
+    assert grid.s is s
+    for name, expected in plain(nodes, grid.spans, s).items():
+        matrix = getattr(grid, name)
+        assert matrix.has_canonical_format
+        np.testing.assert_allclose(matrix.toarray(), expected, rtol=0.0, atol=1e-12, err_msg=name)

@@ -1,0 +1,71 @@
+"""Whether two results are the same, bit for bit, but for clocks; and runs that are stopped."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+import hybrid
+from hybrid.simulation import api as simulate
+from hybrid.store import writer as record
+
+CLOCKS = ("steps/cpu",)
+CLOCK_ATTRIBUTES = ("created", "effort_cpu")
+
+
+def differences(a: Path, b: Path) -> list[str]:
+    """What two results differ in, checkpoints and clocks aside."""
+    out = []
+    with h5py.File(a) as x, h5py.File(b) as y:
+        names: list[set[str]] = []
+        for file in (x, y):
+            names.append(set())
+            file.visit(names[-1].add)
+        ours = [{n for n in found if not n.startswith("checkpoint/slot")} for found in names]
+        out += [f"only in one: {name}" for name in ours[0] ^ ours[1]]
+        for name in sorted(ours[0] & ours[1]):
+            if isinstance(x[name], h5py.Dataset) and name not in CLOCKS:
+                one, other = x[name][()], y[name][()]
+                same = one == other if isinstance(one, bytes) else one.tobytes() == other.tobytes()
+                if not same or getattr(one, "shape", ()) != getattr(other, "shape", ()):
+                    out.append(f"other values: {name}")
+        for name in {*x.attrs, *y.attrs} - {*CLOCK_ATTRIBUTES}:
+            if not np.array_equal(x.attrs.get(name), y.attrs.get(name)):
+                out.append(f"other attribute: {name}: {x.attrs.get(name)!r}, {y.attrs.get(name)!r}")
+    return out
+
+
+class Stopping:
+    """Hears of every step, and stops the run like Ctrl-C at one of them."""
+
+    def __init__(self, monkeypatch, at_every_output: bool = True) -> None:
+        monkeypatch.setattr(simulate, "REPORT_EVERY", -1.0)
+        if at_every_output:  # checkpoints, which are otherwise some tenths of a second apart
+            monkeypatch.setattr(record, "_PAUSE", 0.0)
+            monkeypatch.setattr(record, "_PART", 0.0)
+        self.left, self.heard = -1, 0
+
+    def __call__(self, progress: hybrid.simulation.api.Progress) -> None:
+        self.left -= 1
+        self.heard += 1
+        if self.left == 0:
+            raise KeyboardInterrupt
+
+
+def went_on(scene: hybrid.Scene, path: Path, stopping: Stopping, stops: list[int], **more) -> int:
+    """Run a scene that is stopped after so many steps of each part, and resume it until it is complete; the stops."""
+    begun, count = False, 0
+    for stop in [*stops, -1]:
+        stopping.left = stop
+        try:
+            if begun:
+                hybrid.resume(path, progress=stopping, **more).close()
+            else:
+                hybrid.run(scene, path, progress=stopping, **more).close()
+            break
+        except KeyboardInterrupt:
+            count += 1
+            begun = begun or path.exists()
+    return count

@@ -1,0 +1,460 @@
+"""Accuracy that is asked for: error figures against the truth, efforts that follow, and what cannot be told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.model.mesh_grading import GROWTH, grading
+from hybrid.model.resolution import Asked, Effort, first_effort, wants_errors
+from hybrid.scene.accuracy import amount
+from hybrid.simulation.error_control import ORDERS, Climb, Errors, Estimate, Sketch, Verdict, finer, judge
+
+# --- what is written -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("text", "what", "size"),
+    [("1%", "part", 0.01), ("0.3 %", "part", 0.003), ("3 cm", "position", 0.03), ("5mm", "position", 0.005),
+     ("0.2 m", "position", 0.2), ("50 N", "tension", 50.0), ("1.5 kN", "tension", 1500.0), ("2e-1 m", "position", 0.2)],
+)  # fmt: skip
+def test_amounts(text, what, size):
+    assert amount(text)[0] == what
+    assert amount(text)[1] == pytest.approx(size, rel=1e-12)
+
+
+def swinging(**more):
+    """A chain that is let go from 40 degrees and swings in water; smooth, and of no particular period."""
+    data = {
+        "environment": {"gravity": 9.81, "fluid": {"density": 1000.0}},
+        "cable": {
+            "sections": [
+                {"length": 2.0, "mass": 0.5, "diameter": 0.02, "bending_stiffness": 0.01, "axial_stiffness": 1e5,
+                 "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0}}
+            ]
+        },
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {
+                "kind": "pinned", "position": [1.5, 0, 0],
+                "motion": {"heave": {"amplitude": 0.2, "period": 2.0}, "ramp": 2.0},
+            },
+        },
+        "initial": "equilibrium",
+        "model": "rod",
+        "time": {"duration": 6.0},
+        "output": {"every": 0.1, "points": 21},
+    }  # fmt: skip
+    return hybrid.validate_scene(data | more)
+
+
+@pytest.mark.parametrize(
+    ("given", "where"),
+    [(0.01, "accuracy"), ("1", "accuracy"), ("3 ft", "accuracy"), ("50%", "accuracy"), ("0 m", "accuracy"),
+     ({"position": "5 N"}, "accuracy.position"), ({}, "accuracy"), ([1], "accuracy"), ("-1%", "accuracy")],
+)  # fmt: skip
+def test_what_is_no_accuracy_is_refused(given, where):
+    with pytest.raises(SceneError) as caught:
+        swinging(accuracy=given)
+    assert [c.where for c in caught.value.complaints] == [where]
+
+
+def test_a_number_is_told_how_to_write_it():
+    with pytest.raises(SceneError, match="write 2%"):
+        swinging(accuracy=0.02)
+
+
+def test_steps_that_follow_need_damping():
+    with pytest.raises(SceneError, match=r"at most 0\.9"):
+        swinging(time={"duration": 1.0, "rho_inf": 1.0})
+
+
+# --- efforts -------------------------------------------------------------------------------------
+
+
+def test_first_efforts():
+    """A scene that leaves its steps open asks for 1 %; finer asks are finer; what the scene says stands."""
+    usual, fine = first_effort(swinging()), first_effort(swinging(accuracy="0.1%"))
+    assert wants_errors(swinging())
+    assert usual == first_effort(swinging(accuracy="1%"))
+    assert fine.fineness > 2.0 * usual.fineness and fine.local < 0.1 * usual.local
+    fixed = swinging(time={"duration": 6.0, "step": 0.02}, mesh={"cells": 30}, accuracy="0.1%")
+    assert first_effort(fixed).local is None and first_effort(fixed).step == 0.02 and first_effort(fixed).fineness == 1
+    plain = swinging(time={"duration": 6.0, "step": 0.02})
+    assert not wants_errors(plain) and first_effort(plain).local is None
+    assert first_effort(swinging(time={"duration": 6.0, "tolerance": 1e-7})).local == 1e-7
+
+
+def test_coarser_efforts():
+    effort = Effort(2.0, 0.1, 1e-6, 1e-3)
+    other = effort.coarser(2.0, 2.0)
+    assert (other.fineness, other.local, other.step, other.every) == (1.0, 8e-6, 0.2, 2)
+    assert Effort(2.0, 0.1, None, 1e-3).coarser(1.0, 2.0).step == 0.2
+
+
+# --- estimates, by pure functions ----------------------------------------------------------------
+
+
+def sketch(effort: Effort, steps: int, order: float, every: int = 1, noise: float = 0.0) -> Sketch:
+    """A run whose error is h^order + 0.5 dt^order in position and pull, of known sign, at 9 outputs."""
+    t = np.linspace(0.0, 1.0, 9)
+    keep = np.unique(np.append(np.arange(0, 9, every), 8))
+    h, dt = 1.0 / effort.fineness, 100.0 / steps
+    wrong = (0.01 * h**order + 0.005 * dt**order) * (1.0 + t) + noise
+    position = np.zeros((9, 4, 3))
+    position[..., 2] = (np.sin(t) + wrong)[:, None]
+    values = {"position": position[keep], "reaction_end": (np.cos(t) + wrong)[keep, None] * [0.0, 0.0, 1.0]}
+    return Sketch(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
+
+
+@pytest.mark.parametrize("order", [1.25, 1.4, 2.0])
+def test_an_error_of_one_order_is_found_exactly(order):
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    final = sketch(effort, 100, order)
+    coarse = sketch(effort.coarser(2, 2), 50, order, 2)
+    rough = sketch(effort.coarser(2, 4), 25, order, 4)
+    coarsest = sketch(effort.coarser(4, 4), 25, order, 4)
+    estimate = Estimate(final, coarse, rough, coarsest)
+    assert estimate.order["position"] == pytest.approx(order, abs=1e-6)
+    found = estimate.errors
+    # the largest at t = 1 s; at outputs in between the error is interpolated, and here it is linear
+    assert found.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
+    assert found.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
+    assert found.largest("total", "pull_end") == pytest.approx(0.03, rel=1e-6)
+    better = sketch(Effort(2.5, 0.03, None, 1e-3), 300, order)
+    estimate.follow(better)
+    assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02 / 2.5**order, rel=1e-6)
+    assert estimate.errors.largest("time", "position") == pytest.approx(0.01 / 3.0**order, rel=1e-6)
+
+
+def test_orders_are_bounded():
+    """Runs that do not converge count as of the least order: the figure is most of what the last refinement has changed."""
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    runs = [sketch(effort, 100, 2.0, 1, 0.0), sketch(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
+    runs += [sketch(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sketch(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
+    estimate = Estimate(*runs)
+    assert estimate.order["position"] == ORDERS[0]
+    assert estimate.errors.largest("total", "position") > 0.3
+
+
+def test_without_the_rougher_runs_an_order_in_between_is_taken():
+    effort = Effort(1.0, 0.1, None, 1e-3)
+    estimate = Estimate(sketch(effort, 100, 2.0), sketch(effort.coarser(2, 2), 50, 2.0, 2), None, None)
+    assert ORDERS[0] < estimate.order["position"] < ORDERS[1]
+    assert 1.0 < estimate.errors.largest("total", "position") / 0.03 < 2.0
+    assert "time" not in estimate.errors.fields
+
+
+def test_judging_and_refining():
+    errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
+                     "total": {"position": np.full((2, 3), 0.4), "pull_end": np.full(2, 1.0)}})  # fmt: skip
+    effort = Effort(1.0, 0.1, 1e-3, 1e-3)
+    run = Sketch(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
+    verdict = judge(Asked(0.1, None, None), errors, run)
+    assert (verdict.ratio, verdict.mesh, verdict.time) == pytest.approx((4.0, 3.0, 1.0))
+    better = finer(effort, verdict, True, True)
+    assert better is not None and better.fineness > 1.5 and better.local < 1e-3
+    assert finer(effort, verdict, False, False) is None
+    assert finer(effort, verdict, False, True) is None  # the mesh alone is wrong by more than is asked
+    only_steps = finer(effort, Verdict(1.5, 0.4, 1.1, 0.0, ""), False, True)
+    assert only_steps is not None and only_steps.fineness == 1.0 and only_steps.local < 1e-3
+    assert judge(Asked(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
+
+
+def test_the_model_is_made_better_when_it_is_what_is_wrong():
+    better = finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, True)
+    assert better is not None and better.zones < 0.5e-3
+    assert better.fineness < 1.5  # cells and steps are not to blame
+    assert finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, False) is None
+
+
+# --- cells ---------------------------------------------------------------------------------------
+
+
+def test_graded_cells():
+    """Short where it bends and beside a clamp, neighbours alike, cuts kept, as many times more as asked."""
+    s = np.linspace(0.0, 100.0, 201)
+    curvature = np.where(np.abs(s - 30.0) < 2.0, 0.5, 0.001)
+    found = grading(s, curvature, np.full(201, 0.5), [100.0], 100.0)
+    nodes = found.nodes([0.0, 61.7, 100.0], 1.0)
+    h = np.diff(nodes)
+    assert 61.7 in nodes and nodes[0] == 0.0 and nodes[-1] == 100.0 and (h > 0).all()
+    at = 0.5 * (nodes[1:] + nodes[:-1])
+    assert h[np.abs(at - 30.0) < 1.0].max() < 0.3
+    assert h[-1] < 0.25 and h.max() > 3.0
+    inside = np.abs(at[:-1] - 61.7) > 6.0  # a cut may part cells unevenly
+    assert (np.maximum(h[1:] / h[:-1], h[:-1] / h[1:])[inside]).max() < 1.0 + 2.0 * GROWTH
+    assert found.nodes([0.0, 100.0], 3.0).size == pytest.approx(3 * h.size, rel=0.05)
+
+
+# --- runs ----------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def truth():
+    return hybrid.run(swinging(accuracy="0.02%"))
+
+
+def pull(result):
+    return np.linalg.norm(result.reaction_end, axis=1)
+
+
+@pytest.mark.parametrize("percent", [10, 3, 1, 0.3])
+@pytest.mark.parametrize("model", ["rod", "adaptive"])
+def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
+    """Against a run asked for 0.02 %: error at most as asked, and its estimate from 0.5 to 4 times the truth."""
+    result = hybrid.run(swinging(accuracy=f"{percent}%", model=model))
+    position = np.linalg.norm(result.position - truth.position, axis=2).max()
+    force = np.abs(pull(result) - pull(truth)).max()
+    said = result.attributes["error_total_position"], result.attributes["error_total_pull"]
+    print(
+        f"{model}, {percent} %: position {position:.1e} m, estimated {said[0]:.1e}; pull {force:.1e} N of "
+        f"{pull(truth).max():.3g}, estimated {said[1]:.1e}; {result.attributes['effort_runs']} runs"
+    )
+    assert position <= percent / 100 * 2.0
+    assert force <= percent / 100 * pull(truth).max()
+    assert not [e for e in result.events if e.kind in ("accuracy missed", "no error figure")]
+    if model == "rod":  # zones leave a model error besides
+        assert 0.5 <= said[0] / position <= 4.0
+        assert 0.5 <= said[1] / force <= 6.0
+
+
+def test_what_the_file_holds():
+    result = hybrid.run(swinging(accuracy="3%"))
+    for kind in ("mesh", "time", "total"):
+        for name in ("position", "tension", "curvature", "bending_moment"):
+            assert result[f"errors/{kind}/{name}"].shape == (61, 21)
+            assert np.isfinite(result[f"errors/{kind}/{name}"]).all()
+        assert result[f"errors/{kind}/pull_end"].shape == (61,)
+    assert result.units["errors/total/position"] == "m"
+    assert result.dims("errors/total/tension") == ("t", "s")
+    assert result.errors["total/position"].max() == result.attributes["error_total_position"]
+    assert "0.06 m" in result.attributes["accuracy_asked"]
+    assert result.at(t=3.0, s=1.0)["errors/total/position"] > 0.0
+
+
+def test_explicit_settings_win_and_what_they_miss_is_said():
+    fixed = swinging(accuracy="0.01%", time={"duration": 6.0, "step": 0.05}, mesh={"cells": 10})
+    result = hybrid.run(fixed)
+    assert result.attributes["cells"] == 10
+    assert np.allclose(result["steps/dt"], 0.05)
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "leave mesh" in missed.text and "asked" in missed.text
+
+
+def test_a_figure_beside_a_run_with_fixed_steps(truth):
+    """Without accuracy, output.errors asks for the figure alone; the run is the same as without."""
+    settings = {"time": {"duration": 6.0, "step": 0.02}, "mesh": {"cells": 40}}
+    plain = hybrid.run(swinging(**settings))
+    result = hybrid.run(swinging(output={"every": 0.1, "points": 21, "errors": True}, **settings))
+    assert "errors" not in plain
+    assert (plain.position == result.position).all()
+    error = np.linalg.norm(result.position - truth.position, axis=2).max()
+    assert 0.5 < result.attributes["error_total_position"] / error < 3.0
+
+
+def test_a_figure_that_cannot_be_had_is_said():
+    """On two cells there is nothing coarser; the result stands, without a figure, and says so."""
+    chain = swinging(mesh={"cells": 2}, time={"duration": 1.0, "step": 0.02}, accuracy="1%")
+    result = hybrid.run(chain)
+    kinds = {e.kind for e in result.events}
+    assert "no error figure" in kinds and "errors" not in result
+
+
+def test_steps_land_on_outputs_and_ramps():
+    result = hybrid.run(swinging(accuracy="3%", output={"every": 0.37, "points": 5}))
+    t = result["steps/t"]
+    for when in [*result.times[1:], 2.0]:
+        assert np.abs(t - when).min() < 1e-12
+
+
+@pytest.mark.parametrize("percent", [1, 0.1])
+def test_statics(percent):
+    """A hanging catenary: the error of its cells against one of 4000 cells, all of its error against a rod of 4000."""
+    result = hybrid.static(swinging(model="catenary", accuracy=f"{percent}%", time=None))
+    for kind, model in (("mesh", "catenary"), ("total", "rod")):
+        fine = hybrid.static(swinging(model=model, time=None, mesh={"cells": 4000}))
+        error = np.linalg.norm(result.position - fine.position, axis=2).max()
+        said = result.attributes[f"error_{kind}_position"]
+        print(f"static, {percent} %, {kind}: {error:.2e} m, estimated {said:.2e}")
+        assert error <= percent / 100 * 2.0
+        assert 0.7 <= said / error <= 3.0
+
+
+def test_the_model_error_is_that_of_a_coarser_run():
+    """A catenary in motion: what leaving bending out does is estimated, and is most of its error."""
+    result = hybrid.run(swinging(model="catenary", accuracy="1%"))
+    fine = hybrid.run(swinging(accuracy="0.1%"))
+    error = np.linalg.norm(result.position - fine.position, axis=2).max()
+    model, total = (result.attributes[f"error_{kind}_position"] for kind in ("model", "total"))
+    print(f"catenary in motion: {error:.2e} m, estimated {total:.2e}, of it by the model {model:.2e}")
+    assert 0.7 <= total / error <= 3.0
+    assert result["errors/model/position"].shape == (61, 21)
+    assert "errors/model" not in fine  # a rod leaves nothing out
+
+
+# --- what was found by attack ----------------------------------------------------------------------
+
+
+def test_steps_see_what_a_motion_file_does(tmp_path):
+    """A pulse of half a second in a record of 100 s bounds the step: without, all runs would step over it, and agree."""
+    t = np.arange(0.0, 100.01, 0.02)
+    rows = [f"{x:.2f},1.5,0,{0.3 * np.exp(-(((x - 48.0) / 0.3) ** 2)):.9f}" for x in t]
+    (tmp_path / "pulse.csv").write_text("t,x,y,z\n" + "\n".join(rows) + "\n")
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": {"file": str(tmp_path / "pulse.csv")}},
+    }
+    scene = swinging(ends=ends, time={"duration": 100.0}, output={"every": 10.0}, accuracy="1%")
+    assert first_effort(scene).step < 0.2
+    slow = swinging()
+    assert first_effort(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
+
+
+def test_a_finer_run_is_no_other_result(tmp_path):
+    """Several result runs go into one file, which need not be overwritten, and leave nothing beside it."""
+    target = tmp_path / "run.h5"
+    result = hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
+    assert result.status == "complete" and "errors" in result
+    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "fine.h5", overwrite=False)
+    assert result.attributes["effort_runs"] > 4
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["fine.h5", "run.h5"]
+    with pytest.raises(hybrid.ResultError, match="exists"):
+        hybrid.run(swinging(accuracy="0.2 N"), target, overwrite=False)
+
+
+def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
+    """The result before it stands, with its figure, and says what became of the other."""
+    from hybrid.errors import ComputationError, Outcome
+    from hybrid.simulation.case import Job
+
+    record, count = Job.record, []
+
+    def failing(self, effort, target, climb):
+        count.append(effort)
+        if len(count) > 1:
+            target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
+            raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
+        return record(self, effort, target, climb)
+
+    monkeypatch.setattr(Job, "record", failing)
+    result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
+    assert len(count) == 2 and len(result.times) == 61 and "errors" in result
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "failed" in missed.text
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_reader_does_not_lose_the_figure(tmp_path):
+    """Somebody reads the file when the figure is written."""
+    target = tmp_path / "run.h5"
+    readers = []
+
+    def look(progress):
+        if progress.stage == "result" and not readers and progress.t > 0.0:
+            readers.append(hybrid.open(target))
+
+    result = hybrid.run(swinging(accuracy="3%"), target, progress=look)
+    assert readers and "errors" in result
+    readers[0].close()
+
+
+def test_what_steps_damp_out_is_said():
+    """A stiff rod let go swings as a pendulum; its bending vibrations are far below what a step may be wrong by."""
+    data = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "bending_stiffness": 20.0}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+        "initial": {"kind": "straight", "direction": [np.sin(0.2), 0, -np.cos(0.2)]},
+        "model": "rod",
+        "time": {"duration": 3.2},
+        "output": {"every": 0.1, "points": 11},
+        "accuracy": "1%",
+    }
+    assert "vibrations damped" in {e.kind for e in hybrid.run(hybrid.validate_scene(data)).events}
+    assert "vibrations damped" not in {e.kind for e in hybrid.run(swinging()).events}
+
+
+def test_accuracy_needs_its_figure():
+    with pytest.raises(SceneError, match="error figure"):
+        swinging(accuracy="1%", output={"errors": False})
+
+
+def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
+    """A catenary of a stiff cable: cells and steps cannot mend what it leaves out."""
+    result = hybrid.run(swinging(model="catenary", accuracy="0.1%"))
+    (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+    assert "model" in missed.text and result.attributes["effort_runs"] <= 5
+
+
+def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
+    """Ctrl-C in the second run: the first stays, with its figure, and says that it is not what was asked."""
+    from hybrid.simulation.case import Job
+
+    record, count = Job.record, []
+
+    def stopping(self, effort, target, climb):
+        count.append(effort)
+        if len(count) > 1:
+            raise KeyboardInterrupt
+        return record(self, effort, target, climb)
+
+    monkeypatch.setattr(Job, "record", stopping)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.attributes["error_total_pull"] > 0.01
+        (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
+        assert "stopped" in missed.text
+
+
+def test_an_equilibrium_does_not_replace_a_file_unasked(tmp_path):
+    scene, target = swinging(time=None, accuracy="1%"), tmp_path / "rest.h5"
+    hybrid.static(scene, target, overwrite=False)
+    before = target.read_bytes()
+    with pytest.raises(hybrid.ResultError, match="exists"):
+        hybrid.static(scene, target, overwrite=False)
+    assert target.read_bytes() == before
+    hybrid.static(scene, target)
+
+
+def made_up(notes=(), model=(), bound=0.0, fineness=1.0, steps=100):
+    """A run that says something of itself, whose position is off by 1/fineness."""
+    position = np.full((9, 4, 3), 0.01 / fineness**2)
+    model_error = {"position": np.full((9, 4), model)} if model else {}
+    effort = Effort(fineness, 0.1, 1e-6, 1e-3)
+    return Sketch(
+        effort, {"position": position}, round(100 * fineness), steps, 0.0, 1, False, model_error, bound, tuple(notes)
+    )
+
+
+def test_notes_and_model_error_are_of_the_runs_that_count():
+    """What a result said that was replaced by a finer one, or a model error of zones before, is not told."""
+    said = iter([made_up([("vibrations damped", "first")]), made_up(fineness=9.0, steps=900)])
+    before = made_up([("error beyond estimate", "before")], 0.004, 0.1, 0.5, 50)
+    after = made_up((), 0.0005, 0.1, 4.5, 450)
+    comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
+    climb = Climb(Asked(0.005, None, None), True, True, True, True, lambda _: next(comparisons), lambda _: next(said))
+    final, errors = climb.reach(Effort(1.0, 0.1, 1e-6, 1e-3))
+    assert final.cells == 900 and len(climb.runs) == 6
+    assert errors.largest("model", "position") == 0.0005
+    assert climb.notes == ()
+
+
+def test_a_model_error_that_cannot_be_true_is_not_counted():
+    estimate = Estimate(made_up(), made_up((), 0.4, 0.1, 0.5, 50), None, None)
+    assert estimate.errors.largest("model", "position") == 0.4
+    estimate.take_model(made_up((), 40.0, 0.1, 0.5, 50))
+    assert estimate.errors.largest("model", "position") == 0.0
+    assert [kind for kind, _ in estimate.notes] == ["error beyond estimate"]
+
+
+def test_a_pull_that_outputs_do_not_show_is_said():
+    """A pendulum's pull swings between outputs that come once a period: the curve through them is a straight line."""
+    rare = hybrid.run(swinging(accuracy="1%", output={"every": 0.6, "points": 5}, time={"duration": 6.0}))
+    often = hybrid.run(swinging(accuracy="1%", output={"every": 0.02, "points": 5}, time={"duration": 6.0}))
+    assert [e.kind for e in often.events if e.kind == "pull between outputs"] == []
+    said = [e.text for e in rare.events if e.kind == "pull between outputs"]
+    assert len(said) == 2 and all("leaves the curve" in x and "output.every: 0.06" in x for x in said)

@@ -1,0 +1,309 @@
+"""Scenes in a plane: computed in it, as in space; watched for what would leave it; refused where they do not lie in it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError, SceneError
+from hybrid.model.build import build
+from hybrid.model.plane import WHAT
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# Two marches that solve the same equations end Newton within its tolerance of each other, 1e-9 of the length.
+SAME = 1e-9
+FLAT = (
+    "01_hanging_chain", "02_suspension", "03_suspension_rod", "04_suspension_catenary", "05_cantilever", "06_whip",
+    "irregular_sea", "laying", "rov_tether", "s_tether", "touchdown",
+)  # fmt: skip
+
+
+def scene(what: dict[str, Any], **tables: Any) -> hybrid.Scene:
+    return hybrid.validate_scene(what | tables)
+
+
+def example(name: str, steps: int = 300, **tables: Any) -> hybrid.Scene:
+    """An example, cut short: enough steps for zones to move where they do."""
+    what = hybrid.load_scene(EXAMPLES / f"{name}.yaml").model_dump(exclude_none=True)
+    what.pop("dimension", None)
+    step = what["time"]["step"]
+    duration = min(what["time"]["duration"], steps * step)
+    what["time"]["duration"] = duration
+    what["output"]["every"] = duration / 20
+    return scene(what, **tables)
+
+
+def planes(result: hybrid.Result) -> list[str]:
+    return [e.text for e in result.events if e.kind == "out of plane"]
+
+
+def entry(asked: hybrid.Scene) -> Any:
+    return next(x for x in hybrid.plan(asked).ledger if x.what == WHAT)
+
+
+@pytest.mark.parametrize("name", FLAT)
+def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
+    """The same motion, the same zones, nothing across the plane, and no event of it in the first 300 steps."""
+    space = hybrid.run(example(name, dimension=3))
+    for asked in ({}, {"dimension": 2}):
+        flat = hybrid.run(example(name, **asked))
+        assert not planes(flat)
+        assert np.abs(flat.position - space.position).max() < SAME * space.s[-1]
+        assert np.abs(flat.tension - space.tension).max() < 10 * SAME * np.abs(space.tension).max()
+        assert [len(z) for z in flat.zones] == [len(z) for z in space.zones]
+        n = build(example(name)).plane
+        assert n is not None and np.abs(flat.velocity @ n[2]).max() == 0.0
+
+
+@pytest.mark.parametrize("name", [*FLAT[:2], "05_cantilever", "s_tether", "rov_tether"])
+def test_statics_in_the_plane_and_in_space(name: str) -> None:
+    what = example(name).model_dump(exclude_none=True) | {"initial": {"kind": "equilibrium"}}
+    flat, space = (hybrid.static(scene(what, dimension=d)) for d in (2, 3))
+    assert np.abs(flat.position - space.position).max() < SAME * space.s[-1]
+    assert np.abs(flat.tension - space.tension).max() < 10 * SAME * np.abs(space.tension).max()
+
+
+def turned(what: Any, R: np.ndarray) -> Any:
+    """A scene with every vector turned."""
+    if isinstance(what, dict):
+        return {k: turned(v, R) for k, v in what.items()}
+    if isinstance(what, list | tuple) and len(what) == 3 and all(isinstance(x, int | float) for x in what):
+        return [float(x) for x in R @ np.array(what, float)]
+    return [turned(x, R) for x in what] if isinstance(what, list | tuple) else what
+
+
+def about(axis: tuple[float, float, float], angle: float) -> np.ndarray:
+    a = np.array(axis) / np.linalg.norm(axis)
+    K = np.cross(np.eye(3), a)
+    return np.eye(3) + np.sin(angle) * -K + (1 - np.cos(angle)) * K @ K
+
+
+@pytest.mark.parametrize("angle", [0.3, 1.7, 2.9, -2.0])
+@pytest.mark.parametrize("name", ["03_suspension_rod", "06_whip", "rov_tether"])
+def test_any_vertical_plane(name: str, angle: float) -> None:
+    R = about((0, 0, 1), angle)
+    what = example(name, 200).model_dump(exclude_none=True)
+    what["output"].pop("history", None)
+    straight = hybrid.run(scene(what))
+    asked = scene(turned(what, R))
+    assert entry(asked).on
+    found = hybrid.run(asked)
+    assert not planes(found)
+    assert np.abs(found.position - straight.position @ R.T).max() < SAME * straight.s[-1]
+    assert np.abs(found.velocity @ (R @ [0, 1, 0])).max() < 1e-12 * np.abs(found.velocity).max()
+
+
+@pytest.mark.parametrize("axis", [(1, 2, 3), (1, 0, 0), (-2, 1, 0.5)])
+def test_any_plane_where_nothing_is_heavy(axis: tuple[float, float, float]) -> None:
+    R = about(axis, 1.1)
+    what = example("05_cantilever", 200).model_dump(exclude_none=True)
+    what["output"].pop("history", None)
+    straight, asked = hybrid.run(scene(what)), scene(turned(what, R))
+    assert entry(asked).on
+    found = hybrid.run(asked)
+    assert np.abs(found.position - straight.position @ R.T).max() < SAME * straight.s[-1]
+
+
+def test_random_scenes_in_a_vertical_plane() -> None:
+    """Two sections, a moving end, current, seabed with friction, a float, an end moment, damping of both kinds."""
+    told = 0
+    for seed in range(6):
+        g = np.random.default_rng(seed)
+        x, y = np.cos(seed), np.sin(seed)
+        section = {
+            "length": 10.0, "mass": 1.0, "diameter": 0.02, "axial_stiffness": 1e5, "bending_stiffness": 2.0,
+            "drag": {"normal": 1.2, "tangential": 0.02}, "added_mass": {"normal": 1.0},
+            "damping": {"mass": 0.1, "stiffness": 0.01},
+        }  # fmt: skip
+        a = float(g.uniform(12, 17))
+        what = {
+            "environment": {
+                "fluid": {"density": 1025, "surface": 0, "current": [0.3 * x, 0.3 * y, 0]},
+                "seabed": {"z": -9.0, "stiffness": 1000.0, "damping": 100.0, "friction": 0.4 if seed % 2 else 0},
+            },
+            "cable": {
+                "sections": [section, section | {"mass": 1.5}],
+                "attachments": [{"kind": "float", "at": 8.0, "mass": 0.2, "volume": 0.0005, "drag_area": 0.01}],
+            },
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, 0],
+                          "motion": {"heave": {"amplitude": 0.2, "period": 3}, "velocity": [0.1 * x, 0.1 * y, 0], "ramp": 2}},
+                "end": {"kind": "clamped", "position": [a * x, a * y, -8.0], "tangent": [x, y, -0.2]},
+            },
+            "initial": "equilibrium",
+            "model": ["rod", "adaptive", {"zones": [{"catenary": 3}, {"rod": 17}]}][seed % 3],
+            "time": {"duration": 6.0, "step": 0.05},
+        }  # fmt: skip
+        flat, space = (hybrid.run(scene(what, dimension=d)) for d in (2, 3))
+        if planes(flat):  # an equilibrium that holds in the plane alone: in space another is sought
+            told += 1
+            flat = hybrid.run(scene(what))
+        assert np.abs(flat.position - space.position).max() < SAME * 20, seed
+        assert np.abs(flat.tension - space.tension).max() < 1e-8 * np.abs(space.tension).max(), seed
+    assert told == 1  # of six
+
+
+# --- what would leave the plane ------------------------------------------------------------------
+
+
+def deep_beam(part: float, **tables: Any) -> hybrid.Scene:
+    """A cantilever as deep as a ruler under `part` of the tip load at which it topples, 4.0126 sqrt(EI GJ)/L^2."""
+    EI, GJ, deep = 0.01, 0.008, 30.0
+    critical = 4.0126 * np.sqrt(EI * GJ / ((1 - EI / deep) * (1 - GJ / deep)))
+    what = {
+        "environment": {"gravity": 0.0},
+        "cable": {
+            "sections": [{"length": 1.0, "mass": 0.1, "bending_stiffness": [deep, EI], "torsional_stiffness": GJ,
+                          "rotary_inertia": 0, "damping": {"mass": 0.2}}],
+        },
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 1, 0]},
+            "end": {"kind": "free", "force": {"value": [0, 0, float(-part * critical)], "ramp": 1.0}},
+        },
+        "initial": {"kind": "straight", "direction": [1, 0, 0]},
+        "model": "rod",
+        "mesh": {"cells": 40},
+        "time": {"duration": 60.0, "step": 0.02},
+    }  # fmt: skip
+    return scene(what, **tables)
+
+
+def test_a_deep_beam_topples_where_prandtl_says() -> None:
+    """Prandtl (1899), Michell (1899): below the load nothing grows, above it the beam leaves the plane; within 5 %."""
+    calm = hybrid.run(deep_beam(0.95))
+    assert not planes(calm) and np.abs(calm.position[..., 1]).max() == 0.0
+    topples = hybrid.run(deep_beam(1.05))
+    assert len(planes(topples)) == 1
+    assert np.abs(topples.position[..., 1]).max() > 0.02
+
+
+def test_in_space_nothing_would_have_been_seen() -> None:
+    """A scene without any imperfection stays in its plane in space as well; that is why it is watched."""
+    assert np.abs(hybrid.run(deep_beam(1.05, dimension=3)).position[..., 1]).max() == 0.0
+
+
+def test_who_insists_on_a_plane_is_told() -> None:
+    result = hybrid.run(deep_beam(1.05, dimension=2))
+    assert len(planes(result)) == 1 and "dimension: 3" in planes(result)[0]
+    assert np.abs(result.position[..., 1]).max() == 0.0
+
+
+def test_equilibria_that_hold_in_the_plane_alone() -> None:
+    """A strut, soft across the plane: in the plane it stands, in space it does not, and a static answer says so."""
+    what = deep_beam(0.0).model_dump(exclude_none=True)
+    what["ends"]["end"] = {"kind": "free", "force": [-0.03, 0.0, 0.0]}  # 1.2 times Euler's load for EI
+    what["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, 0]}
+    flat = hybrid.static(scene(what, dimension=2))
+    assert planes(flat) and np.abs(flat.position[0, :, 1:]).max() < 1e-9
+    with pytest.raises(
+        ComputationError, match="unstable"
+    ):  # the search in space does not find where it goes, and says so
+        hybrid.static(scene(what))
+
+
+@pytest.mark.parametrize("period, grows", [(1.0, True), (0.67, False)])
+def test_a_string_whose_tension_swings_twice_as_fast_as_it_does(period: float, grows: bool) -> None:
+    """Parametric resonance (Melde): no tangent matrix is ever indefinite, and yet the string leaves the plane."""
+    tension, length, mass = 100.0, 10.0, 1.0
+    first = 2 * length * np.sqrt(mass / tension)  # s, of its first mode: half of it is the period that makes it grow
+    EA = 1e4
+    what = {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [{"length": length, "mass": mass, "axial_stiffness": EA}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [length * (1 + tension / EA), 0, 0],
+                    "motion": {"surge": {"amplitude": 0.4 * length * tension / EA, "period": 0.5 * period * first}, "ramp": 4}},
+        },
+        "initial": "equilibrium",
+        "model": "catenary",
+        "mesh": {"cells": 20},
+        "time": {"duration": 80.0, "step": 0.02, "rho_inf": 0.9},
+    }  # fmt: skip
+    result = hybrid.run(scene(what))
+    assert bool(planes(result)) == grows
+
+
+# --- what is not in a plane ----------------------------------------------------------------------
+
+BASE = """\
+environment: {fluid: {density: 1025, current: [0.3, 0, 0]}}
+cable: {sections: [{length: 10, mass: 1, diameter: 0.02, bending_stiffness: 1, drag: {normal: 1}}]}
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: {kind: clamped, position: [6, 0, -2], tangent: [1, 0, 0.5]}
+initial: equilibrium
+model: rod
+dimension: 2
+time: {duration: 1, step: 0.1}
+"""
+WRONG = {
+    "current": ("current: [0.3, 0, 0]", "current: [0.3, 0.1, 0]", "environment.fluid.current", 1),
+    "tangent": ("tangent: [1, 0, 0.5]", "tangent: [1, 0.2, 0.5]", "ends.end.tangent", 5),
+    "motion": ("position: [0, 0, 0]", "position: [0, 0, 0], motion: {ramp: 1, sway: {amplitude: 1, period: 1}}",
+               "ends.start.motion.sway", 4),
+    "slope": ("environment: {", "environment: {seabed: {z: -20, stiffness: 100, slope: [0, 0.1]}, ",
+              "environment.seabed.slope", 1),
+    "solver": ("model: rod", "model: rod\nsolver: shooting", "dimension", 9),
+    "roll": ("tangent: [1, 0, 0.5]", "tangent: [1, 0, 0.5], motion: {ramp: 1, roll: {amplitude: 5, period: 1}}",
+             "ends.end.motion.roll", 5),
+    "twist": ("diameter: 0.02, bending_stiffness: 1", "diameter: 0.02, bending_stiffness: [1, 2], torsional_stiffness: 1",
+              "cable.sections[0].bending_stiffness", 2),
+    "curl": ("diameter: 0.02,", "diameter: 0.02, torsional_stiffness: 1, intrinsic_curvature: [0, 0, 1],",
+             "cable.sections[0].intrinsic_curvature", 2),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize(("old", "new", "where", "line"), WRONG.values(), ids=WRONG)
+def test_what_leaves_the_plane_is_named(old: str, new: str, where: str, line: int) -> None:
+    assert hybrid.parse_scene(BASE).dimension == 2
+    assert old in BASE
+    with pytest.raises(SceneError) as caught:
+        hybrid.parse_scene(BASE.replace(old, new))
+    found = [c for c in caught.value.complaints if c.where == where]
+    assert found and found[0].line == line
+    if where != "dimension":
+        assert "dimension is 2" in found[0].expected and "dimension" in found[0].fix
+        # and without insisting it is computed in space, and the plan says why
+        asked = hybrid.parse_scene(BASE.replace(old, new).replace("dimension: 2\n", ""))
+        assert not entry(asked).on and "leaves" in entry(asked).why
+
+
+def test_the_plan_says_who_asked() -> None:
+    for dimension, on, why in ((2, True, "dimension: 2"), (3, False, "dimension: 3"), (None, True, "all of the scene")):
+        text = BASE.replace("dimension: 2\n", f"dimension: {dimension}\n" if dimension else "")
+        told = entry(hybrid.parse_scene(text))
+        assert told.on is on and why in told.why
+    flat, space = (hybrid.plan(hybrid.parse_scene(BASE.replace("dimension: 2", f"dimension: {d}"))) for d in (2, 3))
+    cells = sum(flat.cells)
+    assert flat.unknowns == 3 * cells + 2 and space.unknowns == 5 * cells + 3
+    assert flat.seconds < 0.9 * space.seconds  # outputs cost the same
+
+
+def test_an_end_moment_must_be_normal_to_the_plane() -> None:
+    what = hybrid.parse_scene(BASE).model_dump(exclude_none=True)
+    what["ends"]["end"] = {"kind": "free", "moment": [0, 0.5, 0]}
+    assert entry(scene(what)).on
+    what["ends"]["end"]["moment"] = [0.5, 0, 0]
+    with pytest.raises(SceneError, match="moment"):
+        scene(what)
+
+
+def test_a_load_that_is_let_go_in_a_plane_is_let_go_in_space() -> None:
+    """The accelerations after it are found by the march in space, which steps in the plane had left their work in."""
+    what = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "free", "force": {"value": [0.03, 0, 0], "until": 0.5}},
+        },
+        "initial": {"kind": "straight", "direction": [0.6, 0, -0.8]},
+        "model": "catenary", "mesh": {"cells": 20}, "time": {"duration": 0.7, "step": 0.01},
+        "output": {"every": 0.1, "points": 11, "errors": False},
+    }  # fmt: skip
+    flat, deep = (hybrid.run(scene(what, dimension=k)) for k in (2, 3))
+    assert np.abs(flat.position - deep.position).max() < SAME

@@ -1,0 +1,108 @@
+"""A run that was stopped, however often, is the run that was not: bit for bit."""
+
+from pathlib import Path
+from zlib import crc32
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.errors import LEFT_OUT
+from hybrid.store import writer as record
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# Everything that a state can consist of: fixed zones, adaptive ones, friction, waves, a plane, the corrected catenary,
+# joints with moments, steps that follow the error, a climb to an accuracy with several results.
+CASES = {
+    "fixed zones": ("02_suspension", ["time.duration=3"]),
+    "catenary": ("07_forced_taut_cable", ["time.duration=2"]),
+    "rod in a plane": ("06_whip", ["time.duration=0.2"]),
+    "adaptive in a plane": ("touchdown", ["time.duration=20"]),
+    "adaptive in space": ("s_tether", ["time.duration=8"]),
+    "friction, laid": ("laying", ["time.duration=30"]),
+    "friction, slack": ("slack_on_seabed", ["time.duration=20"]),
+    "waves": ("irregular_sea", ["time.duration=6"]),
+    "joints with moments": ("s_tether", ["time.duration=6", "model={kind: adaptive, joint: curvature}"]),
+    "corrected": ("touchdown", ["time.duration=10", "model=corrected", "output.errors=true"]),
+    "error figure": ("touchdown", ["time.duration=10", "output.errors=true"]),
+    "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
+    "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),
+    "accuracy by a second result": ("touchdown", ["accuracy=0.3%", "time={duration: 5}"]),
+}
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_stopped_run_goes_on_bit_for_bit(name, tmp_path, monkeypatch):
+    file, settings = CASES[name]
+    scene = hybrid.load_scene(EXAMPLES / f"{file}.yaml", settings)
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    steps, draw = stopping.heard, np.random.default_rng(crc32(name.encode()))
+    for k in range(2):
+        path = tmp_path / f"{k}.h5"
+        stops = [round(0.55 * steps + 0.4 * steps * draw.random()), *draw.integers(2, steps // 3, 2).tolist()]
+        assert went_on(scene, path, stopping, stops) >= 1, "nothing was stopped"
+        assert differences(tmp_path / "whole.h5", path) == []
+    assert {x.suffix for x in tmp_path.iterdir()} == {".h5"}, "something is left behind"
+
+
+def test_steps_failed_and_taken_back_go_on_as_well(tmp_path, monkeypatch):
+    """What a controller and a manager remember of steps that failed is in the checkpoint."""
+    scene = hybrid.load_scene(EXAMPLES / "06_whip.yaml", ["time={duration: 0.3, tolerance: 1.0e-7}", "accuracy=null"])
+    stopping = Stopping(monkeypatch)
+    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
+        assert whole["steps/repeats"].sum() > 0, "no step has failed: take another scene"
+        failed = int(np.flatnonzero(whole["steps/repeats"])[0])
+    for stop in (failed + 2, failed + 40):
+        assert went_on(scene, tmp_path / "run.h5", stopping, [stop]) == 1
+        assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+        (tmp_path / "run.h5").unlink()
+
+
+def test_there_are_several_results_in_one_of_the_cases():
+    file, settings = CASES["accuracy by a second result"]
+    with hybrid.run(hybrid.load_scene(EXAMPLES / f"{file}.yaml", settings)) as result:
+        assert result.attributes["effort_runs"] > 4
+
+
+def test_what_the_user_asks_of_zones_is_given_again(tmp_path, monkeypatch):
+    scene = hybrid.load_scene(EXAMPLES / "s_tether.yaml", ["time.duration=4"])
+
+    def wish(look):
+        return np.where(look.s < 10.0 + look.t, 2.0, 0.0)
+
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", criterion=wish, progress=stopping).close()
+    assert went_on(scene, tmp_path / "run.h5", stopping, [40], criterion=wish) == 1
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    (tmp_path / "run.h5").unlink()
+    stopping.left = 40
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, tmp_path / "run.h5", criterion=wish, progress=stopping)
+    with pytest.raises(hybrid.ResultError, match="criterion"):
+        hybrid.resume(tmp_path / "run.h5")
+
+
+def test_events_that_are_too_many_are_counted_on(tmp_path, monkeypatch):
+    """Of those that are not written the file says how many there were, also where the run was stopped in between."""
+    monkeypatch.setattr(record, "MOST_OF_A_KIND", 2)
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["time.duration=30"])
+    stopping = Stopping(monkeypatch)
+    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
+        assert [e.value for e in whole.events if e.kind == LEFT_OUT]
+    assert went_on(scene, tmp_path / "run.h5", stopping, [280]) == 1
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_into_another_file(tmp_path, monkeypatch):
+    scene = hybrid.load_scene(EXAMPLES / "02_suspension.yaml", ["time.duration=2"])
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    stopping.left = 100
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene, tmp_path / "first.h5", progress=stopping)
+    before = (tmp_path / "first.h5").read_bytes()
+    hybrid.resume(tmp_path / "first.h5", tmp_path / "second.h5").close()
+    assert (tmp_path / "first.h5").read_bytes() == before
+    assert differences(tmp_path / "whole.h5", tmp_path / "second.h5") == []

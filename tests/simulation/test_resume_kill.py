@@ -1,0 +1,90 @@
+"""kill -9 at random moments: the file opens, and goes on bit for bit."""
+
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+from bits import differences
+
+import hybrid
+from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.reader import opened
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+RUN = "import sys, hybrid; hybrid.run(hybrid.load_scene(sys.argv[1], sys.argv[3:]), sys.argv[2])"
+RESUME = "import sys, hybrid; hybrid.resume(sys.argv[1])"
+# Long enough to be hit, most of its time in the loop: zones that move, friction and plane; and a climb to an accuracy.
+SCENES = {
+    "touchdown": ["time.duration=200", "output.every=0.5"],
+    "laying": ["output.every=0.25"],
+    "06_whip": ["time={duration: 4}", "accuracy=0.3%"],
+}
+
+
+def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
+    """Kill runs of an example, and resumed runs, so often; how it went."""
+    scene, settings, draw = str(EXAMPLES / f"{name}.yaml"), SCENES[name], random.Random(seed)
+    whole = folder / "whole.h5"
+
+    def start(code: str, *arguments: str) -> subprocess.Popen[bytes]:
+        return subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE)
+
+    for _ in range(2):  # kernels may have to be compiled
+        begin = time.monotonic()
+        process = start(RUN, scene, str(whole), *settings)
+        said = process.communicate()[1].decode()
+        assert process.returncode == 0, said
+    wall = time.monotonic() - begin
+    went = {"killed": 0, "before there was a file": 0, "opened": 0, "the same": 0, "outputs recomputed": 0}
+    path = folder / "run.h5"
+    while went["killed"] < count:
+        for old in folder.glob("*run*"):
+            old.unlink()
+        process = start(RUN, scene, str(path), *settings)
+        while True:
+            time.sleep(draw.uniform(0.2, 1.0) * wall)
+            ended = process.poll() is not None
+            process.kill()
+            said = process.communicate()[1].decode()
+            if ended:
+                assert process.returncode == 0 or "is complete" in said, said
+                break
+            went["killed"] += 1
+            if not path.exists():
+                went["before there was a file"] += 1
+                break
+            with hybrid.open(path) as result:
+                went["opened"] += 1
+                if result.status != "complete":  # else it was killed while its errors were estimated, or after
+                    with opened(path) as file:
+                        lost = int((result.times > read_checkpoint(file).t).sum())
+                    went["outputs recomputed"] = max(went["outputs recomputed"], lost)
+            process = start(RESUME, str(path))
+        if path.exists():
+            try:
+                hybrid.resume(path).close()
+            except hybrid.ResultError as error:
+                assert "is complete" in str(error), error
+            assert differences(whole, path) == []
+            went["the same"] += 1
+            assert {x.name for x in folder.iterdir()} == {"whole.h5", "run.h5"}, "something is left behind"
+    return went
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SCENES)
+def test_some_kills(name, tmp_path):
+    went = kills(name, 4, tmp_path, 1)
+    assert went["outputs recomputed"] == 0
+
+
+@pytest.mark.bench
+@pytest.mark.parametrize("name", SCENES)
+def test_a_hundred_kills(name, tmp_path):
+    went = kills(name, 34, tmp_path, 2)
+    print(f"\n{name}: " + ", ".join(f"{text} {number}" for text, number in went.items()))
+    assert went["outputs recomputed"] <= 1
+    assert went["opened"] == went["killed"] - went["before there was a file"]

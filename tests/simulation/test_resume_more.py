@@ -1,0 +1,466 @@
+"""Beyond the end, other loads, and what is refused."""
+
+import gzip
+import json
+import subprocess
+import sys
+import textwrap
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+from bits import Stopping, differences
+
+import hybrid
+from hybrid.simulation import freeze
+from hybrid.simulation import restart as remainder
+from hybrid.store import checkpoint
+from hybrid.store import disk_space as room
+from hybrid.store import writer as record
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def swinging(**more):
+    """A chain of 1 m that swings for 2 s, in steps of 0.01 s."""
+    data = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "diameter": 0.02, "drag": {"normal": 1.0}}]},
+        "environment": {"fluid": {"density": 100.0}},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+        "initial": {"kind": "straight", "direction": [0.6, 0, -0.8]},
+        "model": "catenary",
+        "mesh": {"cells": 20},
+        "time": {"duration": 2.0, "step": 0.01},
+        "output": {"every": 0.1, "points": 11, "errors": False},
+    }
+    return hybrid.validate_scene(data | more)
+
+
+@pytest.fixture
+def whole(tmp_path):
+    hybrid.run(swinging(), tmp_path / "whole.h5").close()
+    return tmp_path / "whole.h5"
+
+
+def stopped(path: Path, monkeypatch, scene=None, after: int = 150) -> Path:
+    stopping = Stopping(monkeypatch)
+    stopping.left = after
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(scene or swinging(), path, progress=stopping)
+    return path
+
+
+# ---- further ---------------------------------------------------------------------------------------
+
+
+def test_beyond_its_end_it_is_the_longer_run(tmp_path, whole):
+    hybrid.resume(whole, tmp_path / "longer.h5", until=3.0).close()
+    hybrid.run(swinging(time={"duration": 3.0, "step": 0.01}), tmp_path / "at_once.h5").close()
+    assert differences(tmp_path / "longer.h5", tmp_path / "at_once.h5") == []
+
+
+def test_beyond_the_end_of_an_accuracy_the_whole_is_judged(tmp_path):
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=3%", "time={duration: 5}"])
+    hybrid.run(scene, tmp_path / "run.h5").close()
+    with hybrid.resume(tmp_path / "run.h5", until=8.0) as longer:
+        assert longer.times[-1] == 8.0 and longer.status == "complete"
+        assert len(longer["errors/total/position"]) == len(longer.times)
+        assert "time: {duration: 8.0" in longer.scene_text
+    with h5py.File(tmp_path / "run.h5") as file:
+        assert checkpoint.CLIMB not in file
+
+
+def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
+    """A force until 1 s, and the same force taken off by resuming at 1 s: one motion."""
+    free = {"kind": "free", "force": {"value": [0.3, 0, 0], "until": 1.0}}
+    pinned = {"kind": "pinned", "position": [0, 0, 0]}
+    ends = {"start": pinned, "end": free}
+    hybrid.run(swinging(ends=ends), tmp_path / "until.h5").close()
+    for_good = {"start": pinned, "end": {"kind": "free", "force": [0.3, 0, 0]}}
+    hybrid.run(swinging(ends=for_good, time={"duration": 1.0, "step": 0.01}), tmp_path / "pulled.h5").close()
+    hybrid.resume(tmp_path / "pulled.h5", until=2.0, settings=["ends.end.force=null"]).close()
+    with hybrid.open(tmp_path / "until.h5") as one, hybrid.open(tmp_path / "pulled.h5") as other:
+        assert np.allclose(one.position, other.position, rtol=0, atol=1e-12)
+        assert json.loads(other.changes_text)[0]["t"] == 1.0
+        assert "loads change" in {e.kind for e in other.events}
+        assert np.ptp(one.position[:, -1, 0]) > 0.03, "nothing moves"
+
+
+@pytest.mark.parametrize("name", ["slack_on_seabed", "touchdown", "laying"])
+def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, tmp_path, monkeypatch):
+    """A current from 3 s on: computed anew, from a checkpoint at 3 s, and stopped on the way; one motion."""
+    short = ["time.duration=6", "dimension=null"]
+    more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
+    monkeypatch.setattr(record, "_PAUSE", 0.0)
+    monkeypatch.setattr(record, "_PART", 0.0)
+    hybrid.run(hybrid.load_scene(EXAMPLES / f"{name}.yaml", short), tmp_path / "long.h5").close()
+    hybrid.resume(tmp_path / "long.h5", tmp_path / "anew.h5", **more).close()
+    hybrid.run(
+        hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["time.duration=2", short[1]]), tmp_path / "begun.h5"
+    ).close()
+    stopping = Stopping(monkeypatch)
+    stopping.left = 30
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(tmp_path / "begun.h5", until=6.0, progress=stopping, **more)
+    hybrid.resume(tmp_path / "begun.h5").close()
+    with hybrid.open(tmp_path / "anew.h5") as one, hybrid.open(tmp_path / "begun.h5") as other:
+        assert (one.times == other.times).all() and (one.position == other.position).all()
+        with hybrid.open(tmp_path / "long.h5") as without:
+            moved = np.abs(one.position - without.position).max(axis=(1, 2))
+        before = one.times <= 3.0
+        assert moved[before].max() == 0.0 and moved[-1] > 1e-4
+
+
+def test_an_end_that_is_moved_from_a_time_on(tmp_path, whole):
+    travel = "ends.start.motion={travel: {by: [0.5, 0, 0], over: 1.0, begin: 2.5}}"
+    with hybrid.resume(whole, until=4.0, settings=[travel]) as result:
+        assert np.allclose(result.position[-1, 0], [0.5, 0, 0]) and np.allclose(result.position[25, 0], 0.0)
+
+
+# ---- refusals --------------------------------------------------------------------------------------
+
+
+def test_there_is_nothing_left_of_a_complete_run(whole):
+    with pytest.raises(hybrid.ResultError, match=r"(?s)complete.*--until"):
+        hybrid.resume(whole)
+
+
+@pytest.mark.parametrize(
+    ("more", "match"),
+    [
+        ({"until": 1.0}, "until"),
+        ({"until": float("inf")}, "until"),
+        ({"until": 3.0, "start": 2.5}, "from"),
+        ({"until": 3.0, "settings": ["time.duration=4"]}, "say it once"),
+        ({"start": 1.0}, r"(?s)from.*--set"),
+        ({"settings": ["cable.sections[0].mass=2.0"]}, "from|sections"),
+        ({"settings": ["cable.sections[0].mass=2.0"], "until": 3.0}, r"(?s)sections.*run the changed scene"),
+        ({"settings": ["mesh.cells=30"], "until": 3.0}, "mesh"),
+        ({"settings": ["environment.fluid.current=[1, 0, 0]"]}, r"(?s)before the end.*--until"),
+        ({"settings": ["environment.fluid.current=[1, 0, 0]"], "start": 1.0}, r"(?s)anew.*-o"),
+        ({"settings": ["ends.start.motion={surge: {amplitude: 1, period: 4}, ramp: 1}"], "until": 3.0}, "jumps by"),
+        ({"settings": ["nonsense"], "until": 3.0}, "override"),
+    ],
+)
+def test_what_cannot_be_is_refused_and_the_file_stays(more, match, whole):
+    before = whole.read_bytes()
+    with pytest.raises(hybrid.errors.HybridError, match=match):
+        hybrid.resume(whole, **more)
+    assert whole.read_bytes() == before
+    assert [x.name for x in whole.parent.iterdir()] == [whole.name]
+
+
+def test_another_program_is_refused(tmp_path, monkeypatch):
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    monkeypatch.setattr(remainder, "program", lambda: "9.9.9 0123456789abcdef")
+    with pytest.raises(hybrid.ResultError, match=r"(?s)computed by hybrid-cable .*9\.9\.9.*run its scene again"):
+        hybrid.resume(path)
+
+
+def test_the_program_is_named_by_all_that_computes():
+    assert freeze.program() == freeze.program() and len(freeze.program().split()) == 2
+
+
+def test_a_file_without_checkpoints_is_refused(tmp_path):
+    hybrid.static(swinging(time=None), tmp_path / "rest.h5").close()
+    with pytest.raises(hybrid.ResultError, match="no checkpoint"):
+        hybrid.resume(tmp_path / "rest.h5", until=3.0)
+    (tmp_path / "text.h5").write_text("no result")
+    with pytest.raises(hybrid.ResultError, match="HDF5"):
+        hybrid.resume(tmp_path / "text.h5")
+
+
+def test_a_checkpoint_that_was_cut_off_leaves_the_one_before(tmp_path, monkeypatch):
+    hybrid.run(swinging(), tmp_path / "whole.h5").close()
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    with h5py.File(path, "r+") as file:
+        newest = checkpoint.read_checkpoint(file)
+        slot = file[checkpoint.SLOTS[newest.number % 2]]
+        slot[200:400] = 0
+        older = checkpoint.read_checkpoint(file)
+        assert older.number == newest.number - 1 and older.t < newest.t
+    hybrid.resume(path).close()
+    assert differences(tmp_path / "whole.h5", path) == []
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    with h5py.File(path, "r+") as file:
+        for name in checkpoint.SLOTS:
+            file[name][50:90] = 0
+    with pytest.raises(hybrid.ResultError, match="no checkpoint"):
+        hybrid.resume(path)
+
+
+def test_bytes_that_are_no_run_are_not_run():
+    """A pickle can name any function; only classes of the rooms that compute are let in."""
+    import os
+    import pickle
+
+    class Evil:
+        def __reduce__(self):
+            return os.system, ("echo harm",)
+
+    for bytes_ in (
+        pickle.dumps(Evil()),
+        pickle.dumps(subprocess.run),
+        pickle.dumps(hybrid.store.writer.Recorder),
+        b"x",
+    ):
+        with pytest.raises(hybrid.ResultError, match="cannot be read"):
+            freeze.thaw(bytes_)
+
+
+def test_an_end_that_moves_otherwise_is_noticed(tmp_path, monkeypatch):
+    csv = tmp_path / "motion.csv"
+    t = np.linspace(0.0, 3.0, 301)
+    way = 0.1 * np.sin(t) ** 4
+    csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{b:.9f},0,0\n" for a, b in zip(t, way, strict=True)))
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0], "motion": {"file": str(csv)}},
+        "end": {"kind": "free"},
+    }
+    path = stopped(tmp_path / "run.h5", monkeypatch, swinging(ends=ends))
+    csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{2 * b:.9f},0,0\n" for a, b in zip(t, way, strict=True)))
+    with pytest.raises(hybrid.ResultError, match=r"motion\.csv: other than when the run began"):
+        hybrid.resume(path)
+    # a change beyond the checkpoint is one as well
+    kept = way.copy()
+    kept[-1] += 1e-6
+    csv.write_text("t,x,y,z\n" + "".join(f"{a:.3f},{b:.9f},0,0\n" for a, b in zip(t, kept, strict=True)))
+    with pytest.raises(hybrid.ResultError, match="other than when the run began"):
+        hybrid.resume(path)
+    csv.unlink()
+    with pytest.raises((hybrid.SceneError, hybrid.ResultError), match=r"motion\.csv"):
+        hybrid.resume(path)
+
+
+def test_two_processes_on_one_file(tmp_path, monkeypatch):
+    from hybrid.cli.commands import main
+
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    script = f"""
+        import time
+        from pathlib import Path
+        from hybrid.store.checkpoint import claimed
+        with claimed(Path({str(path)!r})):
+            print("held", flush=True)
+            time.sleep(60)
+    """
+    with subprocess.Popen([sys.executable, "-c", textwrap.dedent(script)], stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"held\n"
+        before = path.read_bytes()
+        for attempt in (lambda: hybrid.resume(path), lambda: hybrid.run(swinging(), path)):
+            with pytest.raises(hybrid.ResultError, match="another process"):
+                attempt()
+        assert path.read_bytes() == before
+        with pytest.raises(SystemExit) as left:
+            main(["resume", str(path)])
+        assert left.value.code == 1
+        other.kill()
+    hybrid.resume(path).close()  # a lock of a process that is gone does not hold
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_a_full_disk_loses_nothing(tmp_path, monkeypatch):
+    """As full as a limit of the file's size makes it, in a process of its own; then it goes on, bit for bit."""
+    scene = swinging(output={"every": 0.01, "points": 101, "errors": False})
+    hybrid.run(scene, tmp_path / "whole.h5").close()
+    script = f"""
+        import resource
+        import hybrid
+        from hybrid.store import writer as record
+        from hybrid.store import disk_space as room
+        record._PAUSE = record._PART = 0.0
+        room.RESERVE = 100_000
+        resource.setrlimit(resource.RLIMIT_FSIZE, (MOST, MOST))
+        try:
+            hybrid.run(hybrid.parse_scene({hybrid.scene_text(scene)!r}), {str(tmp_path / "run.h5")!r})
+        except hybrid.ResultError as error:
+            print(error)
+    """
+    size = (tmp_path / "whole.h5").stat().st_size
+    script = textwrap.dedent(script).replace("MOST", str(round(0.7 * size)))
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert "MB are needed" in done.stdout and "hybrid resume" in done.stdout
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "failed" and len(result.times) > 2
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_write_that_fails_all_the_same_ends_with_words(tmp_path):
+    """A quota does not show beforehand.  HDF5 can then neither write nor close; the command still ends in order."""
+    hybrid.run(hybrid.load_scene(EXAMPLES / "02_suspension.yaml"), tmp_path / "whole.h5").close()
+    most = round(0.8 * (tmp_path / "whole.h5").stat().st_size)
+    script = f"""
+        import resource
+        from hybrid.cli.commands import main
+        from hybrid.store import writer as record
+        record.ask_for_room = lambda *a: None
+        record._PAUSE = record._PART = 0.0
+        resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
+        main(["run", "-q", {str(EXAMPLES / "02_suspension.yaml")!r}, "-o", {str(tmp_path / "run.h5")!r}])
+    """
+    done = subprocess.run([sys.executable, "-c", textwrap.dedent(script)], capture_output=True, text=True)
+    assert done.returncode == 2, done.stderr
+    assert "cannot be written" in done.stderr and "free some" in done.stderr
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_folder_that_is_read_only(tmp_path, monkeypatch):
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    before = path.read_bytes()
+
+    def refused(*_):
+        raise PermissionError(13, "Permission denied")
+
+    monkeypatch.setattr(checkpoint.FileLock, "acquire", refused)
+    with pytest.raises(
+        hybrid.ResultError, match=r"(?s)cannot be written.*Permission denied.*a folder you may write to"
+    ):
+        hybrid.resume(path)
+    assert path.read_bytes() == before
+
+
+def test_room_is_that_of_the_disk(tmp_path):
+    assert room.room(tmp_path / "none.h5") > 0
+    with pytest.raises(hybrid.ResultError, match="MB are free"):
+        room.ask_for_room(tmp_path / "none.h5", 1 << 61, "")
+
+
+# ---- the command -----------------------------------------------------------------------------------
+
+
+def test_the_command_goes_on_and_says_so(tmp_path, monkeypatch, capsys):
+    from hybrid.cli.commands import main
+
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    with pytest.raises(SystemExit) as done:
+        main(["resume", str(path), "--json"])
+    assert not done.value.code
+    last = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert last["status"] == "complete" and last["t"] == 2.0
+    with pytest.raises(SystemExit) as done:
+        main(["resume", str(path)])
+    assert done.value.code == 1 and "nothing left to do" in capsys.readouterr().err
+    with pytest.raises(SystemExit) as done:
+        main(["resume", str(path), "--until", "2.5", "--set", "environment.fluid.current=[0.2,0,0]", "--from", "2.2"])
+    assert not done.value.code and "the last 0.5 s" in " ".join(capsys.readouterr().out.split())
+
+
+# ---- versions --------------------------------------------------------------------------------------
+
+
+def test_a_file_of_an_older_program_opens_and_does_not_go_on(tmp_path):
+    """Written by 0.4.0: its numbers are there; it has no checkpoint."""
+    older = tmp_path / "older.h5"
+    older.write_bytes(gzip.decompress((Path(__file__).parents[1] / "data" / "result_0.4.h5.gz").read_bytes()))
+    with hybrid.open(older) as result:
+        assert result.tension[-1].tolist() == [10.109223689133069, 5.164341571429652, 0.0]
+        assert result.title == "a chain of hybrid-cable 0.4.0" and result.zones[0][0].kind == "catenary"
+    with pytest.raises(hybrid.ResultError, match="no checkpoint"):
+        hybrid.resume(older)
+
+
+def test_a_file_of_a_newer_format_is_refused(whole):
+    with h5py.File(whole, "r+") as file:
+        file.attrs["format_version"] = 2
+    for attempt in (hybrid.open, hybrid.resume):
+        with pytest.raises(hybrid.ResultError, match="result format 2; this program reads format 1"):
+            attempt(whole)
+
+
+# ---- what an adversary found -----------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "more", [{"until": 8.0}, {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 4.5}]
+)
+def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, monkeypatch):
+    """The climb of the run before it is not that of the run that goes on."""
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5", "dimension=null"])
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, progress=stopping).close()
+    begun = stopped(tmp_path / "begun.h5", monkeypatch, scene, stopping.heard - 10)
+    (tmp_path / "run.h5").write_bytes(begun.read_bytes())
+    hybrid.resume(begun, tmp_path / "whole.h5", **more).close()
+    stopping = Stopping(monkeypatch)
+    hybrid.resume(begun, tmp_path / "counted.h5", progress=stopping, **more).close()
+    steps = stopping.heard
+    stopping.left = steps - 5  # in the result, after the runs to compare with
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(tmp_path / "run.h5", progress=stopping, **more)
+    hybrid.resume(tmp_path / "run.h5").close()
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_finer_result_of_another_scene_is_not_taken(tmp_path):
+    """What a killed run has left beside its file is of that run."""
+    file, settings = "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"]
+    scene = hybrid.load_scene(EXAMPLES / file, settings)
+    other = hybrid.load_scene(EXAMPLES / file, [*settings, "title=other", "output.points=51"])
+    left = tmp_path / ".run.h5.finer"
+    hybrid.run(scene, tmp_path / "run.h5").close()
+    left.write_bytes((tmp_path / "run.h5").read_bytes())
+    with hybrid.run(other, tmp_path / "run.h5") as result:
+        assert result.title == "other" and len(result.s) == 51
+    assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
+
+
+@pytest.mark.parametrize("setting", ["ends.end.motion.pitch.amplitude=-60", "ends.end.motion=null"])
+def test_an_end_that_would_turn_at_once_is_refused(setting, tmp_path):
+    data = {
+        "cable": {"sections": [{"length": 2.0, "mass": 1.0, "bending_stiffness": 5.0, "torsional_stiffness": 5.0}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {
+                "kind": "guided", "tangent": [1, 0, 0], "force": [20, 0, 0],
+                "motion": {"pitch": {"amplitude": 20, "period": 4}, "ramp": 1},
+            },
+        },
+        "environment": {"gravity": 0.0}, "initial": {"kind": "straight", "direction": [1, 0, 0]}, "model": "rod",
+        "mesh": {"cells": 10}, "time": {"duration": 1.0, "step": 0.02},
+        "output": {"every": 0.1, "points": 5, "errors": False},
+    }  # fmt: skip
+    hybrid.run(hybrid.validate_scene(data), tmp_path / "run.h5").close()
+    with pytest.raises(hybrid.SceneError, match=r"(?s)jumps by.*rad"):
+        hybrid.resume(tmp_path / "run.h5", until=2.0, settings=[setting])
+
+
+def test_an_end_before_a_change_is_refused(tmp_path, monkeypatch, whole):
+    more = {"settings": ["environment.fluid.current=[0.4, 0, 0]"], "start": 2.6, "until": 3.0}
+    stopping = Stopping(monkeypatch)
+    stopping.left = 20
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.resume(whole, progress=stopping, **more)
+    with pytest.raises(hybrid.SceneError, match=r"after the change at 2\.6 s"):
+        hybrid.resume(whole, until=2.5)
+
+
+def test_a_checkpoint_of_odd_things_is_refused_in_words(tmp_path, monkeypatch):
+    """Its digest is right, and what it says is not."""
+    path = stopped(tmp_path / "run.h5", monkeypatch)
+    with h5py.File(path) as file:
+        point = checkpoint.read_checkpoint(file)
+    odd = [
+        {"effort": freeze.freeze([1.0])}, {"state": freeze.freeze(point.rows)}, {"rows": {"nowhere": 3}},
+        {"rows": {"t": -1}}, {"happened": {"merge": "often"}}, {"number": 0.0}, {"t": "now"},
+    ]  # fmt: skip
+    for wrong in odd:
+        with h5py.File(path, "r+") as file:
+            for name in checkpoint.SLOTS:  # both, so that there is none to fall back on
+                file[name][:] = 0
+            checkpoint.write_checkpoint(file, point._replace(**({"number": 0} | wrong)))
+        with pytest.raises(hybrid.ResultError, match="checkpoint"):
+            hybrid.resume(path)
+
+
+def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
+    monkeypatch.setenv("HOME", str(tmp_path))
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["accuracy=0.3%", "time={duration: 5}"])
+    hybrid.run(scene, "~/run.h5").close()
+    (tmp_path / "link.h5").symlink_to("run.h5")
+    hybrid.run(scene, tmp_path / "link.h5").close()
+    assert (tmp_path / "link.h5").is_symlink()
+    assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "link.h5"}

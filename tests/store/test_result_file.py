@@ -1,0 +1,422 @@
+"""What is written is what is read: layout, units, zones, interruption, refusal."""
+
+from __future__ import annotations
+
+import io
+import os
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import h5py
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ResultError
+from hybrid.store.format import Field
+from hybrid.store.reader import Event, Result, Zone, open_result
+from hybrid.store.writer import Recorder
+
+S = np.linspace(0.0, 2.0, 5)
+FIELDS = (
+    Field("position", "m", "position of the centreline", (5, 3), ("s", "xyz"), "inertial"),
+    Field("tension", "N", "axial force", (5,), ("s",)),
+    Field("bending_moment", "N m", "magnitude of the bending moment", (5,), ("s",)),
+    Field("reaction_start", "N", "force of the support on the start", (3,), ("xyz",), "inertial"),
+    Field("energy/kinetic", "J", "kinetic energy"),
+    Field("strain", "", "may be unknown", (5,), ("s",), nan_ok=True),
+)
+STEPS = (
+    Field("t", "s", "end of the step"),
+    Field("residual", "N", "largest residual", nan_ok=True),
+    Field("dt", "s", "length of the step"),
+    Field("iterations", "", "Newton iterations", dtype="int64"),
+)
+ONE = [("catenary", 0.0, 1.5), ("rod", 1.5, 2.0)]
+TWO = [("catenary", 0.0, 1.0), ("rod", 1.0, 2.0)]
+
+
+def recorder(target: object, **more: object) -> Recorder:
+    given = {
+        "grid_s": S,
+        "fields": FIELDS,
+        "step_fields": STEPS,
+        "attributes": {"title": "Tëst", "seed": 7},
+        "texts": {"scene": "title: Tëst\n"},
+    }
+    return Recorder(target, **(given | more))  # type: ignore[arg-type]
+
+
+def values(t: float) -> dict[str, np.ndarray]:
+    """Linear in t and s, so that linear interpolation is exact up to round-off."""
+    return {
+        "position": np.stack([S + t, 0 * S, 2.0 * t - 3.0 * S], axis=1),
+        "tension": 10.0 * t + S,
+        "bending_moment": 0.0 * S + t,
+        "reaction_start": np.array([t, 0.0, -t]),
+        "energy/kinetic": np.array(4.0 * t),
+        "strain": np.full(5, np.nan),
+    }
+
+
+def written(target: object, nt: int = 4, **more: object) -> None:
+    with recorder(target, **more) as r:
+        for i in range(nt):
+            t = 0.5 * i
+            r.log({"t": t, "residual": np.inf if i == 1 else 1e-9, "dt": 0.5, "iterations": i})
+            if i == 2:
+                r.event(t, 1.0, 1.5, "switch", "slack at s = 1.2 m: 5 µN < 10 µN")
+            r.save(t, values(t), ONE if i < 2 else TWO)
+
+
+@pytest.fixture
+def result(tmp_path: Path) -> Result:
+    written(tmp_path / "run.h5")
+    return open_result(tmp_path / "run.h5")
+
+
+def test_round_trip(result: Result) -> None:
+    t = 0.5 * np.arange(4)
+    assert np.array_equal(result.times, t) and np.array_equal(result.t, t) and np.array_equal(result.s, S)
+    for name in ("position", "tension", "reaction_start", "energy/kinetic", "strain"):
+        assert np.array_equal(result[name], np.stack([values(x)[name] for x in t]), equal_nan=True), name
+    assert result.moment is result.bending_moment and result.tension.dtype == np.float64
+    assert list(result.energy) == ["kinetic"] and np.array_equal(result.energy.kinetic, 4.0 * t)
+    assert set(result.steps) == {"t", "residual", "dt", "iterations"}
+    assert result.steps["iterations"].tolist() == [0, 1, 2, 3] and result.steps["iterations"].dtype == np.int64
+    assert result.events == [Event(1.0, 1.0, 1.5, "switch", "slack at s = 1.2 m: 5 µN < 10 µN")]
+    assert result.scene_text == "title: Tëst\n" and result.title == "Tëst" and result.attributes["seed"] == 7
+    assert result.status == "complete" and not result.message and result.versions["numpy"] == np.__version__
+    assert set(result.versions) == {"hybrid-cable", "numpy", "h5py", "numba", "python"}
+    text = repr(result)
+    for part in ("Tëst", "run.h5", "4 outputs", "1.5 s", "5 points", "rod 1-2 m", "complete"):
+        assert part in text
+    assert "position" in dir(result) and "energy" in result and "moment" in result and "lift" not in result
+
+
+def test_in_memory_is_the_same_as_a_file(result: Result) -> None:
+    memory = io.BytesIO()
+    written(memory)
+    for source in (memory, memory.getvalue()):
+        other = open_result(source)
+        assert other.names == result.names and np.array_equal(other.position, result.position)
+        assert other.refresh() is other and "in memory" in repr(other)
+
+
+def test_every_dataset_has_unit_description_and_scales(tmp_path: Path) -> None:
+    speed = Field("speeds", "m/s", "of the current", (2,), ("z",))
+    depth = Field("z", "m", "heights of the current", (2,), ("z",), "inertial")
+    fixed = [(depth, np.array([0.0, -9.0])), (speed, np.array([1.0, 0.2]))]
+    written(tmp_path / "run.h5", fixed=fixed)
+    seen = []
+    with h5py.File(tmp_path / "run.h5") as file:
+
+        def visit(name: str, item: object) -> None:
+            if not isinstance(item, h5py.Dataset) or name == "scene":
+                return
+            seen.append(name)
+            assert isinstance(item.attrs["units"], str) and item.attrs["description"], name
+            for dim, size in zip(item.dims, item.shape, strict=True):
+                assert dim.label, name
+                assert item.is_scale or (dim[0].name == "/" + dim.label and dim[0].shape == (size,)), name
+
+        file.visititems(visit)
+        assert file["position"].attrs["frame"] == "inertial"
+        assert file["t"].is_scale and file["s"].is_scale and file["xyz"].is_scale and file["z"].is_scale
+        assert [d.label for d in file["position"].dims] == ["t", "s", "xyz"]
+    assert {"t", "s", "tension", "steps/dt", "zones/kind", "events/text", "energy/kinetic", "speeds"} <= set(seen)
+    result = open_result(tmp_path / "run.h5")
+    assert result.units["tension"] == "N" and result.units["moment"] == "N m" and result.units["energy/kinetic"] == "J"
+    assert result.describe("position") == "position(t, s, xyz) in m: position of the centreline (inertial frame)"
+    assert result.describe("energy") == "energy: kinetic (J)" and result.describe("zones").endswith("; t (s)")
+    assert result.speeds.tolist() == [1.0, 0.2] and result.dims("speeds") == ("z",)
+
+
+def test_zones_are_looked_up_by_output_and_written_only_when_they_change(result: Result) -> None:
+    assert len(result.zones) == 4
+    assert result.zones[0] == [Zone("catenary", 0.0, 1.5), Zone("rod", 1.5, 2.0)] == result.zones[1]
+    assert result.zones[2] == [Zone("catenary", 0.0, 1.0), Zone("rod", 1.0, 2.0)] == result.zones[-1]
+    assert result.zones[1:3] == [result.zones[1], result.zones[2]]
+    assert result["zones/t"].tolist() == [0.0, 0.0, 1.0, 1.0]
+    assert repr(result.zones).endswith("; from output 2: catenary 0-1 m, rod 1-2 m>")
+    with pytest.raises(IndexError):
+        result.zones[4]
+
+
+def test_interpolation_is_exact_on_linear_data(result: Result) -> None:
+    at = result.at(t=1.23, s=0.77)
+    assert at["tension"] == pytest.approx(13.07, rel=1e-14)  # round-off
+    assert at["position"] == pytest.approx([2.0, 0.0, 0.15], abs=1e-14)
+    assert at["energy/kinetic"] == pytest.approx(4.92, rel=1e-14)
+    at = result.at(t=[0.1, 1.5], s=[0.0, 0.3, 2.0], names=["tension", "position"])
+    assert set(at) == {"tension", "position"} and at["position"].shape == (2, 3, 3)
+    assert at["tension"] == pytest.approx(np.add.outer([1.0, 15.0], [0.0, 0.3, 2.0]), rel=1e-14)
+    assert result.at(s=0.5)["tension"].shape == (4,) and result.at(t=1.5)["tension"].tolist() == (15.0 + S).tolist()
+    assert result.at()["tension"] is result.tension
+    # The last time, reached by adding steps, may be a round-off beyond the end.
+    assert result.at(t=1.5 * (1 + 1e-15))["energy/kinetic"] == 6.0
+
+
+@pytest.mark.parametrize("where", [{"t": -0.1}, {"t": 1.6}, {"s": 2.1}, {"s": [0.0, np.nan]}])
+def test_outside_the_range_says_the_range(result: Result, where: dict[str, float]) -> None:
+    expected = r"0 <= t <= 1.5 s" if "t" in where else r"0 <= s <= 2 m"
+    with pytest.raises(ResultError, match=expected):
+        result.at(**where)
+
+
+def test_unknown_names_are_answered_with_near_ones(result: Result) -> None:
+    for wrong in ("tensoin", "tenson"):
+        with pytest.raises(ResultError, match=rf"no '{wrong}'; did you mean tension\?$"):
+            result[wrong]
+    with pytest.raises(ResultError, match="'energy' is a group; ask for energy/kinetic"):
+        result.dims("energy")
+    with pytest.raises(AttributeError, match="energy/kinetic"):
+        _ = result.kinetic
+    with pytest.raises(ResultError, match=r"it has .*tension"):
+        result.describe("lift")
+    assert not hasattr(result, "lift")
+    with pytest.raises(ValueError, match="read-only"):
+        result.tension[0] = 1.0
+
+
+def test_closed_results_keep_what_was_read(result: Result) -> None:
+    tension = result.tension
+    result.close()
+    assert result.tension is tension
+    with pytest.raises(ResultError, match="open the file again"):
+        result["strain"]
+
+
+# ---- interruption and concurrent reading ----------------------------------------------------------
+
+WRITER = """
+import sys, time
+sys.path[:0] = [{root!r}, {here!r}]
+from test_result_file import recorder, values, ONE, TWO
+r = recorder({path!r})
+for i in range(100000):
+    r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
+    r.save(float(i), values(float(i)), ONE if i % 4 < 2 else TWO)
+    r.flush()  # at once, where a run would hold outputs back for a moment: more chances to go wrong
+    if i == 20:
+        print("ready", flush=True)
+"""
+
+
+def test_a_running_file_can_be_read_and_survives_a_kill(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    root, here = Path(hybrid.__file__).parents[1], Path(__file__).parent
+    code = WRITER.format(root=str(root), here=str(here), path=str(path))
+    writer = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    try:
+        assert writer.stdout is not None and writer.stdout.readline() == "ready\n"
+        result = open_result(path)
+        before = len(result.times)
+        for _ in range(20):
+            check_consistent(result)
+            result.refresh()
+        time.sleep(0.05)
+        assert len(result.refresh().times) > before >= 21
+        assert result.status == "running"
+    finally:
+        writer.send_signal(signal.SIGKILL)
+        writer.wait()
+        assert writer.stdout is not None
+        writer.stdout.close()
+    for opened in (result.refresh(), open_result(path)):
+        check_consistent(opened)
+        assert opened.status == "running" and "interrupted or still running" in repr(opened)
+    with recorder(path, overwrite=True):  # and a killed file can be replaced
+        pass
+
+
+def check_consistent(result: Result) -> None:
+    """No row is half written: all fields have the values of their time."""
+    t = result.times
+    assert np.array_equal(t, np.arange(len(t)))
+    assert np.array_equal(result.tension, 10.0 * t[:, None] + S)
+    assert np.array_equal(result.energy.kinetic, 4.0 * t)
+    assert result.zones[len(t) - 1][0].s_b == (1.5 if (len(t) - 1) % 4 < 2 else 1.0)
+    assert len(result.steps["t"]) == len(result.steps["dt"]) >= len(t)
+
+
+def test_an_exception_sets_the_status(tmp_path: Path) -> None:
+    cases = (
+        (KeyboardInterrupt(), "interrupted", "stopped"),
+        (RuntimeError("the µ slipped"), "failed", "the µ slipped"),
+    )
+    for error, status, message in cases:
+        path = tmp_path / f"{status}.h5"
+        with pytest.raises(type(error)), recorder(path) as r:
+            r.save(0.0, values(0.0), ONE)
+            raise error
+        result = open_result(path)
+        assert result.status == status and message in result.message and message in repr(result)
+        assert len(result.times) == 1
+
+
+def test_a_reader_keeps_what_it_sees_while_the_run_is_repeated(result: Result, tmp_path: Path) -> None:
+    written(tmp_path / "run.h5", nt=2, overwrite=True)
+    assert result.tension.shape == (4, 5)
+    assert result.refresh().tension.shape == (2, 5)
+    assert [p.name for p in tmp_path.iterdir()] == ["run.h5"]
+
+
+def test_no_output_at_all(tmp_path: Path) -> None:
+    recorder(tmp_path / "run.h5").close("failed", "x" * 5000)
+    result = open_result(tmp_path / "run.h5")
+    assert "0 outputs" in repr(result) and result.position.shape == (0, 5, 3) and len(result.message) == 2048
+    with pytest.raises(ResultError, match="no output yet"):
+        result.at(t=0.0)
+
+
+def test_the_log_is_cheap(tmp_path: Path) -> None:
+    """2 us a step are promised on a quiet machine; ten times that would be noticed in a run."""
+    with recorder(tmp_path / "run.h5") as r:
+        row = {"t": 0.0, "residual": 0.0, "dt": 1.0, "iterations": 1}
+        begin = time.process_time()
+        for _ in range(5000):
+            r.log(row)
+        assert time.process_time() - begin < 5000 * 20e-6
+    assert len(open_result(tmp_path / "run.h5").steps["t"]) == 5000
+
+
+# ---- nonsense -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"tension": np.array([0.0, 1.0, np.nan, 0.0, 0.0])}, r"'tension' is not finite at t = 1.5 s .*\(2,\)"),
+        ({"energy/kinetic": np.array(np.inf)}, "'energy/kinetic' is not finite"),
+        ({"tension": np.zeros(4)}, r"'tension' has shape \(4,\), expected \(5,\)"),
+        ({"lift": np.zeros(5)}, "missing or unknown: lift"),
+    ],
+)
+def test_wrong_values_are_refused_by_name(change: dict[str, np.ndarray], message: str) -> None:
+    with recorder(io.BytesIO()) as r, pytest.raises(ResultError, match=message):
+        r.save(1.5, values(1.5) | change, ONE)
+
+
+def test_wrong_times_zones_and_logs_are_refused() -> None:
+    with recorder(io.BytesIO()) as r:
+        r.save(1.0, values(1.0), ONE)
+        for t in (1.0, 0.5, np.nan):
+            with pytest.raises(ResultError, match="cannot follow"):
+                r.save(t, values(1.0), ONE)
+        with pytest.raises(ResultError, match="zone is not finite"):
+            r.save(2.0, values(2.0), [("rod", 0.0, np.nan)])
+        with pytest.raises(ResultError, match="'dt' of the step log"):
+            r.log({"t": 0.0, "residual": 0.0, "dt": np.nan, "iterations": 0})
+        with pytest.raises(ResultError, match="event 'switch'"):
+            r.event(np.nan, 0.0, 1.0, "switch", "")
+        with pytest.raises(ValueError, match="none of running"):
+            r.close("perfect")
+
+
+@pytest.mark.parametrize(
+    "more, message",
+    [
+        ({"fields": (Field("t", "s", "mine"),)}, "'t' is taken"),
+        ({"fields": (Field("zones/a", "s", "mine"),)}, "'zones/a' is taken"),
+        ({"fields": (FIELDS[1], FIELDS[1])}, "twice: tension"),
+        ({"fields": (Field("a", "", "d", (5,), ()),)}, r"shape \(5,\) but dims"),
+        ({"fields": (Field("a", "", "d", (4,), ("s",)),)}, "4 along s, others have 5"),
+        ({"step_fields": (Field("a", "", "d", (4,), ("s",)),)}, "must be a number"),
+        ({"grid_s": np.array([0.0, 1.0, 1.0, 2.0, 3.0])}, "increasing"),
+        ({"attributes": {"status": "fine"}}, "'status' is written by the recorder"),
+    ],
+)
+def test_wrong_promises_are_refused_and_leave_nothing(tmp_path: Path, more: dict[str, object], message: str) -> None:
+    with pytest.raises(ResultError, match=message):
+        recorder(tmp_path / "run.h5", **more)
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_files_of_others_are_never_overwritten(tmp_path: Path) -> None:
+    path = tmp_path / "run.h5"
+    written(path)
+    with pytest.raises(ResultError, match="exists\n    try: "):
+        recorder(path)
+    notes, foreign, empty = tmp_path / "notes.txt", tmp_path / "foreign.h5", tmp_path / "empty.h5"
+    notes.write_text("my thesis")
+    h5py.File(foreign, "w").close()
+    for other in (notes, foreign):
+        before = other.read_bytes()
+        with pytest.raises(ResultError, match="is not a result of hybrid"):
+            recorder(other, overwrite=True)
+        assert other.read_bytes() == before
+    empty.touch()
+    written(empty, overwrite=True)  # nothing to lose, as `mktemp` makes it
+    assert open_result(empty).status == "complete"
+
+
+def test_places_where_nothing_can_be_written(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="mkdir -p"):
+        recorder(tmp_path / "no" / "run.h5")
+    with pytest.raises(ResultError, match="is a folder"):
+        recorder(tmp_path)
+    with pytest.raises(ResultError, match="cannot be written"):
+        recorder("/proc/run.h5")
+    if os.geteuid() != 0:  # the superuser may write anywhere
+        tmp_path.chmod(0o500)
+        with pytest.raises(ResultError, match="cannot be written"):
+            recorder(tmp_path / "run.h5")
+        tmp_path.chmod(0o700)
+
+
+def test_files_that_are_no_results(tmp_path: Path) -> None:
+    (tmp_path / "text.h5").write_text("hello")
+    h5py.File(tmp_path / "foreign.h5", "w").close()
+    written(tmp_path / "future.h5")
+    with h5py.File(tmp_path / "future.h5", "r+") as file:
+        file.attrs["format_version"] = 2
+    cases = (
+        (tmp_path / "none.h5", "there is no file"),
+        (tmp_path, "is a folder"),
+        (tmp_path / "text.h5", "cannot be read as a result"),
+        (tmp_path / "foreign.h5", "not a result of hybrid"),
+        (tmp_path / "future.h5", "result format 2; this program reads format 1"),
+        (b"hello", "no HDF5 file"),
+    )
+    for source, message in cases:
+        with pytest.raises(ResultError, match=message):
+            open_result(source)
+
+
+def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
+    code = "import sys, hybrid.store.writer; print(*(m for m in sys.modules if m.startswith(('hybrid', 'matplotlib'))))"
+    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}
+    modules = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, env=env).stdout
+    assert set(modules.split()) - {"hybrid"} == {
+        "hybrid.errors",
+        "hybrid.store",
+        "hybrid.store.checkpoint",
+        "hybrid.store.format",
+        "hybrid.store.integrity",
+        "hybrid.store.reader",
+        "hybrid.store.writer",
+        "hybrid.store.disk_space",
+    }
+
+
+def test_results_in_memory_are_closed_before_the_interpreter_goes() -> None:
+    """HDF5 would call Python when there is none any more: some scripts ended with a segmentation fault."""
+    script = """
+import atexit, hybrid
+end = {"kind": "free"}
+scene = hybrid.validate_scene({
+    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
+    "initial": {"kind": "straight", "direction": [0, 0, -1]}, "time": {"duration": 0.1, "step": 0.05},
+})
+result = hybrid.run(scene)
+assert result._file
+atexit._run_exitfuncs()
+assert not result._file
+"""
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

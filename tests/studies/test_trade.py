@@ -1,0 +1,443 @@
+"""The ladder of models and accuracies: what counts as good, what is kept, what is refused, what is drawn."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+import hybrid.studies.peers as peers
+import hybrid.studies.runs as rungs
+import hybrid.studies.tradeoff as ladder
+from hybrid.errors import ComputationError, Outcome, SceneError
+from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
+from hybrid.view.tradeoff import plot_trade
+
+# A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.
+SAG: dict[str, Any] = {
+    "title": "a line that sags",
+    "environment": {"fluid": {"density": 1025}},
+    "cable": {
+        "sections": [
+            {
+                "length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
+                "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+            }
+        ]
+    },
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -5]},
+        "end": {
+            "kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1},
+        },
+    },
+    "initial": "equilibrium",
+    "model": {"kind": "adaptive", "tolerance": 1e-4, "always_rod": [[0.0, 1.0]]},
+    "mesh": {"cells": 20},
+    "time": {"duration": 1.0, "step": 0.05},
+    "output": {"every": 0.1, "points": 25},
+}  # fmt: skip
+
+
+def scene(**changes: Any) -> hybrid.Scene:
+    return hybrid.validate_scene(SAG | changes)
+
+
+def row(model: str = "rod", asked: str = "1%", cpu: float = 1.0, error: float = 0.5, **more: Any) -> Row:
+    """A run with `error` metres and ten times as many newtons."""
+    figures = {"position": error, "pull": 10.0 * error, "position_part": error / 10, "pull_part": error / 20}
+    return Row("hybrid", model, asked, "done", cpu=cpu, **figures | more)
+
+
+def table(*rows: Row, position: float | None = 1.0, pull: float | None = 10.0, **more: Any) -> TradeTable:
+    reference = Row("hybrid", "rod", "0.03%", REFERENCE, estimate_position=0.01, estimate_pull=0.1, cells=9, steps=9)
+    facts = (("command", "`hybrid trade x.yaml`"),)
+    return TradeTable("by hand", "1%", 10.0, 200.0, position, pull, (reference, *rows), facts=facts, **more)
+
+
+# --- what counts as good ------------------------------------------------------------------------
+
+
+def test_the_front_is_what_nothing_beats() -> None:
+    points = [(1.0, 5.0), (2.0, 2.0), (3.0, 2.0), (2.0, 4.0), (5.0, 1.0), (6.0, 1.5), (0.5, 9.0)]
+    assert pareto(points) == [True, True, False, False, True, False, True]
+
+
+def test_equal_points_are_on_the_front_together_and_one_alone_is_on_it() -> None:
+    assert pareto([(1.0, 1.0), (1.0, 1.0)]) == [True, True]
+    assert pareto([(3.0, 3.0)]) == [True]
+    assert pareto([]) == []
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_the_front_falls_and_leaves_nobody_better_outside(seed: int) -> None:
+    points = [tuple(x) for x in np.random.default_rng(seed).uniform(size=(40, 2)).tolist()]
+    front = sorted(p for p, on in zip(points, pareto(points), strict=True) if on)
+    assert all(a[0] < b[0] and a[1] > b[1] for a, b in pairwise(front))
+    for p, on in zip(points, pareto(points), strict=True):
+        beaten = any(q[0] <= p[0] and q[1] <= p[1] and q != p for q in points)
+        assert on != beaten
+
+
+def test_the_cheapest_that_meets_what_is_asked_is_recommended() -> None:
+    rough, cheap, dear = row(cpu=0.1, error=2.0), row("catenary", cpu=0.5, error=0.9), row(cpu=2.0, error=0.1)
+    found = table(rough, cheap, dear, row("adaptive", cpu=0.7, error=0.95))
+    assert found.recommended == cheap
+    assert found.front() == [rough, cheap, dear]
+    said = found.recommendation
+    assert said.startswith("For 1% take model catenary with accuracy 1%: 0.5 s of CPU time")
+    assert "4 times less than all rod" in said and "0.9 m and 9 N" in said
+
+
+def test_the_worse_of_two_quantities_counts_and_what_is_not_asked_does_not() -> None:
+    bent = row(error=0.5, pull=30.0)
+    assert table(bent).score(bent) == 3.0
+    assert table(bent).recommended is None
+    assert table(bent, pull=None).recommended == bent
+    assert "No run met 1%; rod 1% comes nearest, at 3 times that" in table(bent).recommendation
+
+
+def test_failed_runs_references_and_other_programs_are_not_recommended() -> None:
+    guest = replace(row(cpu=0.01, error=0.01), code="MoorDyn")
+    ours = row(cpu=1.0, error=0.9)
+    failed = Row("hybrid", "catenary", "1%", FAILED, "it went slack", cpu=0.001)
+    check = replace(row(cpu=0.001, error=0.001), status=CHECK)
+    found = table(ours, failed, check, guest)
+    assert found.recommended == ours and found.front() == [guest]
+
+
+def test_a_run_that_misses_what_it_was_asked_says_by_how_much() -> None:
+    good, bad = row(error=0.5, estimate_pull=2.0), row(error=3.0, estimate_pull=2.0, pull=4.0)
+    limits = [(None, None), (1.0, 10.0), (1.0, 10.0), (None, None)]
+    _, first, second, third = judged(table(good, bad, bad), limits).rows
+    assert first.status == third.status == "done"
+    assert second.status == MISSED and second.cause == "position 3 times what was asked"
+
+
+def test_a_run_is_not_blamed_for_the_error_of_the_reference() -> None:
+    """The reference is known to 0.2 m, half of what the check differs by: 1.1 m may be 0.9 m, 1.3 m may not be 1 m."""
+    check = replace(row(error=0.4), status=CHECK)
+    limits = [(None, None)] * 2 + [(1.0, None)] * 2
+    *_, near, far = judged(table(check, row(error=1.1), row(error=1.3)), limits).rows
+    assert (near.status, far.status) == ("done", MISSED)
+
+
+def test_errors_below_that_of_the_reference_are_marked() -> None:
+    page = table(
+        row(error=0.005, estimate_position=0.01), row("catenary", error=0.5, estimate_position=0.25)
+    ).markdown()
+    first, second = (line for line in page.splitlines() if line.startswith(("| rod 1%", "| catenary")))
+    assert "≲ 0.005 m" in first and "(×" not in first
+    assert "≲" not in second and "0.25 m (× 0.5)" in second
+    doubt = table(row(), replace(row(error=0.4), status=CHECK))
+    assert doubt.doubt("position") == 0.2 and doubt.doubt("pull") == 2.0
+
+
+def test_errors_are_the_largest_over_time_and_place_and_pulls_are_vectors() -> None:
+    truth = {"position": np.zeros((3, 4, 3)), "reaction_start": np.tile([3.0, 4.0, 0.0], (3, 1))}
+    values = {name: x.copy() for name, x in truth.items()}
+    values["position"][1, 2] = [0.3, 0.0, 0.4]
+    values["reaction_start"][2] = [4.0, 3.0, 0.0]  # as large, elsewhere to
+    found = ladder.against(row(), values, truth, 10.0)
+    assert found.position == pytest.approx(0.5) and found.position_part == pytest.approx(0.05)
+    assert found.pull == pytest.approx(2**0.5) and found.pull_part == pytest.approx(2**0.5 / 5)
+    assert found.status == "done"
+    wild = values | {"reaction_start": 3.0 * truth["reaction_start"]}
+    assert ladder.against(row(), wild, truth, 10.0).status == FAILED, "wrong by twice the largest pull"
+    sizes = values | {"reaction_start": np.full((3, 1), 5.5)}  # a program that tells only how large a force is
+    assert ladder.against(row(), sizes, truth, 10.0).pull == pytest.approx(0.5)
+
+
+# --- the ladder ---------------------------------------------------------------------------------
+
+
+def test_a_rung_keeps_the_scene_and_drops_how_finely_it_was_to_be_computed() -> None:
+    asked = hybrid.validate_scene(rungs.rung_data(scene(), "adaptive", "0.3%"))
+    assert asked.mesh is None and asked.time is not None and asked.time.step is None
+    assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
+    assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.always_rod == ((0.0, 1.0),)
+    assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
+    assert rungs.rung_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
+
+
+def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
+    assert {"rod", "catenary", "adaptive", "zones"} <= set(rungs.kinds_of_models())
+    soft = scene()
+    data = soft.model_dump(mode="json", exclude_none=True)
+    del data["cable"]["sections"][0]["bending_stiffness"]
+    soft = hybrid.validate_scene(data | {"model": "catenary"})
+    admitted = [kind for kind, why in ladder._models(soft, None).items() if not why]
+    assert "catenary" in admitted and "rod" not in admitted
+
+
+@pytest.mark.parametrize(
+    ("changes", "where"),
+    [
+        ({"models": ["rood"]}, "models"),
+        ({"accuracies": ["1 parsec"]}, "accuracies"),
+        ({"accuracies": ["50%"]}, "accuracies"),
+        ({"asked_for": "much"}, "for"),
+        ({"reference": "1%", "accuracies": ["1%"]}, "reference"),
+        ({"reference": "none"}, "reference"),
+        ({"repeat": 0}, "repeat"),
+    ],
+)
+def test_nonsense_is_refused_before_anything_is_computed(tmp_path: Path, changes: dict[str, Any], where: str) -> None:
+    with pytest.raises(SceneError) as refused:
+        hybrid.trade(scene(), tmp_path / "new", **changes)
+    assert refused.value.complaints[0].where.split(".")[0] == where
+    assert not (tmp_path / "new").exists()
+
+
+def test_a_scene_without_time_is_refused(tmp_path: Path) -> None:
+    still = {name: value for name, value in SAG.items() if name != "time"}
+    with pytest.raises(SceneError, match="time"):
+        hybrid.trade(hybrid.validate_scene(still), tmp_path)
+
+
+@pytest.mark.parametrize(
+    ("accuracies", "reference"), [(["10%", "3%"], "0.03%"), (["0.06%"], "0.02%"), (["3 cm"], "0.03%")]
+)
+def test_the_reference_is_finer_than_the_ladder(accuracies: list[str], reference: str) -> None:
+    assert ladder._finer(scene(), accuracies) == reference
+    assert (
+        ladder._coarser("0.03%") == "0.09%" and ladder._coarser("8%") == "10%" and ladder._coarser("3 cm") == "0.09 m"
+    )
+
+
+# --- runs ---------------------------------------------------------------------------------------
+
+LADDER: dict[str, Any] = {"models": ["rod", "catenary"], "accuracies": ["10%", "3%"], "reference": "1%"}
+
+
+@pytest.fixture
+def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
+    """Which runs are made, warming up left out."""
+    made: list[str] = []
+    real = rungs.run
+
+    def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
+        if more:
+            assert scene.accuracy is not None
+            made.append(f"{scene.model.kind} {scene.accuracy.position}")
+        return real(scene, *args, **more)
+
+    monkeypatch.setattr(rungs, "run", run)
+    yield made
+
+
+def test_a_ladder_is_computed_once_and_kept(tmp_path: Path, counted: list[str]) -> None:
+    first = hybrid.trade(scene(), tmp_path, **LADDER)
+    assert counted[:2] == ["rod 1%", "rod 3%"], "the reference comes first, then what shows how converged it is"
+    # The check is the rung "rod 3%" as well: one run serves both.
+    assert sorted(counted) == sorted(["rod 1%", "rod 3%", "rod 10%", "catenary 10%", "catenary 3%"])
+    assert [r.name for r in first.rows] == ["rod 1%", "rod 3%", "rod 10%", "rod 3%", "catenary 10%", "catenary 3%"]
+    assert [r.status for r in first.rows][:2] == [REFERENCE, CHECK]
+    for r in first.choices:
+        assert r.position is not None and 0.0 < r.position < 0.5 and r.cells and r.steps and r.cpu and r.cpu > 0.0
+    assert first.recommended is not None
+
+    counted.clear()
+    second = hybrid.trade(scene(), tmp_path, **LADDER)
+    assert not counted and second.rows == first.rows
+    assert (tmp_path / "trade.md").read_text().count("0 of 6 made by this call") == 1
+
+    files = sorted((tmp_path / "runs").glob("*.json"))
+    lost = next(file for file in files if json.loads(file.read_text())["model"] == "catenary")
+    lost.unlink()
+    hybrid.trade(scene(), tmp_path, **LADDER)
+    assert len(counted) == 1 and counted[0].startswith("catenary")
+
+    counted.clear()
+    hybrid.trade(scene(time={"duration": 0.9}), tmp_path, **LADDER)
+    assert len(counted) == 5, "another scene is another ladder"
+
+
+def test_table_page_and_picture(tmp_path: Path) -> None:
+    found = hybrid.trade(scene(), tmp_path, **LADDER, command="hybrid trade sag.yaml")
+    rows = list(csv.DictReader(io.StringIO((tmp_path / "trade.csv").read_text())))
+    assert len(rows) == len(found.rows) == 6
+    for read, kept in zip(rows, found.rows, strict=True):
+        assert (read["model"], read["asked"], read["status"]) == (kept.model, kept.asked, kept.status)
+        assert read["pull"] == (f"{kept.pull:.6g}" if kept.pull is not None else "")
+    assert sum(int(read["recommended"]) for read in rows) == 1
+    assert {r.name for r in found.front()} == {f"{r['model']} {r['asked']}" for r in rows if r["front"] == "1"}
+    page = (tmp_path / "trade.md").read_text()
+    for said in (
+        "# a line that sags", found.recommendation, "(trade.png)", "| machine | ", "cores", "| versions | hybrid-cable ",
+        "`hybrid trade sag.yaml`", "Reference: rod 1%", "rod 3% differs from it by", "time.step, mesh, model.tolerance",
+        "it keeps always_rod",
+    ):  # fmt: skip
+        assert said in page, said
+    assert page.count("**take this**") == 1
+    assert_drawn(tmp_path / "trade.png")
+
+
+def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
+) -> None:
+    real = rungs.run
+
+    def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
+        if scene.model.kind == "catenary":
+            counted.append("failing")
+            raise ComputationError(Outcome.SLACK, 0.4, 3.0)
+        return real(scene, *args, **more)
+
+    monkeypatch.setattr(rungs, "run", run)
+    found = hybrid.trade(scene(), tmp_path, **LADDER)
+    failed = [r for r in found.rows if r.model == "catenary"]
+    assert [r.status for r in failed] == [FAILED] * 2 and "tension of a catenary zone vanished" in failed[0].cause
+    assert all(r.status != FAILED for r in found.rows if r.model == "rod")
+    counted.clear()
+    hybrid.trade(scene(), tmp_path, **LADDER)
+    assert not counted
+
+
+def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    def run(*_: Any, **__: Any) -> None:
+        raise ComputationError(Outcome.NOT_CONVERGED, 0.4, 3.0)
+
+    monkeypatch.setattr(rungs, "run", run)
+    with pytest.raises(ComputationError, match="this was the reference, rod 1%"):
+        hybrid.trade(scene(), tmp_path, **LADDER)
+    assert not (tmp_path / "trade.md").exists()
+
+
+def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
+) -> None:
+    real = rungs.run
+
+    def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
+        if more and len(counted) == 3:
+            raise KeyboardInterrupt
+        return real(scene, *args, **more)
+
+    with monkeypatch.context() as patch:
+        patch.setattr(rungs, "run", run)
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.trade(scene(), tmp_path, **LADDER)
+    assert len(counted) == 3
+    assert "(3 runs are missing)" in (tmp_path / "trade.md").read_text()
+    assert_drawn(tmp_path / "trade.png")
+    whole = hybrid.trade(scene(), tmp_path, **LADDER)
+    assert len(counted) == 5 and whole.missing == 0 and len(whole.rows) == 6
+
+
+def test_a_half_written_run_is_made_again(tmp_path: Path, counted: list[str]) -> None:
+    hybrid.trade(scene(), tmp_path, **LADDER)
+    counted.clear()
+    for file in (tmp_path / "runs").glob("*.json"):
+        if json.loads(file.read_text())["asked"] == "10%":
+            file.write_text('{"code": "hyb')
+    hybrid.trade(scene(), tmp_path, **LADDER)
+    assert sorted(counted) == ["catenary 10%", "rod 10%"]
+
+
+# --- the picture --------------------------------------------------------------------------------
+
+
+def assert_drawn(file: Path) -> None:
+    """It has ink, of more than one colour, and is no larger than a page may be."""
+    from matplotlib.image import imread
+
+    pixels = (255 * imread(file)[..., :3]).astype(int).reshape(-1, 3)
+    assert len(np.unique(pixels, axis=0)) > 50
+    assert 0.01 < (pixels.sum(axis=1) < 600).mean() < 0.5
+    assert file.stat().st_size < 150_000
+
+
+def test_the_picture_shows_every_run_at_its_place() -> None:
+    rows = [row(asked=a, cpu=c, error=e) for a, c, e in (("10%", 0.1, 2.0), ("1%", 0.5, 0.5), ("0.1%", 3.0, 0.03))]
+    rows += [row("catenary", "1%", 0.3, 0.7), replace(row(cpu=9.0, error=0.2), code="MoorDyn", asked="25 elements, x")]
+    figure = plot_trade(table(*rows))
+    position = next(ax for ax in figure.axes if ax.get_title("left") == "error of position")
+    lines = {line.get_label(): line for line in position.get_lines()}
+    np.testing.assert_allclose(lines["rod"].get_xydata(), [(0.1, 2.0), (0.5, 0.5), (3.0, 0.03)])
+    np.testing.assert_allclose(lines["MoorDyn"].get_xydata(), [(9.0, 0.2)])
+    np.testing.assert_allclose(lines["take this"].get_xydata(), [(0.3, 0.7)])
+    assert lines["front"].get_xydata().shape == (4, 2)
+    assert position.get_xscale() == position.get_yscale() == "log"
+    (low, high), (left, right) = position.get_ylim(), position.get_xlim()
+    assert low < 0.03 and high > 2.0 and left < 0.1 and right > 9.0
+
+
+def test_a_picture_without_runs_or_pulls_says_so() -> None:
+    assert any("no run came to an end" in text.get_text() for text in plot_trade(table()).texts)
+    figure = plot_trade(table(row(pull=None, pull_part=None)))
+    assert [ax.get_visible() for ax in figure.axes].count(False) == 1
+
+
+# --- other programs -----------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("change", "reason"),
+    [
+        ({}, ""),
+        ({"environment": {}, "initial": "equilibrium"}, "no water"),
+        ({"environment": {"fluid": {"density": 1025, "current": [1, 0, 0]}}}, "water moves"),
+        ({"initial": {"kind": "points", "points": [[0, 0, -5], [5, 0, -9], [10, 0, -5]]}}, "starts points"),
+        ({"ends": SAG["ends"] | {"end": "free"}}, "not pinned"),
+    ],
+)
+def test_what_other_programs_cannot_do_is_said(change: dict[str, Any], reason: str) -> None:
+    data = dict(SAG | change)
+    if "environment" in change and not change["environment"]:
+        section = {k: v for k, v in SAG["cable"]["sections"][0].items() if k not in ("drag", "added_mass")}
+        data["cable"] = {"sections": [section]}
+    said = peers.unfit(hybrid.validate_scene(data))
+    assert reason in said and bool(said) == bool(reason)
+
+
+def test_a_program_that_is_not_installed_has_no_row_and_one_that_cannot_has_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
+    moving = scene(environment={"fluid": {"density": 1025, "current": [0.1, 0, 0]}})
+    found = hybrid.trade(moving, tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
+    (guest,) = (r for r in found.rows if r.code != "hybrid")
+    assert (guest.code, guest.status, guest.cause) == ("MoorDyn", "cannot do", "the water moves")
+    assert "MoorDyn" in (tmp_path / "trade.md").read_text()
+
+
+@pytest.mark.parametrize("code", list(peers.PEERS))
+def test_another_program_agrees(code: str) -> None:
+    """With the rod at 0.3 %, to 1 % of the length, and in the middle of all outputs 1 % of the pull: what 50 elements can."""
+    pytest.importorskip(peers.PEERS[code].package)
+    guest = next(g for g in peers.ladder(scene()) if g.code == code and g.elements == 50)
+    answer = peers.answer(guest, scene())
+    result = hybrid.run(hybrid.validate_scene(rungs.rung_data(scene(), "rod", "0.3%")))
+    truth = {name: np.array(result[name]) for name in rungs.COMPARED}
+    found = ladder.against(row(), answer.values, truth, 12.0)
+    assert found.position_part is not None and found.position_part < 0.01
+    usual = [np.median(ladder._apart(answer.values[x], truth[x])) for x in ladder.PULLS]
+    assert max(usual) < 0.01 * ladder._largest_pull(truth)
+    assert answer.cpu > 0.0 and answer.steps > 10
+
+
+def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
+    real = peers.answer
+
+    def answer(guest: peers.Guest, scene: hybrid.Scene) -> peers.Answer:
+        if guest.elements != 25:
+            raise peers.Failed("it blew up")
+        return real(replace(guest, code="nobody"), scene)
+
+    monkeypatch.setattr(peers, "answer", answer)
+    monkeypatch.setattr(peers, "versions", lambda guests: "moordyn 0")
+    found = hybrid.trade(scene(), tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
+    guests = [r for r in found.rows if r.code != "hybrid"]
+    assert [r.status for r in guests] == [FAILED] * 3
+    assert "nobody" in guests[0].cause and guests[1].cause == "it blew up"

@@ -1,0 +1,89 @@
+"""Films: frames are outputs, their number is bounded, their pace is what is said; and what cannot be made is refused."""
+
+from __future__ import annotations
+
+import re
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+from PIL import Image
+from reported import reported
+
+from hybrid.errors import ResultError
+from hybrid.view import animation as film
+from hybrid.view.style import KIND_COLOURS
+
+
+def test_a_gif_moves_at_the_pace_that_is_said(tmp_path: Path) -> None:
+    made = film.animate(reported(), tmp_path / "run.gif")
+    with Image.open(made.path) as image:
+        assert image.n_frames == made.frames == 21 and image.info["loop"] == 0
+        seconds = made.frames * image.info["duration"] / 1000
+        frames = []
+        for k in (0, 10, 20):
+            image.seek(k)
+            frames.append(np.asarray(image.convert("RGB"), float))
+    assert seconds == pytest.approx(made.seconds) and 10.0 / seconds == pytest.approx(made.factor, rel=0.01)
+    assert np.abs(frames[0] - frames[1]).max() > 100, "the cable moves"
+    rod = np.array([int(KIND_COLOURS["rod"][k : k + 2], 16) for k in (1, 3, 5)])
+    near = [int((np.abs(frame - rod).max(axis=2) < 30).sum()) for frame in frames]
+    assert near[2] > 2 * near[0], "rod comes after half the time"
+    assert [x.name for x in tmp_path.iterdir()] == ["run.gif"]
+
+
+def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
+    program = film.ffmpeg()
+    if program is None:
+        pytest.skip("no ffmpeg on PATH and no package imageio-ffmpeg: an mp4 cannot be written here")
+    made = film.animate(reported(), tmp_path / "run.mp4")
+    said = subprocess.run([program, "-i", str(made.path), "-f", "null", "-"], capture_output=True, text=True).stderr
+    assert "h264" in said and "yuv420p" in said and "1200x768" in said
+    counted = [int(x) for x in re.findall(r"frame=\s*(\d+)", said)]
+    assert counted and counted[-1] == made.frames
+
+
+def test_the_number_of_frames_is_bounded_and_said(tmp_path: Path) -> None:
+    result = reported(outputs=1501, points=21)
+    made = film.animate(result, tmp_path / "run.gif")
+    assert made.frames <= 240 and f"{made.frames} frames of 1501 outputs" in made.text
+    assert "of" not in film.animate(reported(outputs=5), tmp_path / "few.gif").text.split(",")[0]
+
+
+def test_frames_are_the_outputs_nearest_to_even_times() -> None:
+    result = reported(outputs=101)
+    assert film._frames(result, 11).tolist() == list(range(0, 101, 10))
+    assert film._frames(result, 1000).tolist() == list(range(101))
+
+
+@pytest.mark.parametrize(
+    ("name", "words"),
+    [("run.avi", "ends in .mp4 or .gif"), ("missing/run.gif", "there is no folder"), (".", "is a folder")],
+)
+def test_what_cannot_be_written_is_refused(tmp_path: Path, name: str, words: str) -> None:
+    with pytest.raises(ResultError, match=words):
+        film.animate(reported(), tmp_path / name)
+
+
+@pytest.mark.parametrize("outputs", [0, 1])
+def test_what_does_not_move_is_refused(tmp_path: Path, outputs: int) -> None:
+    with pytest.raises(ResultError, match="nothing moves"):
+        film.animate(reported(outputs=outputs), tmp_path / "run.gif")
+    assert not list(tmp_path.iterdir())
+
+
+def test_without_ffmpeg_an_mp4_is_refused_with_what_to_do(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(film, "ffmpeg", lambda: None)
+    with pytest.raises(ResultError, match=r"needs the program ffmpeg(.|\n)*\[video\]"):
+        film.animate(reported(), tmp_path / "run.mp4")
+
+
+def test_a_failing_ffmpeg_is_quoted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    broken = tmp_path / "ffmpeg"
+    broken.write_text("#!/bin/sh\necho 'no such codec' >&2\nexit 1\n")
+    broken.chmod(0o755)
+    monkeypatch.setattr(film, "ffmpeg", lambda: str(broken))
+    with pytest.raises(ResultError, match="no such codec"):
+        film.animate(reported(), tmp_path / "run.mp4")
+    assert [x.name for x in tmp_path.iterdir()] == ["ffmpeg"]

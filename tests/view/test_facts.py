@@ -1,0 +1,133 @@
+"""What a report says first: every number is that of the data, and what is missing is said to be."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from reported import reported
+
+from hybrid.errors import EVENTS_BY_WEIGHT
+from hybrid.store.reader import Result
+from hybrid.view.style import NEWS
+from hybrid.view.summary import Fact, amount, attention, facts_of
+
+
+def fact(result: Result, key: str) -> Fact:
+    (found,) = [f for f in facts_of(result) if f.key == key]
+    return found
+
+
+def test_the_largest_tension_is_that_of_all_outputs_and_points() -> None:
+    found = fact(reported(), "tension")
+    assert found.values["tension"] == pytest.approx(21e3) and (found.t, found.s) == (2.5, 100.0)
+    assert found.text.startswith("21 kN at the end (s = 100 m), t = 2.5 s.")
+    assert "Between outputs the pull on the end reaches 22.05 kN, at t = 2.5 s." in found.text
+    assert "Between" not in fact(reported(steps=False), "tension").text
+    assert "(± 100 N)" in fact(reported(errors=True), "tension").text
+
+
+def test_the_smallest_bend_radius_is_held_against_the_one_allowed_there() -> None:
+    free = fact(reported(), "bend")
+    assert free.values["radius"] == pytest.approx(50.0) and (free.t, free.s) == (2.5, 50.0)
+    assert free.text.endswith("No allowed radius given.") and free.weight == "plain"
+    good = fact(reported(allowed=40.0), "bend")
+    assert good.weight == "plain" and good.values["ratio"] == pytest.approx(0.8) and "80 % of that bend" in good.text
+    bad = fact(reported(allowed=60.0), "bend")
+    assert bad.weight == "alarm" and "below the 60 m allowed" in bad.text
+    # 0.02 (0.75 + 0.25 sin) > 1/60 where the sine is above 1/3: 8 of the 21 outputs
+    times = np.linspace(0.0, 10.0, 21)
+    count = int((0.02 * (0.75 + 0.25 * np.sin(0.2 * np.pi * times)) > 1 / 60).sum())
+    assert f"at {count} of 21 outputs" in bad.text
+
+
+def test_slack_says_where_when_how_often_and_how_long() -> None:
+    taut = fact(reported(), "slack")
+    assert taut.weight == "plain" and "taut everywhere and always" in taut.text
+    assert taut.values["tension"] == pytest.approx(9e3) and (taut.t, taut.s) == (7.5, 0.0)
+    slack = fact(reported(dip=15.5e3), "slack")
+    assert slack.values["tension"] == pytest.approx(-500.0) and (slack.t, slack.s) == (5.0, 50.0)
+    assert slack.weight == "note" and "at 1 of 21 outputs, at most 2.5 m of it" in slack.text
+
+
+def test_points_on_a_part_of_the_line_are_not_taken_for_all_of_it() -> None:
+    part = reported(span=(10.0, 90.0))
+    assert "at s = 90 m" in fact(part, "tension").text and "at s = 10 m" in fact(part, "slack").text
+    assert "at all points that were saved" in fact(part, "slack").text
+
+
+def test_torque_is_held_against_greenhills_criterion() -> None:
+    """T > M^2 / (4 EI): of 2000 N m, 500 N are needed in the rods, where at least 12.9 kN are there."""
+    found = fact(reported(torque=2000.0), "hockling")
+    least = 1e4 * (1.4 - 0.1)
+    assert found.values["needed"] == pytest.approx(2000.0**2 / (4 * 2000.0)) and found.weight == "plain"
+    assert found.values["ratio"] == pytest.approx(500.0 / least) and (found.t, found.s) == (7.5, 40.0)
+    assert "Greenhill" in found.text and f"{least / 500.0:.3g} times as much" in found.text
+    broken = fact(reported(torque=12e3), "hockling")
+    assert broken.weight == "alarm" and broken.values["ratio"] > 1.0
+    assert "carry no torque" in fact(reported(), "hockling").text
+    assert "far too small" in fact(reported(torque=0.1), "hockling").text
+    none = fact(reported(rod=False), "hockling")
+    assert none.weight == "absent" and "No torque is computed" in none.text
+
+
+def test_torque_in_slack_rods_breaks_the_criterion() -> None:
+    found = fact(reported(torque=2000.0, dip=20e3, outputs=41), "hockling")
+    assert "No torque" not in found.text and found.weight == "plain"  # the dip is before the rod comes
+    slack = reported(torque=2000.0)
+    tension = slack.tension.copy()
+    tension[-1, 20] = -100.0
+    slack._cache["tension"] = tension
+    found = fact(slack, "hockling")
+    assert found.weight == "alarm" and (found.t, found.s) == (10.0, 50.0)
+
+
+def test_touchdown_is_told_with_its_range() -> None:
+    found = fact(reported(), "seabed")
+    assert found.values["grounded"] == pytest.approx([19.0, 21.0])
+    assert found.values["touchdown"]["last"] == pytest.approx([19.0, 21.0])
+    assert "contact ends at s = 19 to 21 m" in found.text and "3.15 kN, t = 2.5 s" in found.text
+    assert fact(reported(seabed=False), "seabed").text == "The scene has no seabed."
+
+
+def test_errors_are_told_by_cause_or_said_not_to_be_estimated() -> None:
+    found = fact(reported(errors=True), "errors")
+    assert found.values["mesh_position"] == 0.03 and found.values["total_pull"] == 42.0
+    assert "Position 0.042 m, pulls at the ends 42 N" in found.text
+    assert fact(reported(), "errors").text.startswith("Not estimated")
+
+
+def test_warnings_come_by_weight_and_news_are_none() -> None:
+    events = [(1.0, 0.0, 100.0, "turned in", "news"), (3.0, 5.0, 5.0, "snap", "a blow"), (2.0, 0, 9, "slack", "loose")]
+    events += [(4.0, 0.0, 9.0, "slack", "loose again"), (5.0, 1.0, 2.0, "grow", "bend 1.05 > 1")]
+    found = [f for f in facts_of(reported(events=events)) if f.key == "warning"]
+    assert [(f.values["kind"], f.weight) for f in found] == [
+        ("slack", "alarm"),
+        ("snap", "alarm"),
+        ("turned in", "note"),
+    ]
+    assert "(2 times; this is the first)" in found[0].text and found[0].t == 2.0
+    assert EVENTS_BY_WEIGHT.index("slack") < EVENTS_BY_WEIGHT.index("snap") and "turned in" in NEWS
+
+
+def test_what_needs_attention_begins_with_how_it_ended() -> None:
+    events = [(3.0, 5.0, 5.0, "snap", "a blow")]
+    result = reported(events=events, allowed=60.0, status="failed", message="it diverged")
+    assert [f.key for f in attention(facts_of(result))] == ["status", "bend", "warning"]
+    assert attention(facts_of(reported())) == []
+    told = reported(status="failed", message="slack at t = 1 s", events=[(1.0, 0, 1, "slack", "slack at t = 1 s")])
+    assert [f.key for f in attention(facts_of(told))] == ["status"]  # not told twice
+
+
+@pytest.mark.parametrize("outputs", [0, 1, 2])
+def test_facts_of_few_outputs(outputs: int) -> None:
+    facts = facts_of(reported(outputs=outputs, seabed=False, energy=False))
+    assert facts[-1].key == "status" and all(f.text for f in facts)
+    if outputs == 1:
+        assert not any(", t = " in f.text for f in facts[:-1])
+
+
+def test_amounts_are_as_engineers_write_them() -> None:
+    assert [amount(41346.9, "N"), amount(0.0, "N"), amount(-0.25, "N", 2)] == ["41.35 kN", "0 N", "-250 mN"]
+    assert amount(math.pi, "m", 3) == "3.14 m"
