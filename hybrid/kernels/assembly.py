@@ -22,6 +22,17 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import after, angular_velocity, before, bending, damped_bending
 from hybrid.kernels.loads import ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
+from hybrid.kernels.report import (
+    ASSEMBLED,
+    FORCE_A,
+    FORCE_B,
+    MOMENT_A,
+    MOMENT_B,
+    REPORT_SIZE,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    STIFFNESS_DAMPING_POWER,
+)
 from hybrid.kernels.rotations import (
     add,
     cross,
@@ -36,15 +47,6 @@ from hybrid.kernels.rotations import (
     scale,
     sub,
 )
-
-REPORT, STEP_REPORT = 33, 22  # numbers of `report`; those from 22 on are not the march's
-# report: 0-2, 3-5 resultant on start and end node; 6-8, 9-11 moment at start and end;
-#         12 drag power, 13 mass damping power, 14 stiffness damping power, 15 largest residual, 16 its node,
-#         17 power into the added mass, 18 power of waves and of buoyancy at the surface,
-#         21 force of the seabed along its normal; of a whole step (kernels.newton.advance): 19 and
-#         20 work (J) of the seabed along its normal and in its plane, 28 energy that it stores, 22-25 `sharpest`,
-#         26 lowest tension of a catenary cell, 27 that cell; 29 kinetic energy of the push out of a plane, 30 how
-#         many pivots of its equations have the wrong sign (kernels.out_of_plane), 31 local error of position (m), 32 its node
 
 
 @inner
@@ -79,9 +81,9 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
         kept, next_kept = (n + 1) * ROW, KEPT
     bits = line.bits
     moving = bits & (ROTARY | STIFFNESS_DAMPING)
-    for j in range(STEP_REPORT):
+    for j in range(ASSEMBLED):
         report[j] = 0.0
-    report[16] = -1.0
+    report[RESIDUAL_NODE] = -1.0
 
     # the first chord and the element at the start
     d, l, il = chord(get3(e, 0))
@@ -103,11 +105,11 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
             )
             A, a = after(C, d, il)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
-            report[14] += loss
+            report[STIFFNESS_DAMPING_POWER] += loss
         else:
             M, C = bending(Rg, Ra, get3(line.kb, 0), get3(line.k0, 0))
             A, a = after(C, d, il)
-    report[6], report[7], report[8] = M
+    report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = M
 
     np_, pNm, pnm, pN0, pn0, pNp, pnp = Z3, Z9, Z3, Z9, Z3, Z9, Z3  # force of cell i-1 and its derivatives
     wide_before = False
@@ -144,7 +146,7 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
                 An, an = madd(An, mat_mat(Cd, We)), add(an, mat_vec(Cd, Wp))
                 Bn, bn = before(msub(C, mat_mat(Cd, hat(sub(wb, wa_)))), Mn, d, il)
                 Bn, bn = madd(Bn, mat_mat(Cd, Wae)), add(bn, mat_vec(Cd, Wap))
-                report[14] += loss
+                report[STIFFNESS_DAMPING_POWER] += loss
             else:
                 Mn, C = bending(Ra, Rn, kb, k0)
                 An, an = after(C, dn, iln)
@@ -163,7 +165,7 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
                 row, late = damped_stretch(d, e1, d1, line.tau[i], cv)
                 gap -= late
                 along = dot(d, e1)
-                report[14] += line.tau[i] * along * along / hck
+                report[STIFFNESS_DAMPING_POWER] += line.tau[i] * along * along / hck
             if gaps.shape[0] > 0 and hck == 0.0:
                 gap = gaps[i]
             if bent:
@@ -193,14 +195,14 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
         held = (i == 0 and ends.held[0]) or (i == n and ends.held[1])
         if i == 0:
             F = add(F, get3(ends.force, 0))
-            report[0], report[1], report[2] = F
+            report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = F
         if i == n:
             F = add(F, get3(ends.force, 1))
-            report[3], report[4], report[5] = F
+            report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = F
         if not held:
             big = max(abs(F[0]), abs(F[1]), abs(F[2]))
-            if not big <= report[15]:
-                report[15], report[16] = big, i
+            if not big <= report[RESIDUAL]:
+                report[RESIDUAL], report[RESIDUAL_NODE] = big, i
         G1, G2 = madd(msub(Nm, pN0), GL), madd(msub(N0, pNp), GR)
         Dii = madd(msub(G1, G2), D)
         rhs = scale(-1.0, F)
@@ -304,7 +306,7 @@ def march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, rep
 
         # --- step along s
         if i == n - 1:
-            report[9], report[10], report[11] = Mn
+            report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = Mn
         d_before, l_before, il_before = d, l, il
         row_before, hck_before, gap_before = row, hck, gap
         np_, pNm, pnm, pN0, pn0, pNp, pnp = nc, Nm, nm, N0, n0, Np, npl
@@ -320,7 +322,7 @@ def workspace(n_cells: int, keep: bool = False):
         np.zeros(SIZE * WIDTH),
         np.zeros((n_cells + 1) * (ROW + KEPT if keep else ROW)),
         np.zeros((n_cells + 1, SIZE)),
-        np.zeros(REPORT),
+        np.zeros(REPORT_SIZE),
         np.zeros((0, SIZE * WIDTH)),
         np.zeros(0),
     )

@@ -35,8 +35,17 @@ from hybrid.kernels.plane import (
     spread2,
     turning2,
 )
+from hybrid.kernels.report import (
+    ASSEMBLED,
+    FORCE_A,
+    FORCE_B,
+    MOMENT_A,
+    MOMENT_B,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    STIFFNESS_DAMPING_POWER,
+)
 
-REPORTED = 22  # numbers of the report that are the march's (kernels.assembly)
 COLUMNS = 6  # of a row of X_i
 TRIPLE = 3 * COLUMNS  # numbers of X_i
 WIDE = 13  # of a block row before elimination (keep_rows)
@@ -187,9 +196,9 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
     bits, plane = line.bits, line.plane
     damped = bits & STIFFNESS_DAMPING
     moving = bits & (ROTARY | STIFFNESS_DAMPING)
-    for j in range(REPORTED):
+    for j in range(ASSEMBLED):
         report[j] = 0.0
-    report[16] = -1.0
+    report[RESIDUAL_NODE] = -1.0
 
     # the first chord, and the element at the start: moment M about n, and how it answers to the chord after it (A)
     # and before it (B): dM = A.de_i - B.de_{i-1}
@@ -206,8 +215,8 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
         rate = turn - across2(plane, ends.spin, 0) if damped else 0.0
         M = k * (angle_between(end_chord(plane, ends.frame, 0), d) - k0 + tau * rate)
         A = (k * (g[0] + tau * g1[0]), k * (g[1] + tau * g1[1]))
-        report[14] += k * tau * rate * rate
-    report[6], report[7], report[8] = M * plane[2, 0], M * plane[2, 1], M * plane[2, 2]
+        report[STIFFNESS_DAMPING_POWER] += k * tau * rate * rate
+    report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = M * plane[2, 0], M * plane[2, 1], M * plane[2, 2]
 
     force, pNm, pN0, pNp = Z2, Z4, Z4, Z4  # force of cell i-1 and its derivatives
     wide_before = False
@@ -239,7 +248,7 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
             Mn = angle_between(d, after) - k0
             if damped:
                 Mn += late * rate
-                report[14] += k * late * rate * rate
+                report[STIFFNESS_DAMPING_POWER] += k * late * rate * rate
             Mn *= k
             Bn = (k * (g[0] + late * g1[0]), k * (g[1] + late * g1[1]))
             if i + 1 < n:
@@ -257,7 +266,7 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
             if damped and hck > 0.0:  # what does not stretch has no rate of stretching to damp
                 x, y, along = 1.0 + tau * cv, tau * turn, dot2(d, e1)
                 row, gap = (x * d[0] + y * m[0], x * d[1] + y * m[1]), gap - tau * along
-                report[14] += tau * along * along / hck
+                report[STIFFNESS_DAMPING_POWER] += tau * along * along / hck
             if bent:
                 # shear -m Q/l, whose Q answers to the chords of cells i-1, i, i+1
                 x = il * (Mn - M)
@@ -281,15 +290,15 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
         if i == 0:
             f = part2(plane, ends.force, 0)
             F = (F[0] + f[0], F[1] + f[1])
-            report[0], report[1], report[2] = spread2(plane, F)
+            report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = spread2(plane, F)
         if i == n:
             f = part2(plane, ends.force, 1)
             F = (F[0] + f[0], F[1] + f[1])
-            report[3], report[4], report[5] = spread2(plane, F)
+            report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = spread2(plane, F)
         if not held:
             big = max(abs(F[0]), abs(F[1]))
-            if not big <= report[15]:
-                report[15], report[16] = big, i
+            if not big <= report[RESIDUAL]:
+                report[RESIDUAL], report[RESIDUAL_NODE] = big, i
         G1, G2 = madd2(msub2(Nm, pN0), GL), madd2(msub2(N0, pNp), GR)
         Dii = madd2(msub2(G1, G2), D)
         rhs = (-F[0], -F[1])
@@ -318,7 +327,11 @@ def march_planar(line, sea, ends, e, u, r, v, vd, T, a1, cv, ca, X, report, rows
 
         # --- step along s
         if i == n - 1:
-            report[9], report[10], report[11] = Mn * plane[2, 0], Mn * plane[2, 1], Mn * plane[2, 2]
+            report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = (
+                Mn * plane[2, 0],
+                Mn * plane[2, 1],
+                Mn * plane[2, 2],
+            )
         d_before, l_before, il_before = d, l, il
         row_before, hck_before, gap_before = row, hck, gap
         force, pNm, pN0, pNp = nc, Nm, N0, Np

@@ -20,6 +20,23 @@ from hybrid.kernels.loads import FRICTION, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.out_of_plane import step_aside
 from hybrid.kernels.plane import chord2, part2
+from hybrid.kernels.report import (
+    BEND,
+    BEND_NODE,
+    CONTACT_WORK,
+    FRICTION_WORK,
+    LOCAL_ERROR,
+    LOCAL_ERROR_NODE,
+    PUSH_ENERGY,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    SEABED_ENERGY,
+    SLACKEST,
+    SLACKEST_CELL,
+    TWIST,
+    TWIST_NODE,
+    WRONG_PIVOTS,
+)
 from hybrid.kernels.rotations import dot, frame, log_rotation, spin_about, transport
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.water import stir
@@ -164,8 +181,8 @@ def newton(
         else:
             bad = march(line, sea, ends, e, u, r, v, vd, T, a1, w, wd, cv, ca, gaps, W, X, report, rows)
         if bad >= 0:
-            if not report[15] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
-                return NOT_FINITE, it, left, int(report[16])
+            if not report[RESIDUAL] < math.inf:  # a NaN makes every pivot fail: say so instead of "singular"
+                return NOT_FINITE, it, left, int(report[RESIDUAL_NODE])
             return SINGULAR, it, left, bad
         if not (substitute_planar(line.plane, X, x) if planar else substitute(X, x)):
             return NOT_FINITE, it, left, first_bad(x, e)
@@ -374,22 +391,22 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
         turn, cell = widest_turn(old.e, u)
         if not turn < LARGEST_STEP_TURN:
             outcome, where = TURNED_TOO_FAR, cell
-        report[22], report[23], report[24], report[25] = sharpest(line, ends, new.e, new.T, new.a1)
-        report[26], report[27] = lowest(line, new.T)
+        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest(line, ends, new.e, new.T, new.a1)
+        report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
         change, place = unrest(old, new)
-        report[31], report[32] = slip * dt * dt * change, place
+        report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place
         if line.bits & SEABED:
             for i in range(n + 1):  # force times way: bounded by the energy of a blow, however short the step is not
                 b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
                      0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
                 ui = get3(u, i)
                 along = dot(sea.normal, ui) * dot(sea.normal, b)
-                report[19] += along
-                report[20] += dot(b, ui) - along
+                report[CONTACT_WORK] += along
+                report[FRICTION_WORK] += dot(b, ui) - along
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
-            report[28] = stored(line, sea, new.r)
+            report[SEABED_ENERGY] = stored(line, sea, new.r)
         if was.shape[0] > 0:
-            report[29], report[30] = step_aside(
+            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_aside(
                 line, sea, ends, new.r, new.e, new.v, new.vd, new.T, new.a1, dt, before, rho, was, now, X
             )
     return outcome, iterations, left, where

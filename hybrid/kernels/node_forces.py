@@ -21,6 +21,7 @@ from hybrid.kernels.loads import (
     half_cell_added_mass,
     half_cell_drag,
 )
+from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 from hybrid.kernels.rotations import add, dot, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
 from hybrid.kernels.water import current_at, wetted, wetted_stretch
@@ -72,9 +73,9 @@ def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, d, l, il, cv, ca, r
         D = madd(mscale(wet, D), mscale(-(wa + wb) * iD, outer(f, UP)))
         L = madd(mscale(wet, L), mscale(-side * 0.5 * wb * iD, outer(f, UP)))
         f = scale(wet, f)
-    report[12] -= wet * drag
-    report[17] -= wet * added
-    report[18] += wet * pushed
+    report[DRAG_POWER] -= wet * drag
+    report[ADDED_MASS_POWER] -= wet * added
+    report[WAVE_POWER] += wet * pushed
     return f, D, L
 
 
@@ -106,9 +107,9 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
             wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
         D = madd(mscale(wet, D), mscale(-slope * iH, outer(f, UP)))
         f = scale(wet, f)
-    report[12] -= wet * drag
-    report[17] -= wet * added
-    report[18] += wet * pushed
+    report[DRAG_POWER] -= wet * drag
+    report[ADDED_MASS_POWER] -= wet * added
+    report[WAVE_POWER] += wet * pushed
     return f, D
 
 
@@ -139,7 +140,7 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
         N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
     F, slope, q = scale(N, n), n, (0.0, 0.0, 0.0)
     D = Z9
-    report[21] += N
+    report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
         w = dot(n, get3(u, i))
         q = (
@@ -171,7 +172,7 @@ def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, rig
         F = sub(F, scale(b, vi))
         c = -cv * b
         D = (D[0] + c, D[1], D[2], D[3], D[4] + c, D[5], D[6], D[7], D[8] + c)
-        report[13] += b * dot(vi, vi)
+        report[MASS_DAMPING_POWER] += b * dot(vi, vi)
     if bits & WATER:
         z, eta = r[i, 2] + u[i, 2], sea.surface
         U, U1 = Z3, Z3

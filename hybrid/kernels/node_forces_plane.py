@@ -30,6 +30,7 @@ from hybrid.kernels.plane import (
     part2,
     spread2,
 )
+from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 from hybrid.kernels.seabed import contact, pressure
 from hybrid.kernels.water import current_at, wetted, wetted_stretch
 
@@ -71,9 +72,9 @@ def half_cell_water2(line, c, side, up, z, eta, u, U1, vi, b, af, d, l, il, cv, 
         D = madd2(mscale2(wet, D), outer2(-(wa + wb) * iD, f, up))
         L = madd2(mscale2(wet, L), outer2(-side * 0.5 * wb * iD, f, up))
         f = (wet * f[0], wet * f[1])
-    report[12] -= wet * drag
-    report[17] -= wet * added
-    report[18] += wet * pushed
+    report[DRAG_POWER] -= wet * drag
+    report[ADDED_MASS_POWER] -= wet * added
+    report[WAVE_POWER] += wet * pushed
     return f, D, L
 
 
@@ -105,9 +106,9 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
             wet, slope = min(max(x, 0.0), 1.0), 1.0 if 0.0 < x < 1.0 else 0.0
         D = madd2(mscale2(wet, D), outer2(-slope * iH, f, up))
         f = (wet * f[0], wet * f[1])
-    report[12] -= wet * drag
-    report[17] -= wet * added
-    report[18] += wet * pushed
+    report[DRAG_POWER] -= wet * drag
+    report[ADDED_MASS_POWER] -= wet * added
+    report[WAVE_POWER] += wet * pushed
     return f, D
 
 
@@ -141,7 +142,7 @@ def seabed2(line, sea, i, r, u, v, e, left, right, cv, report):
         N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
     F, slope, q = (N * n[0], N * n[1]), n, Z2
     D = Z4
-    report[21] += N
+    report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
         ui, slip = part2(plane, u, i), part2(plane, sea.slip, i)
         w = dot2(n, ui)
@@ -166,7 +167,7 @@ def loads2(line, sea, i, r, u, e, v, vi, vdi, dl, ll, ill, dr, lr, ilr, left, ri
         b = line.damp[i]
         F = (F[0] - b * vi[0], F[1] - b * vi[1])
         c -= cv * b
-        report[13] += b * dot2(vi, vi)
+        report[MASS_DAMPING_POWER] += b * dot2(vi, vi)
     D, GL, GR = (c, 0.0, 0.0, c), Z4, Z4
     if bits & WATER:
         up = (plane[0, 2], plane[1, 2])

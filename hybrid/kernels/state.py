@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 Floats = NDArray[np.float64]
-NO_PLANE: Floats = np.full((3, 3), np.nan)  # of a line in space
-NO_PLANE.flags.writeable = False
+# Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
+NO_PLANE: Floats = np.full((3, 3), np.nan)
 
 
 class Line(NamedTuple):

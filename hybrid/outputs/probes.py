@@ -16,6 +16,7 @@ import numpy as np
 
 from hybrid.kernels.energies import observe
 from hybrid.kernels.loads import SEABED
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.model.bending_reference import LEFT
@@ -212,7 +213,7 @@ class View:
     def reaction(self, k: int) -> Floats:
         """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
         if self.ends.held[k]:
-            force = -self.report[3 * k : 3 * k + 3]
+            force = -self.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
             return force if self.shift is None else force - self.shift.resultants[k]
         first, out = (0, -1.0) if k == 0 else (-1, 1.0)
         if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
@@ -264,7 +265,9 @@ PROBES: dict[str, Probe] = {
         "N m", "moment on the cable at its end", _X, lambda v: v.node_moment[-1].copy(), "rod", "inertial"
     ),
     "contact": Probe("N/m", "force of the seabed per length, along its normal", _S, lambda v: v.contact, "seabed"),
-    "contact_force": Probe("N", "force of the seabed along its normal", (), lambda v: v.report[21], "seabed"),
+    "contact_force": Probe(
+        "N", "force of the seabed along its normal", (), lambda v: v.report[CONTACT_FORCE], "seabed"
+    ),
     "grounded_length": Probe("m", "length in contact with the seabed", (), lambda v: v.touchdown.grounded, "seabed"),
     "touchdown": Probe(
         "m", "arc lengths of the first and last point in contact; NaN: none", _E, lambda v: v.touchdown.edges, "seabed"

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels.report import PUSH_ENERGY, WRONG_PIVOTS
 from hybrid.kernels.state import State
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, planar, untwist
@@ -59,7 +60,7 @@ class Flat:
         """Whether, after an accepted step, the motion has to go on in space."""
         if self.push is None or taken.outcome != Outcome.OK:
             return False
-        grown = self.push.judge(*stepper.told[29:31])
+        grown = self.push.judge(*stepper.told[PUSH_ENERGY : WRONG_PIVOTS + 1])
         if grown < GROWN:
             return False
         fast = "faster than the step can follow" if np.isinf(grown) else f"by a factor of {grown:.0f}"

@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.loads import SEABED
+from hybrid.kernels.report import BEND, CONTACT_WORK, FORCE_A, FRICTION_WORK, SEABED_ENERGY, TWIST_NODE
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.plan import step_ends
@@ -276,9 +277,9 @@ class Motion:
             self.work[k] += half * (a + b)
         if self.model.line.bits & SEABED:  # the seabed's comes by way, not by power; what it stores is energy, not work
             told = self.stepper.told
-            self.work[CONTACT] += told[19] + told[28] - self._stored
-            self.work[FRICTION] += told[20]
-            self._stored = told[28]
+            self.work[CONTACT] += told[CONTACT_WORK] + told[SEABED_ENERGY] - self._stored
+            self.work[FRICTION] += told[FRICTION_WORK]
+            self._stored = told[SEABED_ENERGY]
         self.power = power
         self.recorder.log(
             {
@@ -291,7 +292,7 @@ class Motion:
         assert self.scene.time is not None
         if self.target is not None:
             self.watch.step(end, dt, self.scene.time.rho_inf, self.spare, self.state)
-        self._look(self.watch.shape(end, self.stepper.told[22:26], self.state))
+        self._look(self.watch.shape(end, self.stepper.told[BEND : TWIST_NODE + 1], self.state))
         leaves = self.flat.left(taken, self.stepper, lambda node, kind, text: self.watch.note(end, node, kind, text))
         if self.model.slack == "warn":
             self.watch.tension(end, self.state)
@@ -376,7 +377,7 @@ class Motion:
         self.watch.follow(self.model)
         self._stale = True
         self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
-        self._stored = self.stepper.told[28]
+        self._stored = self.stepper.told[SEABED_ENERGY]
         self.power = self._powers()
 
     def _bring_ends_in(self) -> None:
@@ -399,7 +400,7 @@ class Motion:
         ends = self.model.ends.values
         if self._loaded[k]:
             return abs(float(self.state.T[-k]))
-        x, y, z = self.stepper.told[3 * k : 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
+        x, y, z = self.stepper.told[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
         return sqrt(x * x + y * y + z * z)
 
     def _powers(self) -> list[float]:
@@ -415,7 +416,7 @@ class Motion:
         self.dt = 0.0
         if taken.outcome != Outcome.OK:
             self._stop(taken, 0.0)
-        self._stored = self.stepper.told[28]
+        self._stored = self.stepper.told[SEABED_ENERGY]
 
     def _stop(self, taken: Taken, dt: float) -> None:
         """The computation cannot go on: leave the last good state on disk, and say where and why."""

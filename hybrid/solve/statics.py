@@ -14,6 +14,7 @@ from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.block_elimination import SIZE, WIDTH
 from hybrid.kernels.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.newton import lay, lowest, newton
+from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.solve.stepper import Stepper
 
@@ -207,7 +208,7 @@ class _Solver:
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
             if self.prove(ends, new) <= BALANCED * (float(np.abs(new.T).max()) + self.scale):
                 break
-            outcome, where = Outcome.NOT_CONVERGED, int(self.report[16])
+            outcome, where = Outcome.NOT_CONVERGED, int(self.report[RESIDUAL_NODE])
         if outcome == Outcome.OK:
             tension, cell = lowest(line, new.T)
             if not tension > self.floor:
@@ -233,7 +234,7 @@ class _Solver:
             self.line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
             state.w, state.wd, 0.0, self.anchor, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
-        return float(self.report[15]) if bad < 0 else float("inf")
+        return float(self.report[RESIDUAL]) if bad < 0 else float("inf")
 
 
 def _loaded(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:

@@ -14,6 +14,7 @@ from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
 from hybrid.kernels.loads import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.newton import advance, lay
+from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import contact, pressure, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.water import stir
@@ -110,9 +111,9 @@ class Stepper:
             self.gaps, self.W, self.X, self.x, self.report, self.rows, was, now,
         )  # fmt: skip
         self.told = told = self.report.tolist()
-        if outcome == OK and not told[26] > self.floor:
-            outcome, where = Outcome.SLACK, int(told[27])
-        return Taken(OUTCOMES[outcome], iterations, left, where, told[15], told[31])
+        if outcome == OK and not told[SLACKEST] > self.floor:
+            outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])
+        return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR])
 
     def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
@@ -160,7 +161,7 @@ class Stepper:
             0.0, HEAVY, gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         if bad >= 0 or not substitute(self.X, self.x):
-            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[15]))
+            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[RESIDUAL]))
         state.vd[:] = HEAVY * self.x[:, 1:4]
         if self.line.bits & PLANAR:  # round-off across the plane would stay there
             state.vd[:] -= np.outer(state.vd @ self.line.plane[2], self.line.plane[2])
@@ -177,10 +178,10 @@ class Stepper:
             0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
         )  # fmt: skip
         if self.line.bits & SEABED:
-            self.report[28] = stored(self.line, sea, state.r)
+            self.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed
         self.told = self.report.tolist()
-        return Taken(Outcome.OK, 1, 0.0, -1, self.told[15])
+        return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
     def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
         """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
@@ -192,7 +193,7 @@ class Stepper:
         """The forces and the report of a state as it is, for the books of the step that follows."""
         self._march_as_it_is(sea, ends, state, self.rows)
         if self.line.bits & SEABED:
-            self.report[28] = stored(self.line, sea, state.r)
+            self.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed
         self.told = self.report.tolist()
 

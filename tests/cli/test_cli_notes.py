@@ -60,7 +60,9 @@ def test_a_slip_of_units_comes_before_what_follows_from_it() -> None:
 def test_every_kind_of_event_that_doubts_an_answer_has_a_weight() -> None:
     known = {*EVENTS_BY_WEIGHT, *EXPECTED, *(outcome.name.lower() for outcome in Outcome)}
     found = set()
-    for file in (f for f in PACKAGE.rglob("*.py") if f.name not in ("console.py", "commands.py", "tables.py")):  # their notes are lines
+    for file in (
+        f for f in PACKAGE.rglob("*.py") if f.name not in ("console.py", "commands.py", "tables.py")
+    ):  # their notes are lines
         for call in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
             if not (isinstance(call, ast.Call) and isinstance(call.func, ast.Attribute) and call.func.attr in WRITERS):
                 continue
