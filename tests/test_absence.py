@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.kernels.loads import (
+from hybrid.kernels.forces import (
     ADDED_MASS,
     BODIES,
     DRAG,

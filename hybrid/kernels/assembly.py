@@ -20,7 +20,7 @@ from hybrid.kernels.cell import (
 )
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import after, angular_velocity, before, bending, damped_bending
-from hybrid.kernels.loads import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
 from hybrid.kernels.report import (
     ASSEMBLED,

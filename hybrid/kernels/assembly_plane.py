@@ -15,10 +15,7 @@ import math
 
 from hybrid.kernels.block_elimination import first_gone, fourth_gone, second_gone, third_gone
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.loads import (
-    ROTARY,
-    STIFFNESS_DAMPING,
-)
+from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces_plane import loads2
 from hybrid.kernels.plane import (
     about_normal,

@@ -23,8 +23,7 @@ import math
 from hybrid.kernels.block_elimination import again
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.loads import (
+from hybrid.kernels.forces import (
     ADDED_MASS,
     BODIES,
     DRAG,
@@ -36,10 +35,9 @@ from hybrid.kernels.loads import (
     STIFFNESS_DAMPING,
     SURFACE,
     WAVES,
-    body_drag,
-    half_cell_added_mass,
-    half_cell_drag,
 )
+from hybrid.kernels.generalized_alpha import weights
+from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.node_forces import WATER, Z3, get3
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure

@@ -6,7 +6,7 @@ from hybrid.kernels.assembly import get3, get9
 from hybrid.kernels.cell import chord, turning
 from hybrid.kernels.compile import kernel
 from hybrid.kernels.element import bending, damped_bending, relative_rotation
-from hybrid.kernels.loads import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.rotations import add, cross, dot, frame, log_rotation, scale, sub
 
 

@@ -15,8 +15,8 @@ from hybrid.kernels.block_elimination import substitute
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
+from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.loads import FRICTION, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.out_of_plane import step_aside
 from hybrid.kernels.plane import chord2, part2

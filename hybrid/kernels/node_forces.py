@@ -7,20 +7,8 @@ and kernels.seabed.
 from __future__ import annotations
 
 from hybrid.kernels.compile import inner
-from hybrid.kernels.loads import (
-    ADDED_MASS,
-    BODIES,
-    DRAG,
-    FLOW,
-    FRICTION,
-    MASS_DAMPING,
-    SEABED,
-    SURFACE,
-    WAVES,
-    body_drag,
-    half_cell_added_mass,
-    half_cell_drag,
-)
+from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
+from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 from hybrid.kernels.rotations import add, dot, madd, mat_vec, mscale, outer, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure

@@ -6,17 +6,7 @@ tests/kernels/test_planar.py holds both against each other for every force.
 from __future__ import annotations
 
 from hybrid.kernels.compile import inner
-from hybrid.kernels.loads import (
-    ADDED_MASS,
-    BODIES,
-    DRAG,
-    FLOW,
-    FRICTION,
-    MASS_DAMPING,
-    SEABED,
-    SURFACE,
-    WAVES,
-)
+from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.plane import (
     added_mass2,
     body_drag2,

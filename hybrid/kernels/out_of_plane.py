@@ -22,8 +22,8 @@ import math
 
 from hybrid.kernels.assembly_plane import end_chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.loads import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, part2
 from hybrid.kernels.rotations import jacobian_functions
 from hybrid.kernels.water import current_at

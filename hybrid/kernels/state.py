@@ -51,7 +51,7 @@ class Line(NamedTuple):
     point_height: Floats  # (N+1,) m, over which a body passes through the surface
     point_upright: Floats  # (N+1,) 1 where a body is a cylinder that stands upright, 0 where it is a sphere
     footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
-    bits: int  # which optional forces are on (kernels.loads)
+    bits: int  # which optional forces are on (kernels.forces)
     plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
 
 

@@ -21,7 +21,7 @@ from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
-from hybrid.kernels.loads import SEABED
+from hybrid.kernels.forces import SEABED
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
 
 # What a ratio is where there is no tension, or no number: large, and finite.

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.loads import FRICTION, SEABED
+from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.state import Floats, Line, State, blank_state
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes

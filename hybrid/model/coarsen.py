@@ -7,7 +7,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from hybrid.kernels.loads import FRICTION, PLANAR, ROTARY, SEABED
+from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED
 from hybrid.kernels.state import Floats, Line, State, blank_state
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director

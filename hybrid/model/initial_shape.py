@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 from scipy.optimize import brentq
 
-from hybrid.kernels.loads import BODIES, DRAG, FLOW, SURFACE
+from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import pi
 
 from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.loads import FORCES
+from hybrid.kernels.forces import FORCES
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
 from hybrid.model.properties import weight

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.loads import BODIES, ROTARY
+from hybrid.kernels.forces import BODIES, ROTARY
 from hybrid.kernels.state import Floats, Line
 from hybrid.model.material import Material
 

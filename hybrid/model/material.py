@@ -10,7 +10,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from hybrid.kernels.loads import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
+from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.kernels.state import Floats
 from hybrid.model.properties import (
     attachments_at,

@@ -7,16 +7,7 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.loads import (
-    ADDED_MASS,
-    DRAG,
-    FRICTION,
-    ROTARY,
-    SEABED,
-    STIFFNESS_DAMPING,
-    SURFACE,
-    WAVES,
-)
+from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.model.build import build
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone

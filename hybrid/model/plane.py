@@ -7,7 +7,7 @@ from collections.abc import Iterable
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.loads import PLANAR
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.state import Ends, Floats, Line, State
 from hybrid.model.ledger import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of

@@ -15,7 +15,7 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.kernels.energies import observe
-from hybrid.kernels.loads import SEABED
+from hybrid.kernels.forces import SEABED
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State

@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ComputationError, ResultError
 from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.loads import SEABED, SURFACE
+from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading

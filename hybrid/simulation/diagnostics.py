@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.loads import FRICTION, PLANAR, SEABED
+from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.newton import lowest, sharpest
 from hybrid.kernels.state import Ends, Floats, State
 from hybrid.model.build import Model

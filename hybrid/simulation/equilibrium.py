@@ -6,7 +6,7 @@ from dataclasses import replace
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ComputationError
-from hybrid.kernels.loads import FRICTION
+from hybrid.kernels.forces import FRICTION
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against

@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.loads import SEABED
+from hybrid.kernels.forces import SEABED
 from hybrid.kernels.report import BEND, CONTACT_WORK, FORCE_A, FRICTION_WORK, SEABED_ENERGY, TWIST_NODE
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build

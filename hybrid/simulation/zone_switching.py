@@ -11,7 +11,7 @@ from hybrid.adapt.moment_joints import Joints
 from hybrid.adapt.state_transfer import Clamp, Remapped, balance, remap
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.energies import observe
-from hybrid.kernels.loads import FRICTION, PLANAR, SEABED
+from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import freed, soften, still_lacking

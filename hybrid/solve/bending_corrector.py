@@ -13,7 +13,7 @@ import numpy as np
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.bending_error import follow
 from hybrid.kernels.energies import observe
-from hybrid.kernels.loads import FRICTION, SEABED, WAVES
+from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.newton import lay
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, no_sea

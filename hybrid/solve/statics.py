@@ -12,7 +12,7 @@ from scipy.linalg import LinAlgError, cholesky_banded
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.loads import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.kernels.forces import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.newton import lay, lowest, newton
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State

@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
-from hybrid.kernels.loads import FRICTION, PLANAR, SEABED, WAVES
+from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.newton import advance, lay
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import contact, pressure, stored

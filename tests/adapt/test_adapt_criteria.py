@@ -18,7 +18,7 @@ from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygo
 from hybrid.adapt.manager import FLOOR, HARD, HORIZON, MOST_AHEAD, DomainManager
 from hybrid.adapt.zone_rules import wanted
 from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
-from hybrid.kernels.loads import SEABED
+from hybrid.kernels.forces import SEABED
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_criteria import FORESEEN
 

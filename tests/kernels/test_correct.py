@@ -12,7 +12,7 @@ import hybrid
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.bending_error import lay_out, left_out, right_side
 from hybrid.kernels.block_elimination import again
-from hybrid.kernels.loads import ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.state import no_sea
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build

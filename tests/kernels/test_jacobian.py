@@ -12,7 +12,7 @@ import pytest
 
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
-from hybrid.kernels.loads import (
+from hybrid.kernels.forces import (
     ADDED_MASS,
     BODIES,
     DRAG,

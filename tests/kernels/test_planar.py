@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 from test_jacobian import BITS, CA, CV, ZONES, random_case
 
-from hybrid.kernels import loads
+from hybrid.kernels import forces
 from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.assembly_plane import WIDE, march_planar, substitute_planar, update_planar
 from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
-from hybrid.kernels.loads import PLANAR
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.out_of_plane import BAND, step_aside
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import State
@@ -36,7 +36,7 @@ def flat_case(seed, element, bits, held=(0, 0), anisotropic=False):
     """The random line of test_jacobian, moved into a random plane with all that acts on it."""
     line, sea, ends, st = random_case(seed, element, bits, held)
     g = np.random.default_rng(seed + 100)
-    plane = axes(seed, bits & loads.SURFACE)
+    plane = axes(seed, bits & forces.SURFACE)
     inside = plane[:2].T @ plane[:2]
     n = plane[2]
 
@@ -169,7 +169,7 @@ def test_a_singular_block_is_named():
 @pytest.mark.parametrize("seed", range(4))
 def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     """One step of the push equals the linear answer of the march in space to it, frames and spins included."""
-    bits = sum(getattr(loads, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
+    bits = sum(getattr(forces, name) for name in ("DRAG", "ADDED_MASS", "MASS_DAMPING", "FLOW", "BODIES"))
     line, sea, ends, st = flat_case(seed, ZONES[zones], bits, (1, 0), anisotropic=seed > 1)
     st.vd[0] = st.v[0] = 0.0
     n, dt, rho = line.plane[2], 0.2, 0.5
