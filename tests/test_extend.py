@@ -55,8 +55,8 @@ def copy(tmp_path: Path) -> Path:
 
 
 def test_every_change_can_be_made(copy: Path) -> None:
-    assert "LAMINAR" in (copy / "hybrid" / "solve" / "node.py").read_text(encoding="utf-8")
-    assert (copy / "hybrid" / "peers" / "masses.py").is_file()
+    assert "LAMINAR" in (copy / "hybrid" / "kernels" / "node_forces.py").read_text(encoding="utf-8")
+    assert (copy / "hybrid" / "studies" / "peers" / "masses.py").is_file()
 
 
 def test_a_change_that_no_longer_fits_is_noticed(copy: Path) -> None:

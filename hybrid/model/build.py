@@ -161,9 +161,7 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
         _refuse_folds(start.e, s, rod)
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
-    velocity = getattr(scene.initial, "velocity", None)
-    if velocity:
-        start.v[:] = velocity
+        start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
     ends, frames = ends_and_frames(scene, start.e, rod, sea)
     start.a1[:] = frames
     others = []
@@ -252,7 +250,7 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
     of = np.clip(np.searchsorted(cable.bounds, s) - 1, 0, cable.mass.size - 1)
     EI = cable.B[of, :2].min(axis=1)
     weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
-    asked = getattr(scene.model, "rod_cell", None)
+    asked = scene.model.rod_cell if isinstance(scene.model, AdaptiveModel) else None
     if asked:
         return np.full(s.size, asked)
     bend = np.cbrt(EI / weight)
@@ -264,7 +262,7 @@ def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> 
 
     The gap this leaves at a held end is closed by small shifts of all chords, until both are met.
     """
-    to = getattr(scene.ends.end, "position", None) if getattr(scene.ends.start, "position", None) else None
+    to = scene.ends.end.held_position if scene.ends.start.held_position else None
     for _ in range(50 if to else 1):
         if to:
             gap = np.array(to, float) - start.r[0] - start.e.sum(axis=0)

@@ -135,7 +135,7 @@ class EndConditions:
         self.values.moment[:] = 0.0
         for load in self._acting:
             part, _ = rise(t, load.ramp) if load.ramp else (1.0, 0.0)
-            getattr(self.values, load.what)[load.end] += part * load.value
+            (self.values.force if load.what == "force" else self.values.moment)[load.end] += part * load.value
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""

@@ -42,9 +42,8 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float =
     fluid = scene.environment.fluid
     still = fluid is None or not fluid.flows()
     if bed is not None and bed.slope is None and len(held) == 1 and still and not all(rod_ends):
-        loads = [getattr(end, key, None) for end in (scene.ends.start, scene.ends.end) for key in ("force", "thrust")]
-        level = [getattr(x, "value", x)[:2] for x in loads if x is not None]
-        if not any(any(x) for x in level):
+        forces = [x for end in scene.ends.both for x in end.loads if x.what == "force"]
+        if not any(any(x.value[:2]) for x in forces):
             found.append(
                 "nothing pulls the line along the seabed: what lies there has no tension, and a flexible line without "
                 "tension has no shape: make it a rod there, or give a current"

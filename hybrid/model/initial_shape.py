@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from typing import Literal
+from collections.abc import Iterator
 
 import numpy as np
 from scipy.optimize import brentq
@@ -15,7 +14,7 @@ from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, tra
 from hybrid.model.properties import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.scene.motion import EndMotion
-from hybrid.scene.schema import Body, Clamped, Equilibrium, Guided, Pinned, Points, Scene, Straight
+from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel
 
 SHORTEST_SPAN = 1e-3  # of the length: a line between nearer ends has no straight span to start from
 DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
@@ -23,7 +22,7 @@ DRAG_ROUNDS = 4  # of the first shape: drag follows the shape, half of it first
 
 def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     """First positions of the nodes (N+1, 3), m, and the shape's name; what hangs is refined by `hung`."""
-    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    start, end = (end.held_position for end in scene.ends.both)
     initial, length = scene.initial, scene.length
     if isinstance(initial, Points):
         return along_polyline(np.array(initial.points, float), s), "the polyline given"
@@ -36,7 +35,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     if initial.points is not None:
         return along_polyline(np.array(initial.points, float), s), "the polyline given"
     down = net_weight(scene) >= 0.0  # a line lighter than water hangs upwards
-    start, end = (x or getattr(e, "near", None) for x, e in ((start, scene.ends.start), (end, scene.ends.end)))
+    start, end = (end.first_position for end in scene.ends.both)
     if start and end and initial.guess == "span":
         return np.array(start) + (s / length)[:, None] * np.subtract(end, start), "the straight span"
     if start and end and initial.guess != "straight":
@@ -44,7 +43,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
     if initial.direction is not None:
         direction = np.array(initial.direction, float)
     else:
-        tangent = getattr(scene.ends.start, "tangent", None) or getattr(scene.ends.end, "tangent", None)
+        tangent = scene.ends.start.held_tangent or scene.ends.end.held_tangent
         hanging = -1.0 if down == bool(start) else 1.0
         place, bed = start or end or (0.0, 0.0, 0.0), scene.environment.seabed
         lies = bed is not None and down and place[2] - bed.height(place[0], place[1]) < 1e-3 * length
@@ -59,7 +58,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
 
 def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
     """Shapes to start from where an elastic catenary leads nowhere: an arc and the straight span of two held ends."""
-    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    start, end = (end.held_position for end in scene.ends.both)
     if start and end:
         first, span = np.array(start, float), np.subtract(end, start)
         yield "an arc", _arc(first, np.array(end, float), s, -1.0 if net_weight(scene) >= 0.0 else 1.0)
@@ -69,14 +68,15 @@ def spare_shapes(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
 
 def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
     """A shape to start from where a line is clamped at one end alone: its first rod straight, the rest hanging."""
-    start, end = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    start, end = (end.held_position for end in scene.ends.both)
     initial = scene.initial
-    zones: Sequence[object] = getattr(scene.model, "zones", ())
-    tangent = getattr(scene.ends.start if start else scene.ends.end, "tangent", None)
+    zones = scene.model.zones if isinstance(scene.model, ZonesModel) else ()
+    tangent = (scene.ends.start if start else scene.ends.end).held_tangent
     asked = isinstance(initial, Equilibrium) and initial.guess == "auto" and not (initial.points or initial.direction)
     if not asked or bool(start) == bool(end) or not tangent or len(zones) < 2:
         return
-    stiff = getattr(zones[0] if start else zones[-1], "rod", 0.0)
+    outer = zones[0] if start else zones[-1]
+    stiff = outer.rod if isinstance(outer, RodZone) else 0.0
     outward = np.array(tangent, float) * (1.0 if start else -1.0) / np.linalg.norm(tangent)
     far = s if start else s[-1] - s
     hanging = np.array([0.0, 0.0, -1.0 if net_weight(scene) >= 0.0 else 1.0])
@@ -111,8 +111,8 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
         return None
     if initial.direction is not None:
         return None
-    places = [getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end)]
-    stiff = any(getattr(e, "tangent", None) for e in (scene.ends.start, scene.ends.end))
+    places = [end.held_position for end in scene.ends.both]
+    stiff = any(end.held_tangent for end in scene.ends.both)
     if not any(places) or (stiff and not all(places)):  # what is clamped at one end starts along its clamp
         return None
     loads = line.force.copy()
@@ -125,9 +125,9 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
     if floating is not None:
         loads[floating, 2] -= line.point_buoy[floating]
     for k, end in ((0, scene.ends.start), (-1, scene.ends.end)):
-        load = getattr(end, "force", None) or getattr(end, "thrust", None)
-        if load is not None:
-            loads[k] += np.array(getattr(load, "value", load), float)
+        for load in end.loads:
+            if load.what == "force":
+                loads[k] += load.value
     drag = np.zeros_like(loads)
     found = None
     for _ in range(1 + DRAG_ROUNDS * bool(line.bits & FLOW)):
@@ -226,16 +226,16 @@ def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundin
     """
     d = e / np.linalg.norm(e, axis=1)[:, None]
     start, end = scene.ends.start, scene.ends.end
-    first = first_director(getattr(start, "tangent", None) or tuple(d[0]), getattr(start, "normal", None))
-    tangents = np.vstack([getattr(start, "tangent", None) or d[0], d, getattr(end, "tangent", None) or d[-1]])
+    first = first_director(start.held_tangent or tuple(d[0]), start.held_normal)
+    tangents = np.vstack([start.held_tangent or d[0], d, end.held_tangent or d[-1]])
     carried = transported(first, tangents)
-    if isinstance(end, Clamped | Guided) and end.normal is not None:
-        wanted = first_director(end.tangent, end.normal)
+    if end.held_tangent is not None and end.held_normal is not None:
+        wanted = first_director(end.held_tangent, end.held_normal)
         t = tangents[-1] / np.linalg.norm(tangents[-1])
         last = carried[-1]
         twist = float(np.arctan2(np.dot(np.cross(last, wanted), t), np.dot(last, wanted)))
         n = e.shape[0]
-        if not _fixes_twist(start):
+        if not start.fixes_frame:
             part = np.ones(n + 2)  # the whole line takes the end's orientation
         elif rod.all():
             part = np.concatenate([[0.0], (np.arange(n) + 0.5) / n, [1.0]])
@@ -248,34 +248,24 @@ def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundin
     return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1]
 
 
-def _fixes_twist(end: object) -> bool:
-    """True for an end that says how the material frame stands, and holds it."""
-    return isinstance(end, Clamped | Guided) and end.normal is not None and not getattr(end, "swivel", False)
-
-
 def _end_conditions(
     scene: Scene, directors: tuple[Floats, Floats], chords: tuple[Floats, Floats], around: Surroundings
 ) -> EndConditions:
     position, frame = np.zeros((2, 3)), np.zeros((2, 9))
     loads: list[EndLoad] = []
     motions: dict[int, Moves] = {}
-    pair = (scene.ends.start, scene.ends.end)
-    for k, end in enumerate(pair):
-        t = np.array(getattr(end, "tangent", None) or chords[k], float)
+    for k, end in enumerate(scene.ends.both):
+        t = np.array(end.held_tangent or chords[k], float)
         t = t / np.linalg.norm(t)
         base = np.column_stack([directors[k], np.cross(t, directors[k]), t])
         frame[k] = base.ravel()
-        position[k] = getattr(end, "position", (0.0, 0.0, 0.0))
-        kinds: tuple[tuple[Literal["force", "moment"], str], ...]
-        kinds = (("force", "force"), ("force", "thrust"), ("moment", "moment"))
-        for what, key in kinds:
-            load = getattr(end, key, None)
-            if load is not None:
-                until = getattr(load, "until", None)
-                value = np.array(getattr(load, "value", load), float)
-                ramp = getattr(load, "ramp", None)
-                loads.append(EndLoad(what, k, value, np.inf if until is None else until, ramp))
-        motion = getattr(end, "motion", None)
+        position[k] = end.held_position or (0.0, 0.0, 0.0)
+        loads += [
+            EndLoad(x.what, k, np.array(x.value, float), np.inf if x.until is None else x.until, x.ramp)
+            for x in end.loads
+        ]
+        motion = end.prescribed_motion
         if motion is not None:
-            motions[k] = EndMotion(motion, getattr(end, "position", None), base, around.elevation)
-    return EndConditions([isinstance(e, Pinned | Clamped) for e in pair], position, frame, loads, motions)
+            motions[k] = EndMotion(motion, end.held_position, base, around.elevation)
+    held = [end.held_position is not None for end in scene.ends.both]
+    return EndConditions(held, position, frame, loads, motions)

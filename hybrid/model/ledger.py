@@ -190,9 +190,9 @@ def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, correct
         why = "rods that come and go have none; fixed zones and `model: rod` do"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
-        moving = getattr(end, "motion", None) is not None
+        moving = end.prescribed_motion is not None
         entries.append(Entry(f"ends.{name}: {end.kind}{', moving' if moving else ''}", True, f"ends.{name}"))
-        if not line.spin[cell] and (hasattr(end, "tangent") or getattr(end, "moment", None) is not None):
+        if not line.spin[cell] and end.acts_by_moment:
             entries.append(
                 Entry(
                     f"moment and tangent at ends.{name}",

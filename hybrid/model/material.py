@@ -22,7 +22,7 @@ from hybrid.model.properties import (
     rotary_inertia,
     torsional_stiffness,
 )
-from hybrid.scene.schema import Clamped, Guided, Scene, Section
+from hybrid.scene.schema import Scene, Section
 
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright")
@@ -92,7 +92,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
     """The cable without its water and its attachments."""
     k, gravity = len(of), scene.environment.gravity
     nothing = np.full(k, np.nan)
-    pair = (scene.ends.start, scene.ends.end)
+    start, end = scene.ends.both
     out = Material(
         bounds=bounds,
         mass=np.array([x.mass for x in of], float),
@@ -104,8 +104,8 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         polar=np.array([rotary_inertia(x)[1] for x in of]),
         damp=nothing, tau=nothing, drag_n=nothing, drag_t=nothing, added_n=nothing, added_t=nothing,
         buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
-        held_tangent=(isinstance(pair[0], Clamped | Guided), isinstance(pair[1], Clamped | Guided)),
-        held_twist=(_resists_twist(pair[0]), _resists_twist(pair[1])),
+        held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
+        held_twist=(start.holds_twist, end.holds_twist),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
     if any(damping(x).mass for x in of):
@@ -115,12 +115,6 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         out.bits |= STIFFNESS_DAMPING
         out.tau = np.array([damping(x).stiffness for x in of], float)
     return out
-
-
-def _resists_twist(end: object) -> bool:
-    if isinstance(end, Clamped):
-        return not end.swivel
-    return isinstance(end, Guided) and end.normal is not None
 
 
 def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> None:

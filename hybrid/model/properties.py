@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from hybrid.scene.ends import SHIFTS
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section, Straight
 
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
@@ -144,12 +144,10 @@ def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fast
             if s.drag and s.diameter
         ]
         candidates += [0.5 * fluid.density * x.drag_area * fastest**2 for _, x in attachments_at(scene)]
-    for end in (scene.ends.start, scene.ends.end):
-        for name, arm in (("force", 1.0), ("thrust", 1.0), ("moment", length)):
-            load = getattr(end, name, None)
-            if load is not None:
-                candidates.append(float(np.abs(getattr(load, "value", load)).max()) / arm)
-        motion = getattr(end, "motion", None)
+    for end in scene.ends.both:
+        for load in end.loads:
+            candidates.append(float(np.abs(load.value).max()) / (length if load.what == "moment" else 1.0))
+        motion = end.prescribed_motion
         if motion is not None:
             candidates += [
                 mass * abs(x.amplitude) * (2 * np.pi / x.period) ** 2
@@ -157,11 +155,11 @@ def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fast
                 if name in SHIFTS
                 for x in parts
             ]
-    first, last = (getattr(e, "position", None) for e in (scene.ends.start, scene.ends.end))
+    first, last = (end.held_position for end in scene.ends.both)
     if first and last and all(s.axial_stiffness for s in sections):
         free = length / sum(s.length / s.axial_stiffness for s in sections if s.axial_stiffness)  # N per unit strain
         candidates.append(free * max(0.0, float(np.linalg.norm(np.subtract(last, first))) / length - 1.0))
-    velocity = getattr(scene.initial, "velocity", None)
+    velocity = scene.initial.velocity if isinstance(scene.initial, Straight) else None
     if velocity:
         candidates.append(mass / length * float(np.dot(velocity, velocity)))
     scale = max(candidates)

@@ -11,7 +11,7 @@ from math import sqrt
 from hybrid.model.mesh_grading import Grading
 from hybrid.scene.accuracy import Accuracy, amount
 from hybrid.scene.motion import shortest_period
-from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.scene.schema import AdaptiveModel, Scene, ZonesModel
 
 USUAL = "1%"  # of a scene that asks for nothing and leaves its steps open
 # Parts of what is asked that zones may make of it; mesh and time step share the rest as they come.
@@ -115,7 +115,7 @@ def wants_errors(scene: Scene) -> bool:
 
 def mesh_is_free(scene: Scene) -> bool:
     """Whether the program places the cells."""
-    zones = getattr(scene.model, "zones", ())
+    zones = scene.model.zones if isinstance(scene.model, ZonesModel) else ()
     return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
 
 

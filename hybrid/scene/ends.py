@@ -6,7 +6,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Literal, NamedTuple
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
@@ -177,12 +177,94 @@ def _normal_is_across(tangent: tuple[float, float, float], normal: tuple[float, 
         refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
 
 
-class Pinned(Table):
+class GivenLoad(NamedTuple):
+    """A force [N] or moment [N m] that a scene gives at an end, inertial frame.
+
+    key: its place below the end; until: time at which it stops [s], None: never; ramp: time over which it grows [s].
+    """
+
+    what: Literal["force", "moment"]
+    key: tuple[str, ...]
+    value: Triple
+    until: float | None
+    ramp: float | None
+
+
+class EndTable(Table):
+    """What the program asks of an end, whatever its kind: a kind overrides what it holds, moves or carries."""
+
+    @property
+    def held_position(self) -> Triple | None:
+        """Position that is held, inertial frame [m]."""
+        return None
+
+    @property
+    def first_position(self) -> Triple | None:
+        """Where the search of the equilibrium puts the end first [m]."""
+        return self.held_position
+
+    @property
+    def held_tangent(self) -> Triple | None:
+        """Direction that is held, of any length."""
+        return None
+
+    @property
+    def held_normal(self) -> Triple | None:
+        """Direction of the material axis a1 that the scene gives, of any length."""
+        return None
+
+    @property
+    def holds_twist(self) -> bool:
+        """Whether the end resists that the cable turns about its tangent."""
+        return False
+
+    @property
+    def fixes_frame(self) -> bool:
+        """Whether the scene says how the material frame stands at the end, and the end holds it there."""
+        return self.holds_twist and self.held_normal is not None
+
+    @property
+    def prescribed_motion(self) -> Motion | None:
+        """How what is held moves."""
+        return None
+
+    @property
+    def loads(self) -> tuple[GivenLoad, ...]:
+        """Forces and moments given at the end."""
+        return ()
+
+    @property
+    def acts_by_moment(self) -> bool:
+        """Whether a tangent is held or a moment given: a cable that ends in a catenary transmits neither."""
+        return self.held_tangent is not None or any(load.what == "moment" for load in self.loads)
+
+
+def _given(**loads: Triple | Load | None) -> tuple[GivenLoad, ...]:
+    """The loads that are given, by the key of the end that gives them."""
+    found = []
+    for key, load in loads.items():
+        what: Literal["force", "moment"] = "moment" if key == "moment" else "force"
+        if isinstance(load, Load):
+            found.append(GivenLoad(what, (key, "value"), load.value, load.until, load.ramp))
+        elif load is not None:
+            found.append(GivenLoad(what, (key,), load, None, None))
+    return tuple(found)
+
+
+class Pinned(EndTable):
     """Held at a point, free to turn."""
 
     kind: Literal["pinned"] = Field(default="pinned", description="a ball joint")
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
+
+    @property
+    def held_position(self) -> Triple:
+        return self.position
+
+    @property
+    def prescribed_motion(self) -> Motion | None:
+        return self.motion
 
     @model_validator(mode="after")
     def _turning_is_free(self) -> Pinned:
@@ -193,7 +275,7 @@ class Pinned(Table):
         return self
 
 
-class Clamped(Table):
+class Clamped(EndTable):
     """Held at a point and in a direction.  The tangent points along increasing s at either end."""
 
     kind: Literal["clamped"] = Field(default="clamped", description="position and direction held")
@@ -203,13 +285,33 @@ class Clamped(Table):
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
 
+    @property
+    def held_position(self) -> Triple:
+        return self.position
+
+    @property
+    def held_tangent(self) -> Triple:
+        return self.tangent
+
+    @property
+    def held_normal(self) -> Triple | None:
+        return self.normal
+
+    @property
+    def holds_twist(self) -> bool:
+        return not self.swivel
+
+    @property
+    def prescribed_motion(self) -> Motion | None:
+        return self.motion
+
     @model_validator(mode="after")
     def _frame(self) -> Clamped:
         _normal_is_across(self.tangent, self.normal)
         return self
 
 
-class Guided(Table):
+class Guided(EndTable):
     """Held in a direction, free to move.  The tangent points along increasing s at either end."""
 
     kind: Literal["guided"] = Field(default="guided", description="direction held, position free")
@@ -219,6 +321,26 @@ class Guided(Table):
     motion: Motion | None = Field(
         default=None, description="how the direction turns; a guided end takes no translation"
     )
+
+    @property
+    def held_tangent(self) -> Triple:
+        return self.tangent
+
+    @property
+    def held_normal(self) -> Triple | None:
+        return self.normal
+
+    @property
+    def holds_twist(self) -> bool:
+        return self.normal is not None
+
+    @property
+    def prescribed_motion(self) -> Motion | None:
+        return self.motion
+
+    @property
+    def loads(self) -> tuple[GivenLoad, ...]:
+        return _given(force=self.force)
 
     @model_validator(mode="after")
     def _frame(self) -> Guided:
@@ -230,15 +352,19 @@ class Guided(Table):
         return self
 
 
-class Free(Table):
+class Free(EndTable):
     """Not held."""
 
     kind: Literal["free"] = Field(default="free", description="neither position nor direction held")
     force: Loading | None = Field(default=None, description="force on the end, inertial frame [N]")
     moment: Loading | None = Field(default=None, description="moment on the end, inertial frame [N m]")
 
+    @property
+    def loads(self) -> tuple[GivenLoad, ...]:
+        return _given(force=self.force, moment=self.moment)
 
-class Body(Table):
+
+class Body(EndTable):
     """Carries a body, such as a vehicle or a buoy, that moves with the cable and is not held."""
 
     kind: Literal["body"] = Field(default="body", description="free, with a body on it")
@@ -253,6 +379,14 @@ class Body(Table):
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")
+
+    @property
+    def first_position(self) -> Triple | None:
+        return self.near
+
+    @property
+    def loads(self) -> tuple[GivenLoad, ...]:
+        return _given(thrust=self.thrust)
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""
@@ -280,17 +414,23 @@ class Ends(Table):
     start: End = Field(description="the end at s = 0")
     end: End = Field(description="the end at s = length")
 
+    @property
+    def both(self) -> tuple[End, End]:
+        """Start and end."""
+        return self.start, self.end
+
+    def named(self) -> dict[str, End]:
+        """The ends by name (`start`, `end`)."""
+        return {"start": self.start, "end": self.end}
+
     def held(self) -> dict[str, Triple]:
         """Positions [m] of the ends that have one, by name (`start`, `end`)."""
-        named = {"start": self.start, "end": self.end}
-        return {name: end.position for name, end in named.items() if isinstance(end, Pinned | Clamped)}
+        return {name: end.held_position for name, end in self.named().items() if end.held_position is not None}
 
     def near(self) -> dict[str, Triple]:
         """First positions [m] of the bodies that have one, by name (`start`, `end`)."""
-        named = {"start": self.start, "end": self.end}
-        return {name: end.near for name, end in named.items() if isinstance(end, Body) and end.near is not None}
+        return {name: end.near for name, end in self.bodies().items() if end.near is not None}
 
     def bodies(self) -> dict[str, Body]:
         """The bodies at the ends, by name (`start`, `end`)."""
-        named = {"start": self.start, "end": self.end}
-        return {name: end for name, end in named.items() if isinstance(end, Body)}
+        return {name: end for name, end in self.named().items() if isinstance(end, Body)}

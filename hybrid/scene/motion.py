@@ -22,7 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.base import Finding, dotted
 from hybrid.scene.cable import Environment
-from hybrid.scene.ends import SHIFTS, TURNS, Ends, Guided, Harmonic, Motion, Pinned, smooth_step
+from hybrid.scene.ends import SHIFTS, TURNS, End, Ends, Harmonic, Motion, smooth_step
 from hybrid.scene.motion_file import Record, RecordRefused, judge_record, read_record
 
 if TYPE_CHECKING:
@@ -231,11 +231,13 @@ def check_motions(scene: Scene) -> None:
         raise SceneError([_complaint((), finding) for finding in found])
 
 
-def _motions(ends: Ends) -> list[tuple[tuple[str, ...], Any, Motion]]:
+def _motions(ends: Ends) -> list[tuple[tuple[str, ...], End, Motion]]:
     """Place, end and motion of the ends that are moved."""
-    named = (("start", ends.start), ("end", ends.end))
-    each = [(("ends", name, "motion"), end, getattr(end, "motion", None)) for name, end in named]
-    return [(here, end, motion) for here, end, motion in each if motion is not None]
+    return [
+        (("ends", name, "motion"), end, end.prescribed_motion)
+        for name, end in ends.named().items()
+        if end.prescribed_motion is not None
+    ]
 
 
 def motion_findings(ends: Ends, duration: float | None) -> list[Finding]:
@@ -294,9 +296,7 @@ def ramp_ends(scene: Scene) -> list[float]:
     moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]
     times = [m.ramp for _, _, m in _motions(ends)] + [t for m in moves for t in (m.begin, m.begin + m.over)]
     times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
-    for end in (ends.start, ends.end):
-        for load in (getattr(end, "force", None), getattr(end, "moment", None)):
-            times += [getattr(x, "ramp", None) for x in (load if isinstance(load, tuple) else (load,))]
+    times += [load.ramp for end in ends.both for load in end.loads]
     return [t for t in times if t]
 
 
@@ -387,23 +387,23 @@ def _harmonic_jump(motion: Motion) -> list[Finding]:
     return [Finding((), expected, fix, f"{name} without ramp: {jump} at t = 0")]
 
 
-def _file_findings(end: Any, motion: Motion, duration: float | None) -> list[Finding]:
+def _file_findings(end: End, motion: Motion, duration: float | None) -> list[Finding]:
     try:
         record = read_record(motion.file or "")
     except RecordRefused as refused:
         return [refused.finding]
-    if isinstance(end, Pinned) and record.turn is not None:
+    if end.held_tangent is None and record.turn is not None:
         given = f"{record.name} with rotations"
         return [
             Finding(
                 ("file",), "columns t,x,y,z, because a pinned end turns freely", "kind: clamped can be turned", given
             )
         ]
-    if isinstance(end, Guided) and record.shift is not None:
+    if end.held_position is None and record.shift is not None:
         given = f"{record.name} with positions"
         expected = "columns t,rx,ry,rz, because the position of a guided end is free"
         return [Finding(("file",), expected, "kind: clamped can be moved", given)]
-    position = None if isinstance(end, Guided) else np.array(end.position)
+    position = None if end.held_position is None else np.array(end.held_position)
     return judge_record(record, position, duration)
 
 

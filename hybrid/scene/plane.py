@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from hybrid.scene.analysis import Initial, Points, Straight
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import SHIFTS, TURNS, Clamped, Ends, Guided, Motion, Triple
+from hybrid.scene.ends import SHIFTS, TURNS, End, Ends, Motion, Triple
 from hybrid.scene.motion_file import RecordRefused, read_record
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
 
@@ -148,13 +148,13 @@ def _twisted(ends: Ends, plane: Plane) -> Iterator[Finding]:
         yield Finding(("ends", "end", "normal"), expected, "leave it out, or write `dimension: 3`")
 
 
-def _director(end: Any, plane: Plane) -> tuple[float, float] | None:
+def _director(end: End, plane: Plane) -> tuple[float, float] | None:
     """Components of the axis a1 of an end along the normal and along (normal x tangent); None: it gives none."""
-    if not isinstance(end, Clamped | Guided) or end.normal is None:
+    if end.held_tangent is None or end.held_normal is None:
         return None
-    t = unit(end.tangent)
-    along = sum(a * b for a, b in zip(end.normal, t, strict=True))
-    a = unit(_minus(end.normal, (along * t[0], along * t[1], along * t[2])))
+    t = unit(end.held_tangent)
+    along = sum(a * b for a, b in zip(end.held_normal, t, strict=True))
+    a = unit(_minus(end.held_normal, (along * t[0], along * t[1], along * t[2])))
     n = plane.normal
     m = _cross(n, t)
     return sum(x * y for x, y in zip(a, n, strict=True)), sum(x * y for x, y in zip(a, m, strict=True))
@@ -162,13 +162,12 @@ def _director(end: Any, plane: Plane) -> tuple[float, float] | None:
 
 def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterator[Witness]:
     """Everything in a scene that has a direction, what says most first."""
-    for name in ("start", "end"):
-        here: Place = ("ends", name)
-        end = getattr(ends, name)
-        for key, kind in (("position", "place"), ("near", "place"), ("tangent", "along")):
-            value = getattr(end, key, None)
-            if value is not None:
-                yield Witness((*here, key), kind, value)  # type: ignore[arg-type]
+    for name, end in ends.named().items():
+        if end.first_position is not None:
+            key = "position" if end.held_position is not None else "near"
+            yield Witness(("ends", name, key), "place", end.first_position)
+        if end.held_tangent is not None:
+            yield Witness(("ends", name, "tangent"), "along", end.held_tangent)
     if isinstance(initial, Straight):
         if initial.origin is not None:
             yield Witness(("initial", "origin"), "place", initial.origin)
@@ -180,17 +179,12 @@ def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterat
             yield Witness(("initial", "points", i), "place", point)
     elif initial.direction is not None:
         yield Witness(("initial", "direction"), "along", initial.direction)
-    for name in ("start", "end"):
-        here = ("ends", name)
-        end = getattr(ends, name)
-        for key, kind in (("force", "along"), ("thrust", "along"), ("moment", "normal")):
-            load = getattr(end, key, None)
-            value = getattr(load, "value", load)
-            if value is not None and any(value):
-                where = (*here, key, "value") if hasattr(load, "value") else (*here, key)
-                yield Witness(where, kind, value)  # type: ignore[arg-type]
-        if getattr(end, "motion", None) is not None:
-            yield from _moved(end.motion, (*here, "motion"))
+    for name, end in ends.named().items():
+        for load in end.loads:
+            if any(load.value):
+                yield Witness(("ends", name, *load.key), "normal" if load.what == "moment" else "along", load.value)
+        if end.prescribed_motion is not None:
+            yield from _moved(end.prescribed_motion, ("ends", name, "motion"))
     yield from _sea(environment)
 
 

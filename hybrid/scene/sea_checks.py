@@ -114,8 +114,8 @@ def waves(environment: Environment) -> Iterator[Finding]:
 def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
     """Ends that follow waves which are not there, or are there at once."""
     sea = environment.fluid.waves if environment.fluid is not None else None
-    for name in ("start", "end"):
-        motion = getattr(getattr(ends, name), "motion", None)
+    for name, end in ends.named().items():
+        motion = end.prescribed_motion
         if motion is None or motion.follow is None:
             continue
         if sea is None:
@@ -165,7 +165,8 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
     if isinstance(initial, Straight) and not ends.held().keys() >= {"start", "end"}:
         yield from _straight_in_the_ground(environment, cable, ends, initial, SUNK * depth)
     for name, (x, y, z) in ends.held().items():
-        travel = getattr(getattr(getattr(ends, name), "motion", None), "travel", None)
+        motion = ends.named()[name].prescribed_motion
+        travel = motion.travel if motion is not None else None
         if travel is not None:
             x, y, z = x + travel.by[0], y + travel.by[1], z + travel.by[2]
             under = seabed.height(x, y) - z

@@ -81,7 +81,7 @@ def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
 def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
     """Two held ends that travel apart farther than the cable joins them."""
     held = ends.held()
-    motions = {name: getattr(getattr(ends, name), "motion", None) for name in held}
+    motions = {name: ends.named()[name].prescribed_motion for name in held}
     carriers = {name: m for name, m in motions.items() if m is not None and (m.travel or m.velocity)}
     if time is None or len(held) < 2 or not carriers or too_short(cable, math.dist(held["start"], held["end"])):
         return
@@ -162,8 +162,7 @@ def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[floa
 
 def _forces(ends: Ends) -> list[Triple]:
     """Forces on the ends at the beginning, N."""
-    loads = [getattr(end, key, None) for end in (ends.start, ends.end) for key in ("force", "thrust")]
-    return [getattr(load, "value", load) for load in loads if load is not None]
+    return [load.value for end in ends.both for load in end.loads if load.what == "force"]
 
 
 def _drifts(environment: Environment, cable: Cable, ends: Ends) -> tuple[str, str]:

@@ -141,7 +141,7 @@ def end_rows(
     if hold.tangent:
         held, C_held = _turned(at, hold, target.frame, target.spin, earlier.frame, rate, before)
         # In motion a clamp without a normal keeps the twist it started with.
-        twist = hold.twist or (before is not None and hold.place and not getattr(hold.table, "swivel", False))
+        twist = hold.twist or (before is not None and hold.place and hold.table.holds_twist)
         rows = 3 if twist else 2
         low, C_low = np.concatenate([held[:rows], low[rows:]]), np.concatenate([C_held[:rows], C_low[rows:]])
     if spin_free:
@@ -237,9 +237,7 @@ def spinning(line: Line, moving: bool) -> list[bool]:
             last += 1
         run = line.pieces[i : last + 1]
         ends = ([line.start] if i == 0 else []) + ([line.end] if last + 1 == len(line.pieces) else [])
-        held = any(
-            h.twist or (moving and h.place and h.tangent and not getattr(h.table, "swivel", False)) for h in ends
-        )
+        held = any(h.twist or (moving and h.place and h.tangent and h.table.holds_twist) for h in ends)
         inert = not moving or not any(p.inertia[2] for p in run)
         # An applied moment at the first end would be dropped with the row: leave it, and let the fit say "singular".
         loaded = i == 0 and line.start.moment(0.0).any()

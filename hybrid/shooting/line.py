@@ -15,7 +15,6 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.schema import (
-    Body,
     CatenaryModel,
     Clamped,
     End,
@@ -265,16 +264,14 @@ def _inertia(section: Section) -> Array:
 
 def _hold(table: End, piece: Piece) -> Hold:
     """What this end holds; a catenary end passes neither tangent nor moment."""
-    tangent = isinstance(table, Clamped | Guided) and piece.rod
+    tangent = table.held_tangent is not None and piece.rod
     # Without a normal a clamp still holds the twist of a rod that can tell its sides apart; of a
     # round one it holds it in motion only (conditions.py), for in statics any turn is as good.
-    twist = tangent and (getattr(table, "normal", None) is not None or (isinstance(table, Clamped) and not piece.round))
-    if isinstance(table, Clamped) and table.swivel:
-        twist = False
+    twist = tangent and table.holds_twist and (table.held_normal is not None or not piece.round)
     motion = None
-    if not isinstance(table, Free | Body) and table.motion is not None:
+    if table.prescribed_motion is not None:
         from hybrid.scene.motion import EndMotion  # only a scene that moves needs it
 
         still = Hold(table, True, tangent, twist).at(0.0)
-        motion = EndMotion(table.motion, still.position, still.frame)
-    return Hold(table, isinstance(table, Pinned | Clamped), tangent, twist, motion)
+        motion = EndMotion(table.prescribed_motion, still.position, still.frame)
+    return Hold(table, table.held_position is not None, tangent, twist, motion)

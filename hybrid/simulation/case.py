@@ -129,8 +129,8 @@ class Job:
     @property
     def _files(self) -> dict[str, str]:
         """Digests of the motion files, by path: a run that goes on needs the same."""
-        ends = [end for x in (self.scene, *(x.scene for x in self.changes)) for end in (x.ends.start, x.ends.end)]
-        paths = {motion.file for end in ends if (motion := getattr(end, "motion", None)) is not None and motion.file}
+        ends = [end for x in (self.scene, *(x.scene for x in self.changes)) for end in x.ends.both]
+        paths = {motion.file for end in ends if (motion := end.prescribed_motion) is not None and motion.file}
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 
     def goes_on(self, source: Path, effort: Effort) -> bool:
@@ -428,7 +428,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         return
     line = model.line
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
-        if not hasattr(end, "tangent") or line.spin[cell]:
+        if end.held_tangent is None or line.spin[cell]:
             continue
         s, far = float(line.s[cell]), float(line.s[-1])
         bend = float(model.cable.B[cell, :2].mean())

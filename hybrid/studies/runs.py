@@ -199,10 +199,9 @@ class Desk:
 def key_of(scene: Scene, repeat: int, also: str = "") -> str:
     """Of all that decides what a run finds: the scene, files it reads, the package, how often it is timed."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
-    for end in (scene.ends.start, scene.ends.end):
-        file = getattr(getattr(end, "motion", None), "file", None)
-        if file is not None:
-            digest.update(Path(file).read_bytes())
+    for end in scene.ends.both:
+        if end.prescribed_motion is not None and end.prescribed_motion.file is not None:
+            digest.update(Path(end.prescribed_motion.file).read_bytes())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):
         place = source.relative_to(package)
