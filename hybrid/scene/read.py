@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
+from os import PathLike
 from pathlib import Path
 from typing import Any, get_type_hints
 
@@ -25,6 +26,24 @@ from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_tex
 # Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
 # some seconds.
 LARGEST_SCENE = 1_000_000
+
+
+def as_scene(scene: Scene | str | PathLike[str] | Mapping[str, Any]) -> Scene:
+    """The scene given as a `Scene`, as the path of a scene file, or as a dict of its tables.
+
+    SceneError if it is refused; TypeError if it is none of these.
+    """
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, str) and "\n" in scene:
+        raise TypeError("a scene is expected, or the path of a scene file; for YAML text: hybrid.parse_scene(text)")
+    if isinstance(scene, str | PathLike):
+        return load_scene(Path(scene))
+    if isinstance(scene, Mapping):
+        return validate_scene(dict(scene))
+    raise TypeError(
+        f"a scene is expected: a hybrid.Scene, the path of a scene file, or a dict; given: {type(scene).__name__}"
+    )
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:

@@ -10,7 +10,7 @@ from pydantic import ValidationError
 from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPENSION, complaints, marked
 
 from hybrid.errors import SceneError
-from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
+from hybrid.scene.read import as_scene, load_scene, parse_scene, scene_text, validate_scene
 from hybrid.scene.schema import (
     Cable,
     CatenaryModel,
@@ -204,6 +204,21 @@ def test_files(tmp_path) -> None:
     with pytest.raises(SceneError, match=r"scene.yaml:1:41: cable.sections\[0\].mass"):
         path.write_text(AT_REST.replace("mass: 1.0", "mass: -1.0"))
         load_scene(path)
+
+
+def test_a_path_a_dict_or_a_scene(tmp_path) -> None:
+    scene = parse_scene(AT_REST)
+    path = tmp_path / "scene.yaml"
+    path.write_text(AT_REST)
+    assert as_scene(scene) is scene
+    assert as_scene(path) == as_scene(str(path)) == as_scene(scene.model_dump()) == scene
+    with pytest.raises(SceneError, match="exists"):
+        as_scene("nothing.yaml")
+    with pytest.raises(TypeError, match="parse_scene"):
+        as_scene(AT_REST)
+    for nonsense in (None, 3, [1], b"scene.yaml"):
+        with pytest.raises(TypeError, match=f"path of a scene file.*{type(nonsense).__name__}"):
+            as_scene(nonsense)
 
 
 def test_motion_file_is_next_to_the_scene(tmp_path) -> None:
