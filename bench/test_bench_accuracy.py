@@ -56,7 +56,7 @@ def truth(name):
     said = result.attributes
     print(
         f"{name}: truth of {said['cells']} cells, {len(result['steps/t'])} steps; its own error "
-        f"{said['error_total_position']:.1e} m, {said['error_total_pull']:.1e} N {missed}"
+        f"{said['error_total_position']:.1e} m, {said['error_total_end_force']:.1e} N {missed}"
     )
     return result
 
@@ -76,7 +76,7 @@ def row(name, model, percent):
     out = {
         "position": position / (percent / 100 * length), "pull": force / (percent / 100 * whole),
         "effect position": said.get("error_total_position", np.nan) / position,
-        "effect pull": said.get("error_total_pull", np.nan) / force,
+        "effect pull": said.get("error_total_end_force", np.nan) / force,
         "cpu": cpu, "missed": bool(kinds & {"accuracy missed", "no error figure"}),
     }  # fmt: skip
     print(

@@ -172,7 +172,7 @@ def test_adaptive_switches(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     lost, mass, momentum, _ = np.abs(np.array(watched.rows)).max(axis=0)
     t, when = a.steps["t"], sorted({e.t for e in changes(a)})
     jumps, large, anywhere = [], 0, 0
-    for pull in ("pull_start", "pull_end"):
+    for pull in ("end_force_start", "end_force_end"):
         rod = np.interp(t, r.steps["t"], r.steps[pull])
         if rod.mean() < 1e-9:  # a free end
             continue

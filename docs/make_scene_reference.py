@@ -202,7 +202,7 @@ output: {every: 0.25, criteria: true}
 Every change is an event: `split` (a rod within a catenary), `grow`, `merge` (a rod goes), `shrink`, and `retry` (a step
 was taken back because a catenary would have gone too far in it), each with the criterion, its value and threshold; the
 energy that the changes of a moment put in is in the first of them.
-`zones held` and `clamp left out` say what the program decided at the start.
+`zones fixed` and `bending at clamp neglected` say what the program decided at the start.
 
 ## Steps and outputs
 

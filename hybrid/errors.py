@@ -74,7 +74,7 @@ class Outcome(IntEnum):
     UNSTABLE = 6
     GAINS_ENERGY = 7
     TWISTED_TOO_FAR = 8
-    DROWNED = 9
+    ILL_CONDITIONED = 9
     BURIED = 10
 
     @property
@@ -86,14 +86,14 @@ class Outcome(IntEnum):
         return _REMEDY[self]
 
 
-# Kinds of events that call an answer into question, the worst first; other kinds are news.
+# Kinds of events that call a result into question, the worst first; other kinds are information.
 EVENTS_BY_WEIGHT = (
     "gains energy",
-    "implausible",  # a slip of units, which all that follows may come from
+    "implausible",  # a wrong unit, from which everything else may follow
     "accuracy missed",
     "no error figure",
     "error uncertain",
-    "pull between outputs",
+    "end force between outputs",
     "slack",
     "unstable",
     "out of plane",
@@ -101,30 +101,30 @@ EVENTS_BY_WEIGHT = (
     "unresolved bend",
     "stretched",
     "deep in the seabed",
-    "loses energy",
+    "numerical dissipation",
     "vibrations damped",
     "snap",
     "coarse step",
-    "torque left out",
+    "torque neglected",
     "ignored",
     "undamped",
-    "error beyond estimate",
-    "not judged",
-    "clamp left out",
-    "point left out",
-    "zones held",
-    "friction left out",
-    "turned in",
-    "events left out",
+    "model error not estimated",
+    "stability not judged",
+    "bending at clamp neglected",
+    "bending at point load neglected",
+    "zones fixed",
+    "static friction neglected",
+    "end rotated in",
+    "events omitted",
 )
 
 
-# Kinds of events of zones that change: they tell of the run as it should be.
+# Changes of zones: part of a normal run.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
-# All kinds that call nothing into question: those, and what was asked for while the run was on its way.
+# All kinds that are part of a normal run: changes of zones, and changes of loads that `resume` was asked for.
 EXPECTED = (*ZONE_EVENTS, "loads change")
-# Kind of the event that says how many of another kind (its criterion) were too many to write (its value).
-LEFT_OUT = EVENTS_BY_WEIGHT[-1]
+# Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.
+OMITTED = EVENTS_BY_WEIGHT[-1]
 
 
 def weight_of_event(kind: str) -> int:
@@ -137,10 +137,10 @@ _CAUSE = {
     Outcome.NOT_CONVERGED: "Newton's method did not converge",
     Outcome.NOT_FINITE: "a number stopped being finite (NaN or infinity)",
     Outcome.SINGULAR: "the equations have no unique solution: something can move without resistance",
-    Outcome.SLACK: "the tension of a catenary zone vanished; a flexible catenary has no answer there",
+    Outcome.SLACK: "the line goes into compression; a catenary cannot carry it",
     Outcome.TURNED_TOO_FAR: "a cell turned by more than a radian within one time step, however small",
     Outcome.GAINS_ENERGY: "the computation creates energy: as much as all the work done on the cable so far",
-    Outcome.DROWNED: "the line is too long for literal shooting: growth along it has drowned the answer",
+    Outcome.ILL_CONDITIONED: "the line is too long for literal shooting: the system is ill-conditioned",
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
@@ -154,7 +154,7 @@ _REMEDY = {
     Outcome.SLACK: "make this stretch a rod zone (it needs bending_stiffness), or keep it taut",
     Outcome.TURNED_TOO_FAR: "look for a jump of force at this time; add damping or bending stiffness, or add cells",
     Outcome.GAINS_ENERGY: "make time.step or rho_inf smaller, give axial_stiffness, add cells where the cable folds",
-    Outcome.DROWNED: "take solver: elimination",
+    Outcome.ILL_CONDITIONED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
@@ -172,10 +172,8 @@ class ComputationError(HybridError):
         self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None
     ) -> None:
         self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot
-        at = " and ".join(
-            x for x in (f"t = {t:.6g} s" if t is not None else "", f"s = {s:.6g} m" if s is not None else "") if x
-        )
-        lines = [f"{outcome.cause}{' at ' + at if at else ''}"]
+        place = [f"{name} = {x:.6g} {unit}" for name, x, unit in (("t", t, "s"), ("s", s, "m")) if x is not None]
+        lines = [f"{outcome.cause} ({', '.join(place)})" if place else outcome.cause]
         if detail:
             lines.append(f"    detail:   {detail}")
         remedy = outcome.remedy

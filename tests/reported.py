@@ -68,8 +68,13 @@ def reported(
     if errors:
         causes = {"mesh": 0.03, "time": 0.01, "model": 0.002, "total": 0.042}
         attributes |= {f"error_{k}_position": x for k, x in causes.items()}
-        attributes |= {f"error_{k}_pull": 1e3 * x for k, x in causes.items()}
-    log = [Field("t", "s", "d"), Field("dt", "s", "d"), Field("pull_start", "N", "d"), Field("pull_end", "N", "d")]
+        attributes |= {f"error_{k}_end_force": 1e3 * x for k, x in causes.items()}
+    log = [
+        Field("t", "s", "d"),
+        Field("dt", "s", "d"),
+        Field("end_force_start", "N", "d"),
+        Field("end_force_end", "N", "d"),
+    ]
     memory = io.BytesIO()
     recorder = Recorder(
         memory, grid_s=s, fields=fields, step_fields=log if steps and outputs > 1 else [], attributes=attributes,
@@ -95,7 +100,7 @@ def reported(
         recorder.save(float(t), {f.name: values[f.name] for f in fields}, zones if late else [("catenary", 0.0, 100.0)])
         if steps and outputs > 1 and t > 0.0:
             pull = float(values["tension"][-1])
-            recorder.log({"t": float(t), "dt": 0.01, "pull_start": pull / 2, "pull_end": pull * 1.05})
+            recorder.log({"t": float(t), "dt": 0.01, "end_force_start": pull / 2, "end_force_end": pull * 1.05})
     for t, a, b, kind, text in events:
         recorder.event(t, a, b, kind, text)
     recorder.close(status, message)

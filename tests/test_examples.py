@@ -62,7 +62,7 @@ def test_suspension_comes_to_rest_where_goyal_and_perkins_say() -> None:
     assert distance(hybrid_, rod) == pytest.approx(5.36e-2, rel=0.01)
     for result in (hybrid_, rod):
         assert np.abs(result.velocity[-1]).max() < 1e-6
-        assert [event.kind for event in result.events] == ["turned in"]
+        assert [event.kind for event in result.events] == ["end rotated in"]
 
 
 def test_suspension_has_its_moment_in_the_rod_and_a_kink_at_the_joint() -> None:
@@ -398,7 +398,7 @@ def test_buoy_follows_an_irregular_sea() -> None:
     assert chain.min() == pytest.approx(-178, rel=0.3)
     end = result.touchdown[late, 1]
     assert 32 < end.min() < 34 and 38 < end.max() < 40
-    assert result.events[0].kind == "friction left out"
+    assert result.events[0].kind == "static friction neglected"
 
 
 def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

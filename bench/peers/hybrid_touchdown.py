@@ -67,4 +67,4 @@ def run(elements: int, EI: float, dt: float = 0.1, zones: Zones = ()) -> Answer:
     words = f"dt {dt:g} s" + "".join(f", {kind} {s:g} m {c} cells (ratio {q:g})" for kind, s, c, q in zones)
     times = np.concatenate([[0.0], steps["t"]])
     first = float(np.linalg.norm(result.reaction_end[0]))
-    return Answer(times, np.concatenate([[first], steps["pull_end"]]), loop, whole - loop, words)
+    return Answer(times, np.concatenate([[first], steps["end_force_end"]]), loop, whole - loop, words)

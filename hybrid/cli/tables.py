@@ -9,7 +9,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.errors import LEFT_OUT, ZONE_EVENTS
+from hybrid.errors import OMITTED, ZONE_EVENTS
 
 if TYPE_CHECKING:
     from hybrid.interop.moordyn import ImportedDeck
@@ -78,17 +78,17 @@ def zones_over_time(result: Result) -> dict[str, Any]:
     shares = [sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / length for zones in result.zones]
     events = result.events
     changes = sum(e.kind in ZONE_EVENTS for e in events)
-    changes += sum(int(e.value or 0) for e in events if e.kind == LEFT_OUT and e.criterion in ZONE_EVENTS)
+    changes += sum(int(e.value or 0) for e in events if e.kind == OMITTED and e.criterion in ZONE_EVENTS)
     rod = {"least": min(shares), "mean": sum(shares) / len(shares), "most": max(shares)}
     return {"rod": rod, "zone_changes": changes}
 
 
 def errors_facts(result: Result) -> dict[str, Any]:
-    """The estimated errors: largest of position (m) and of the pulls at the ends (N), by kind; whether they are met."""
+    """The estimated errors: largest of position (m) and of the end forces (N), by kind; whether they are met."""
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
-        known = not kinds & {"error uncertain", "error beyond estimate"}
+        known = not kinds & {"error uncertain", "model error not estimated"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 
@@ -102,7 +102,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     table = Table.grid(padding=(0, 2))
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
     table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
-    for what, unit, whole in (("position", "m", float(result.s[-1])), ("pull", "N", most)):
+    for what, unit, whole in (("position", "m", float(result.s[-1])), ("end_force", "N", most)):
         total = errors[f"total_{what}"]
         share = (
             f"{100 * total / whole:.2g} % of {'the length' if what == 'position' else f'{_short(whole)} N'}"
@@ -110,7 +110,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
             else ""
         )
         sizes = (f"{_short(errors[f'{kind}_{what}'], total)} {unit}" for kind in kinds)
-        table.add_row("position" if what == "position" else "pull at ends", *sizes, share)
+        table.add_row("position" if what == "position" else "end force", *sizes, share)
     if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
         names = [f"errors/{kind}/bending_moment" for kind in kinds]
         found = {name: float(result[name].max()) for name in names if name in result}

@@ -151,7 +151,7 @@ def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Seri
     """Pull or tension, and curvature, at one place."""
     result, times = part.result, part.times
     series = []
-    pull = {part.s[0]: "pull_start", part.s[-1]: "pull_end"}.get(s, "")
+    pull = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
     if pull and f"steps/{pull}" in result and len(part.array("steps/t")) > 2:
         said = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
         series.append(Series(place, s, "pull", part.array("steps/t"), part.array(f"steps/{pull}"), said))

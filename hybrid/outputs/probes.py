@@ -310,8 +310,8 @@ MODEL_ERRORS = {
     "tension": ("N", "change of tension", _S),
     "curvature": ("1/m", "change of curvature", _S),
     "bending_moment": ("N m", "change of the bending moment", _S),
-    "pull_start": ("N", "change of the force that holds the start", ()),
-    "pull_end": ("N", "change of the force that holds the end", ()),
+    "end_force_start": ("N", "change of the force that holds the start", ()),
+    "end_force_end": ("N", "change of the force that holds the end", ()),
 }
 
 
@@ -323,7 +323,7 @@ def model_errors(plain: View, corrected: View) -> dict[str, object]:
         "curvature": np.abs(corrected.curvature_twist[:, 0] - plain.curvature_twist[:, 0]),
         "bending_moment": np.abs(corrected.bending_moment() - plain.bending_moment()),
     }
-    for k, name in enumerate(("pull_start", "pull_end")):
+    for k, name in enumerate(("end_force_start", "end_force_end")):
         out[name] = float(np.linalg.norm(corrected.reaction(k) - plain.reaction(k)))
     return out
 

@@ -187,7 +187,7 @@ def newton(
                 linear = _less(linear, offset, part)
             residual = _largest(linear, problem)
             if marches is None and step < TOLERANCE and residual < RESIDUAL:
-                outcome = Outcome.OK if condition < DIGITS else Outcome.DROWNED
+                outcome = Outcome.OK if condition < DIGITS else Outcome.ILL_CONDITIONED
                 break
             if i == (limit if marches is None else marches):
                 outcome = Outcome.NOT_CONVERGED if marches is None else Outcome.OK
@@ -195,11 +195,11 @@ def newton(
             try:
                 fit = march(linear)
             except np.linalg.LinAlgError:
-                outcome, condition = Outcome.DROWNED, np.inf
+                outcome, condition = Outcome.ILL_CONDITIONED, np.inf
                 break
             growth, condition = fit.growth, fit.condition
             if not all(np.isfinite(d).all() for d in fit.change):
-                outcome = Outcome.DROWNED if condition > DIGITS or not growth < DROWNED else Outcome.NOT_FINITE
+                outcome = Outcome.ILL_CONDITIONED if condition > DIGITS or not growth < DROWNED else Outcome.NOT_FINITE
                 break
             sizes = [np.abs(d / scale).max(1) for d, scale in zip(fit.change, scales, strict=True)]
             worst = max(range(len(sizes)), key=lambda p: float(sizes[p].max()))
@@ -208,10 +208,10 @@ def newton(
             fields = [
                 moved(y, factor * d, problem.clock(p)) for p, (y, d) in enumerate(zip(fields, fit.change, strict=True))
             ]
-    if outcome in (Outcome.NOT_CONVERGED, Outcome.DROWNED) and _slack(fields, scales[0][3]):
+    if outcome in (Outcome.NOT_CONVERGED, Outcome.ILL_CONDITIONED) and _slack(fields, scales[0][3]):
         outcome = Outcome.SLACK
     elif outcome is Outcome.NOT_CONVERGED and (condition > DIGITS or not growth < DROWNED):
-        outcome = Outcome.DROWNED
+        outcome = Outcome.ILL_CONDITIONED
     if outcome is Outcome.OK:
         where = None
     return Solved(fields, outcome, i, step, residual, growth, condition, where)

@@ -25,7 +25,7 @@ def equilibrium(line: Line) -> Solved:
                 return solved
             if solved.drowned:
                 return solved.demand(None)
-            first = solved if first is None or solved.outcome is Outcome.DROWNED else first
+            first = solved if first is None or solved.outcome is Outcome.ILL_CONDITIONED else first
     assert first is not None
     return first.demand(None)
 

@@ -29,7 +29,7 @@ from hybrid.simulation.error_control import Climb, Errors, Sketch, summary
 from hybrid.simulation.freeze import freeze
 from hybrid.simulation.restart import Remainder, remainder
 from hybrid.simulation.transient import Motion
-from hybrid.simulation.undersampling import unseen_pulls
+from hybrid.simulation.undersampling import undersampled_end_forces
 from hybrid.store.checkpoint import claimed
 from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
@@ -261,12 +261,14 @@ def _amend(
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
     with open_result(target) as result:
-        unseen = unseen_pulls(result, errors.fields.get("total", {})) if climb.moves and errors is not None else []
-    amend(target, fields, attributes, [*dict(reversed(climb.notes)).items(), *unseen], done)
+        total = errors.fields.get("total", {}) if errors is not None and climb.moves else {}
+        undersampled = undersampled_end_forces(result, total)
+    amend(target, fields, attributes, [*dict(reversed(climb.notes)).items(), *undersampled], done)
 
 
 UNITS_OF_ERRORS = {
-    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m", "pull_start": "N", "pull_end": "N",
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
+    "end_force_start": "N", "end_force_end": "N",
 }  # fmt: skip
 WORDS_OF_ERRORS = {
     "mesh": "error by the mesh", "time": "error by the time step", "model": "error by bending that is left out",

@@ -40,7 +40,7 @@ def static_shooting(scene: Scene, output: str | Path | None, overwrite: bool) ->
     with _recorder(scene, target, overwrite, ()) as recorder:
         if state.rod.any():
             text = "literal shooting finds an equilibrium, stable or not, and a rod may have several"
-            recorder.event(0.0, 0.0, scene.length, "not judged", text)
+            recorder.event(0.0, 0.0, scene.length, "stability not judged", text)
         recorder.save(0.0, _values(scene, state), _zones(state))
         recorder.close("complete", f"equilibrium by literal shooting, growth {state.growth:.2g}")
     return open_result(target)

@@ -58,11 +58,11 @@ STEP_FIELDS = (
     Field(
         "correction", "", "next Newton correction as predicted (turn of a chord in rad, or tension over the largest)"
     ),
-    Field("residual", "N", "largest force out of balance at a node before the last correction"),
+    Field("residual", "N", "largest residual force at a node before the last correction"),
     Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
     Field("error", "m", "local error of position that the step makes, by the change of acceleration in it"),
-    Field("pull_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
-    Field("pull_end", "N", "the same at the end; of an end body: tension of the last cell"),
+    Field("end_force_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
+    Field("end_force_end", "N", "the same at the end; of an end body: tension of the last cell"),
     Field("cpu", "s", "processor time since the start of the run"),
 )
 
@@ -94,7 +94,7 @@ class Job:
         recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps, self._texts)
         recorder.files = self._files
         if zoning and zoning.manager.held:
-            recorder.event(0.0, 0.0, model.length, "zones held", HELD)
+            recorder.event(0.0, 0.0, model.length, "zones fixed", HELD)
         with recorder:
             correction = _correction(model, zoning)
             motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning, correction)
@@ -253,7 +253,7 @@ class Job:
                 raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
             values = _values_at_rest(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
-            recorder.close("complete", f"equilibrium: {found.summary}; out of balance {found.residual:.2g} N")
+            recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
         return _sketch_at_rest(effort, model, values, clock.process_time() - begin)
 
     def sketch_rest(self, effort: Effort) -> Sketch:
@@ -329,7 +329,7 @@ class Job:
 NOTHING_LOST = 1e-6
 # The same as a part of all work done: what the books miss when steps are long.
 IN_BOOKS = 0.01
-MODEL, BEYOND = "errors/model/", "error beyond estimate"
+MODEL, BEYOND = "errors/model/", "model error not estimated"
 
 
 def _damped(result: Result) -> tuple[tuple[str, str], ...]:
@@ -405,14 +405,16 @@ def _recorder(
         outputs=outputs + 1, overwrite=True, climb=climb,
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
-        recorder.event(0.0, s, s, "clamp left out", text)
+        recorder.event(0.0, s, s, "bending at clamp neglected", text)
     left = [s for s in model.attached if model.layout is not None and not _bends(model, s)]
     if left:
         which = ", ".join(f"{s:.5g}" for s in left[:5]) + ", .." * (len(left) > 5)
         text = (
             f"bends at the point loads at s = {which} m shift the cable by less than the tolerance: they have no moment"
         )
-        recorder.event(0.0, left[0], left[-1], "point left out", f"{text}; for it, say always_rod around them")
+        recorder.event(
+            0.0, left[0], left[-1], "bending at point load neglected", f"{text}; for it, say always_rod around them"
+        )
     return recorder
 
 

@@ -102,7 +102,7 @@ class Watch:
         if self._model.line.bits & FRICTION and not found.rubbed:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
-            self.recorder.event(0.0, 0.0, self._model.length, "friction left out", where)
+            self.recorder.event(0.0, 0.0, self._model.length, "static friction neglected", where)
         model = self._model
         line, sea, ends = model.line, model.sea.values, model.ends.values
         if line.bits & PLANAR and not is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
@@ -115,7 +115,7 @@ class Watch:
                 else "an end moment is not conservative"
             )
             text = f"the stability of this equilibrium is not judged, because {why}"
-            self.recorder.event(0.0, 0.0, self._model.length, "not judged", text)
+            self.recorder.event(0.0, 0.0, self._model.length, "stability not judged", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""
@@ -210,7 +210,7 @@ class Watch:
                 f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
                 f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
             )
-            self.recorder.event(t, 0.0, self._model.length, "torque left out", text)
+            self.recorder.event(t, 0.0, self._model.length, "torque neglected", text)
             self._left_out = True
 
     def strain(self, t: float, state: State) -> None:
@@ -282,7 +282,7 @@ class Watch:
             self._slack = min(10.0 * tension, 10.0 * self._slack)
 
     def energy(self, t: float, values: Mapping[str, Any], work: Floats, state: State) -> Stop:
-        """No scheme may create energy, nor swallow most of it."""
+        """Energy that the time scheme creates or dissipates, held against all that was put in."""
         gained, potential = float(values["work/scheme"]), float(values["energy/potential"])
         alive = sum(float(values[x]) for x in values if x.startswith("energy/")) - potential
         if t == 0.0:
@@ -295,14 +295,14 @@ class Watch:
         if gained > GAIN_STOPS * self._put_in + floor:
             return Outcome.GAINS_ENERGY, fastest
         if gained > self._gain * self._put_in + floor:
-            text = (
-                f"the computation has created {gained:.3g} J, {part:.0f} % of all put in: {Outcome.GAINS_ENERGY.remedy}"
-            )
-            self.note(t, fastest, "gains energy", text)
+            text = f"the time scheme has created {gained:.3g} J, {part:.0f} % of the energy put in"
+            self.note(t, fastest, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
             self._gain *= 3.0
         if -gained > self._loss * self._put_in + floor:
-            text = f"the time scheme has swallowed {-gained:.3g} J, {part:.0f} % of all put in"
-            self.note(t, fastest, "loses energy", f"{text}: motion is faster than the step; make time.step smaller")
+            text = f"the time scheme has dissipated {-gained:.3g} J, {part:.0f} % of the energy put in"
+            self.note(
+                t, fastest, "numerical dissipation", f"{text}: motion is faster than the step; make time.step smaller"
+            )
             self._loss *= 1.3
         return None
 

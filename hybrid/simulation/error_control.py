@@ -45,7 +45,7 @@ MOST_RUNS, MOST_FINER = 3, 3.0
 MOST_PARTS = 24.0
 # What a run is compared by, as names of outputs; those that are not there are left out.
 COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end")
-PULLS = {"reaction_start": "pull_start", "reaction_end": "pull_end"}
+END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
 # The run that looks how the cable bends: cells and steps so many times as long as those of the first result.
 SURVEY_CELLS, SURVEY_STEPS, SURVEY_POINTS = 2.0, 4.0, 201
 
@@ -76,10 +76,10 @@ class Sketch:
         return values[_thin(len(values), every // self.every)]
 
     @property
-    def pull(self) -> float:
+    def largest_end_force(self) -> float:
         """The largest force at the ends, N."""
         return max(
-            (float(np.linalg.norm(self.values[x], axis=1).max()) for x in PULLS if x in self.values), default=0.0
+            (float(np.linalg.norm(self.values[x], axis=1).max()) for x in END_FORCES if x in self.values), default=0.0
         )
 
 
@@ -136,7 +136,7 @@ class Estimate:
     def take_model(self, coarse: Sketch) -> None:
         """The model error is that of a coarser run: it hardly depends on cells and steps."""
         doubtful = _beyond(coarse)
-        self.notes = (*coarse.notes, *((("error beyond estimate", doubtful),) if doubtful else ()))
+        self.notes = (*coarse.notes, *((("model error not estimated", doubtful),) if doubtful else ()))
         count = len(next(iter(self.run.values.values())))
         left = coarse.model_error if not doubtful else {}
         self._model = {name: _spread(x, count, coarse.every) for name, x in left.items() if len(x)}
@@ -164,7 +164,7 @@ class Estimate:
         """What it comes to.  Causes add up in size: that they cancel is seldom true at all times."""
         out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": self.model, "total": {}}
         for name, cells in self.cells.items():
-            late, called = self.late.get(name), PULLS.get(name, name)
+            late, called = self.late.get(name), END_FORCES.get(name, name)
             out["mesh"][called] = total = _size(cells, name)
             if late is not None:
                 out["time"][called] = _size(late, name)
@@ -212,7 +212,7 @@ def _spread(error: np.ndarray, count: int, every: int) -> np.ndarray:
 
 def _size(error: np.ndarray, name: str) -> np.ndarray:
     """Of vectors their length, of numbers their size."""
-    return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in PULLS else np.abs(error))
+    return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))
 
 
 # --- what is asked ------------------------------------------------------------------------------
@@ -234,11 +234,11 @@ def judge(asked: Asked, errors: Errors, run: Sketch) -> Verdict:
     bounds: list[tuple[str, str, float]] = []
     if asked.position is not None:
         bounds.append(("position", "m", asked.position))
-    for name in PULLS.values():
+    for name in END_FORCES.values():
         if asked.tension is not None:
             bounds.append((name, "N", asked.tension))
         if asked.of_pull is not None:
-            bounds.append((name, "N", asked.of_pull * run.pull))
+            bounds.append((name, "N", asked.of_pull * run.largest_end_force))
     if asked.of_curvature is not None and "curvature" in run.values:
         bounds.append(("curvature", "1/m", asked.of_curvature * float(run.values["curvature"].max())))
     worst = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked")
@@ -249,7 +249,8 @@ def judge(asked: Asked, errors: Errors, run: Sketch) -> Verdict:
         if total / bound >= worst.ratio:
             model = errors.largest("model", name)
             mesh, time = (errors.largest(kind, name) / bound for kind in ("mesh", "time"))
-            text = f"{name.replace('_', ' at the ')}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
+            quantity = name.replace("end_force_", "force at the ")
+            text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text)
     return worst
 
@@ -471,9 +472,9 @@ class Climb:
 
 
 def summary(errors: Errors) -> dict[str, float]:
-    """The largest errors of position (m) and of the pulls at the ends (N), by kind, for the file and for people."""
+    """The largest errors of position (m) and of the end forces (N), by kind, for the file and for people."""
     out = {}
     for kind in errors.fields:
         out[f"error_{kind}_position"] = errors.largest(kind, "position")
-        out[f"error_{kind}_pull"] = max(errors.largest(kind, name) for name in PULLS.values())
+        out[f"error_{kind}_end_force"] = max(errors.largest(kind, name) for name in END_FORCES.values())
     return out

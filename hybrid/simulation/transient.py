@@ -285,7 +285,7 @@ class Motion:
             {
                 "t": end, "dt": dt, "iterations": taken.iterations + wasted, "correction": taken.correction,
                 "residual": taken.residual, "repeats": repeats, "error": taken.error,
-                "pull_start": self._pull(0), "pull_end": self._pull(1),
+                "end_force_start": self._pull(0), "end_force_end": self._pull(1),
                 "cpu": clock.process_time() - self.cpu,
             }
         )  # fmt: skip
@@ -315,7 +315,7 @@ class Motion:
         beyond = self.correction.beyond
         if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
             s = float(self.model.line.s[max(self.correction.corrector.where, 0)])
-            self.recorder.event(end, s, s, "error beyond estimate", beyond)
+            self.recorder.event(end, s, s, "model error not estimated", beyond)
             self._beyond = end + self.model.time_scale
 
     def _new_stepper(self, floor: float) -> Stepper:
@@ -391,10 +391,10 @@ class Motion:
             s = float(model.line.s[-k])
             text = (
                 f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
-                f"it is turned in, and a force there grows, over the first {duration:.3g} s; "
+                f"it is rotated to it, and a force there grows, over the first {duration:.3g} s; "
                 f"start from an equilibrium to avoid this"
             )
-            self.recorder.event(0.0, s, s, "turned in", text)
+            self.recorder.event(0.0, s, s, "end rotated in", text)
 
     def _pull(self, k: int) -> float:
         ends = self.model.ends.values

@@ -40,6 +40,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.integrity import being_written, readable
+from hybrid.store.old_names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 
 if TYPE_CHECKING:
     import xarray
@@ -87,6 +88,15 @@ class Event(NamedTuple):
 
 class UnknownName(ResultError, AttributeError):
     """The file holds nothing of this name.  (An AttributeError too, so that `hasattr` works.)"""
+
+
+class Attributes(dict[str, Any]):
+    """Attributes of a file by name; names of older versions are understood in `attributes[name]`."""
+
+    def __missing__(self, name: str) -> Any:
+        if name in OLD_ATTRIBUTES:
+            return self[OLD_ATTRIBUTES[name]]
+        raise KeyError(name)
 
 
 class Columns(Mapping[str, np.ndarray]):
@@ -176,6 +186,7 @@ class Result:
     def _scan(self) -> None:
         self._cache: dict[str, np.ndarray] = {}
         self._dims: dict[str, tuple[str, ...]] = {}
+        self._stored: dict[str, str] = {}  # names in the file, where another version wrote it
         self.units: dict[str, str] = {}
         groups: set[str] = set()
 
@@ -183,6 +194,9 @@ class Result:
             if name.split("/")[0] in HIDDEN:
                 return
             if isinstance(item, h5py.Dataset) and name not in TEXTS:
+                if name in OLD_NAMES:
+                    self._stored[OLD_NAMES[name]] = name
+                    name = OLD_NAMES[name]
                 self._dims[name] = tuple(d.label for d in item.dims)
                 self.units[name] = _text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
@@ -196,13 +210,15 @@ class Result:
         scales = sorted((n for n, dims in self._dims.items() if dims == (n,)), key=lambda n: n != "t")
         self._rows = {n: self._dataset(n).shape[0] for n in scales}
         self._groups = {g: Columns(self, g) for g in sorted(groups)}
-        self.attributes: dict[str, Any] = {k: _plain(v) for k, v in self._file.attrs.items()}
+        self.attributes: dict[str, Any] = Attributes(
+            {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._file.attrs.items()}
+        )
         table = self._groups["zones"]
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
         self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
 
     def _dataset(self, name: str) -> Any:
-        data = self._file[name]
+        data = self._file[self._stored.get(name, name)]
         if self._file.swmr_mode:
             data.refresh()  # HDF5 may remember its length from a moment before the row count was taken
         return data
@@ -227,7 +243,7 @@ class Result:
     # ---- arrays -------------------------------------------------------------------------------
 
     def _known(self, name: str) -> str:
-        name = ALIASES.get(name, name)
+        name = _current(name)
         if name in self._dims:
             return name
         if name in self._groups:
@@ -262,7 +278,7 @@ class Result:
         return self[name]
 
     def __contains__(self, name: object) -> bool:
-        return name in self._dims or name in self._groups or ALIASES.get(str(name)) in self._dims
+        return name in self._groups or _current(str(name)) in self._dims
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *self._groups, *ALIASES, *(n for n in self.names if "/" not in n)]
@@ -275,7 +291,7 @@ class Result:
         """`units`, `description` and `frame` of an array, as the file has them; empty where it has none."""
         if not self._file:
             raise ResultError("the result is closed; open the file again")
-        attrs = self._file[self._known(name)].attrs
+        attrs = self._dataset(self._known(name)).attrs
         return {key: _text(attrs.get(key, "")) for key in ("units", "description", "frame")}
 
     def describe(self, name: str) -> str:
@@ -336,7 +352,11 @@ class Result:
         with readable(self._source):
             table = self._groups["events"]
             rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
-            return [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
+            events = [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
+        return [
+            e._replace(kind=OLD_EVENTS.get(e.kind, e.kind), criterion=OLD_EVENTS.get(e.criterion, e.criterion))
+            for e in events
+        ]
 
     @property
     def scene_text(self) -> str:
@@ -482,6 +502,11 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
     weight = np.clip((x - grid[left]) / np.where(width > 0, width, 1.0), 0.0, 1.0)
     weight = weight.reshape(weight.shape + (1,) * (array.ndim - axis - 1))
     return np.take(array, left, axis) * (1.0 - weight) + np.take(array, right, axis) * weight
+
+
+def _current(name: str) -> str:
+    """The name a dataset has now, from an alias or from the name an older version gave it."""
+    return ALIASES.get(name) or OLD_NAMES.get(name, name)
 
 
 def _joined(texts: list[str], by: str = ", ") -> str:

@@ -28,7 +28,7 @@ from typing import Any
 import h5py
 import numpy as np
 
-from hybrid.errors import LEFT_OUT, ResultError
+from hybrid.errors import OMITTED, ResultError
 from hybrid.store.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint, write_climb
 from hybrid.store.disk_space import ask_for_room
 from hybrid.store.format import (
@@ -271,7 +271,7 @@ class Recorder:
             left = count - MOST_OF_A_KIND
             if left > 0:
                 text = f"{left} more events '{kind}' are not written, after the first {MOST_OF_A_KIND}"
-                row = (max(self.last, 0.0), 0.0, 0.0, LEFT_OUT, text, kind, float(left), nan, nan)
+                row = (max(self.last, 0.0), 0.0, 0.0, OMITTED, text, kind, float(left), nan, nan)
                 self._events.rows.append(row)
 
     def flush(

@@ -217,5 +217,5 @@ def _told_by(result: Result, row: Row) -> Row:
     return replace(
         row, status=MISSED if missed else DONE, cause=missed, cells=said.get("cells"),
         steps=len(result["steps/t"]), runs=said.get("effort_runs"), effort_cpu=said.get("effort_cpu"),
-        estimate_position=said.get("error_total_position"), estimate_pull=said.get("error_total_pull"),
+        estimate_position=said.get("error_total_position"), estimate_pull=said.get("error_total_end_force"),
     )  # fmt: skip

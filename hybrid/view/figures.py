@@ -77,14 +77,14 @@ def histories(result: Result, store: Store) -> list[Spec]:
 def _pulls(result: Result, store: Store) -> Spec:
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for end in _PULLS:
-        if f"steps/pull_{end}" in result and len(result["steps/t"]):
-            found[end] = (result["steps/t"], result[f"steps/pull_{end}"])
+        if f"steps/end_force_{end}" in result and len(result["steps/t"]):
+            found[end] = (result["steps/t"], result[f"steps/end_force_{end}"])
         elif f"reaction_{end}" in result:
             found[end] = (result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1))
     factor, unit = prefix("N", max((float(y.max()) for _, y in found.values()), default=0.0))
     data: list[Spec] = []
     for end, (t, y) in found.items():
-        error = f"errors/total/pull_{end}"
+        error = f"errors/total/end_force_{end}"
         if error in result and f"reaction_{end}" in result:
             middle = np.linalg.norm(result[f"reaction_{end}"], axis=1)
             k = outline(middle)
@@ -93,7 +93,7 @@ def _pulls(result: Result, store: Store) -> Spec:
         k = outline(y)
         data.append(curve(store, t[k], y[k] * factor, f"at the {end}", _PULLS[end], unit))
     said = "Force that holds or loads each end, at every step."
-    return _over_time("pulls", "Pull at the ends", said, data, f"pull ({unit})")
+    return _over_time("pulls", "End forces", said, data, f"force ({unit})")
 
 
 def _doubt(store: Store, x: np.ndarray, low: np.ndarray, high: np.ndarray, named: bool) -> Spec:

@@ -107,8 +107,8 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
     if 0 < len(zones) <= 4:  # more are to be seen, not to be read
         facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in zones))
     if "error_total_position" in result.attributes:
-        size = {x: float(result.attributes[f"error_total_{x}"]) for x in ("position", "pull")}
-        facts.insert(0, f"estimated error {size['position']:.2g} m, {size['pull']:.2g} N at the ends")
+        size = {x: float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force")}
+        facts.insert(0, f"estimated error {size['position']:.2g} m, {size['end_force']:.2g} N at the ends")
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
     return facts

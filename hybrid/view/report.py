@@ -168,7 +168,7 @@ def _facts(facts: list[Fact], several: bool) -> str:
 def _error_table(fact: Fact) -> str:
     head = "".join(f'<th class="number">{name}</th>' for name in CAUSES.values())
     rows = ""
-    for what, name, unit in (("position", "position", "m"), ("pull", "pulls at the ends", "N")):
+    for what, name, unit in (("position", "position", "m"), ("end_force", "end forces", "N")):
         cells = [fact.values.get(f"{cause}_{what}") for cause in CAUSES]
         factor, written = prefix(unit, max((x for x in cells if x is not None), default=0.0))
         said = (f'<td class="number">{"–" if x is None else short(x * factor, 2)}</td>' for x in cells)

@@ -32,12 +32,12 @@ ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
 _NAMES = {"theta": "angle to z", "phi": "azimuth", "bending_moment": "|bending moment|", "shear": "|shear|"}
 _NAMES |= {"contact": "contact force"} | {x: f"position {x}" for x in "xyz"}
 NEWS = (
-    "not judged",
-    "turned in",
-    "friction left out",
-    "clamp left out",
-    "point left out",
-    "zones held",
+    "stability not judged",
+    "end rotated in",
+    "static friction neglected",
+    "bending at clamp neglected",
+    "bending at point load neglected",
+    "zones fixed",
 )  # no warnings
 
 

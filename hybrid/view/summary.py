@@ -142,12 +142,12 @@ def _tension(result: Result) -> Fact:
     text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, k)}."
     values: dict[str, Any] = {"tension": most}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
-        if f"steps/pull_{end}" in result and len(result["steps/t"]):
-            pull = result[f"steps/pull_{end}"]
+        if f"steps/end_force_{end}" in result and len(result["steps/t"]):
+            pull = result[f"steps/end_force_{end}"]
             n = int(pull.argmax())
-            values[f"pull_{end}"], when = float(pull[n]), float(result["steps/t"][n])
+            values[f"end_force_{end}"], when = float(pull[n]), float(result["steps/t"][n])
             if pull[n] > most * (1.0 + 1e-3):
-                text += f" Between outputs the pull on the {end} reaches {amount(pull[n], 'N')}, at t = {when:.5g} s."
+                text += f" Between outputs the force at the {end} reaches {amount(pull[n], 'N')}, at t = {when:.5g} s."
     return Fact("tension", "Largest tension", text, values=values, t=t, s=s)
 
 
@@ -205,7 +205,7 @@ def _bend(result: Result) -> Fact:
 
 def _bends_left_out(result: Result) -> str:
     """Where a bend was left out, so that no radius is known; empty where none was."""
-    found = [e for e in result.events if e.kind in ("point left out", "clamp left out")]
+    found = [e for e in result.events if e.kind in ("bending at point load neglected", "bending at clamp neglected")]
     if not found:
         return ""
     where = ", ".join(dict.fromkeys(f"s = {x:.4g} m" for e in found for x in (e.s_a, e.s_b)))
@@ -331,9 +331,7 @@ def _errors(result: Result) -> Fact:
         text = "Not estimated; `accuracy: 1%` or `output: {errors: true}` in the scene asks for it."
         return Fact("errors", title, text, "absent")
     asked = result.attributes.get("accuracy_asked")
-    text = (
-        f"Position {amount(found['total_position'], 'm', 2)}, pulls at the ends {amount(found['total_pull'], 'N', 2)}"
-    )
+    text = f"Position {amount(found['total_position'], 'm', 2)}, end forces {amount(found['total_end_force'], 'N', 2)}"
     text += f"; asked was {asked}." if asked else "."
     return Fact("errors", title, text, "plain", found | {"asked": asked})
 

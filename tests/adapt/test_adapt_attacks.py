@@ -71,7 +71,7 @@ def test_what_the_comparison_at_rest_has_shown_is_kept(cells, span, tolerance):
     model = {"kind": "adaptive", "tolerance": tolerance}
     a, _, far = compared(scene(section, pinned(), pinned(span, 0, 0), mesh={"cells": cells}, model=model))
     assert far.max() < 0.1 and np.abs(a.velocity).max() < 1e-9
-    assert [e.kind for e in a.events] == ["zones held"]
+    assert [e.kind for e in a.events] == ["zones fixed"]
 
 
 def test_curvature_without_stress_bends_a_straight_cable():
@@ -133,10 +133,10 @@ def test_a_clamp_that_is_left_out_is_said():
     section = {"length": 500, "mass": 1.2, "bending_stiffness": 20, "axial_stiffness": 3e6}
     text = scene(section, pinned(), clamped((400, 0, -100)), time={"duration": 0.2, "step": 0.02})
     a = hybrid.run(hybrid.validate_scene(text))
-    (said,) = [e for e in a.events if e.kind == "clamp left out"]
+    (said,) = [e for e in a.events if e.kind == "bending at clamp neglected"]
     assert said.s_a == 500.0 and "always_rod: [[4" in said.text
     asked = text | {"model": {"kind": "adaptive", "always_rod": [[490, 500]]}}
-    assert not [e for e in hybrid.run(hybrid.validate_scene(asked)).events if e.kind == "clamp left out"]
+    assert not [e for e in hybrid.run(hybrid.validate_scene(asked)).events if e.kind == "bending at clamp neglected"]
 
 
 def test_sections_that_lie_one_way_or_the_other_are_refused():

@@ -14,7 +14,7 @@ from problems import Scene, pinned, scene
 import hybrid
 
 BUSY = ["deep", "bend", "point", "edge"]
-PULLS = ("pull_start", "pull_end")
+PULLS = ("end_force_start", "end_force_end")
 
 
 def switches(result: hybrid.Result) -> list[float]:
@@ -149,7 +149,7 @@ def test_a_switch_while_tension_rises_is_not_felt(stiffness):
 def test_smaller_steps_ring_no_more(step):
     """A switch is no blow: at half the step the largest change of the pull from one step to the next is no larger."""
     result = hybrid.run(sagging(step=step))
-    change = np.abs(np.diff(result.steps["pull_end"])).max() / result.steps["pull_end"].mean()
+    change = np.abs(np.diff(result.steps["end_force_end"])).max() / result.steps["end_force_end"].mean()
     assert change <= 0.02
 
 

@@ -178,12 +178,12 @@ def test_json_lines_of_a_run(call: Call) -> None:
 def test_what_happened_is_told_most_important_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     from hybrid.store.reader import Event, Result
 
-    events = [Event(0.0, 1, 1, "other", "b"), Event(0.0, 2, 2, "turned in", "a"), Event(1.5, 3, 3, "other", "c")]
+    events = [Event(0.0, 1, 1, "other", "b"), Event(0.0, 2, 2, "end rotated in", "a"), Event(1.5, 3, 3, "other", "c")]
     monkeypatch.setattr(Result, "events", events)
     said = call("run", "wire.yaml")
     assert said.err == "note: t = 0 s: a\nnote: t = 0 s: b (1 more like this)\n"
     notes = [line for line in call("run", "wire.yaml", "--json").lines if line["event"] == "note"]
-    assert [(n["kind"], n["count"]) for n in notes] == [("turned in", 1), ("other", 2)]
+    assert [(n["kind"], n["count"]) for n in notes] == [("end rotated in", 1), ("other", 2)]
 
 
 # ---- 1: refused -----------------------------------------------------------------------------------
@@ -265,7 +265,7 @@ def test_an_older_result_is_replaced_unless_told_otherwise(call: Call) -> None:
 def test_a_failed_computation_names_cause_place_and_snapshot(call: Call) -> None:
     said = call("run", "pushed.yaml")
     assert said.code == 2 and said.out == ""
-    assert "tension of a catenary zone vanished" in said.err and "at t = " in said.err and "s = " in said.err
+    assert "goes into compression" in said.err and "(t = " in said.err and "s = " in said.err
     snapshot = Path("pushed.snapshot.npz").resolve()
     assert f"snapshot: {snapshot}" in said.err and snapshot.is_file()
     assert "file:     pushed.h5" in said.err

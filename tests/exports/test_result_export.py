@@ -55,7 +55,7 @@ def made(
             *([("touchdown", "m", ("edge",), "")] if bed else []),
         )
     ]
-    log = [Field("t", "s", "end of the step"), Field("dt", "s", "length"), Field("pull_end", "N", "the pull")]
+    log = [Field("t", "s", "end of the step"), Field("dt", "s", "length"), Field("end_force_end", "N", "the pull")]
     memory = io.BytesIO()
     fixed = [(Field("history", "m", "arc lengths to follow", (1,), ("history",)), np.array([2.5]))]
     if bed:
@@ -82,7 +82,7 @@ def made(
         if steps and i:
             for k in range(1, round(every / step) + 1):
                 end = t - every + k * step
-                recorder.log({"t": end, "dt": step, "pull_end": 100.0 + PULL * np.sin(2 * np.pi * end)})
+                recorder.log({"t": end, "dt": step, "end_force_end": 100.0 + PULL * np.sin(2 * np.pi * end)})
         middle = 6.0 if t < duration / 2 else 3.0
         recorder.save(t, values, [("catenary", 0.0, middle), ("rod", middle, LENGTH)])
     recorder.event(duration / 2, 3.0, 6.0, "grow", 'bend 1.05 > 1, in "the" middle', criterion="bend", value=1.05)
@@ -117,7 +117,7 @@ def test_a_result_opens_directly_in_xarray(result: Result, tmp_path: Path, engin
         assert opened.attrs["title"] == "Schwingt, 5 µm" and opened.attrs["status"] == "complete"
         assert not [dim for dim in opened.sizes if dim.startswith("phony")]
     with xarray.open_dataset(tmp_path / "run.h5", engine=engine, group="steps") as steps:
-        assert steps.pull_end.dims == ("t",) and (steps.t == result.steps["t"]).all()
+        assert steps.end_force_end.dims == ("t",) and (steps.t == result.steps["t"]).all()
     groups = xarray.open_groups(tmp_path / "run.h5", engine=engine)
     assert {"/", "/energy", "/errors/total", "/steps", "/zones", "/events"} <= set(groups)
     assert groups["/energy"].kinetic.dims == ("t",) and groups["/errors/total"].tension.dims == ("t", "s")
@@ -209,7 +209,7 @@ def test_csv_of_places_components_and_tables_opens_in_pandas(result: Result, tmp
     np.testing.assert_allclose(table["reaction_end z (N)"], result.reaction_end[10:21, 2], rtol=1e-15)
     assert "# note: only t = 1 to 2 s of 0 to 8 s" in file.read_text(encoding="utf-8")
     log = pandas.read_csv(export(result, tmp_path / "b.csv", names=["steps"]).files[0], comment="#")
-    np.testing.assert_allclose(log["steps/pull_end (N)"], result.steps["pull_end"], rtol=1e-15)
+    np.testing.assert_allclose(log["steps/end_force_end (N)"], result.steps["end_force_end"], rtol=1e-15)
     events = pandas.read_csv(export(result, tmp_path / "c.csv", names=["events"]).files[0], comment="#")
     assert events["events/text"].tolist() == [event.text for event in result.events], "commas and quotes are kept"
 

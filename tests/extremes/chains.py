@@ -219,7 +219,7 @@ def folds() -> Iterator[Case]:
             tables = scene(
                 rod(L, 1e-3 * G * L**3), pinned(), free(), model, 20, G, initial=initial, **clock(20, 0.005 * beat)
             )
-            cause = "corner of 180 deg" if model == "rod" else "tension of a catenary zone vanished"
+            cause = "corner of 180 deg" if model == "rod" else "goes into compression"
             source = "a fold has no direction in which a rod could bend; the loose strand falls with g and has T = 0"
             yield Case(
                 "folded starts", told(L=L), model, tables, lambda _: [("any", 1.0, 0.5)], source, "refused", cause

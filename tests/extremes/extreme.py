@@ -30,7 +30,7 @@ from hybrid.store.reader import Result
 MODELS = ("rod", "catenary", "zones", "adaptive")
 LONGEST = 20.0  # s of wall time: a case that takes longer has failed
 # Kinds of events that are no doubt about an answer: what the scene asked for, in other words.
-NEWS = {"turned in", "not judged", "zones held", "friction left out", "undamped"}
+NEWS = {"end rotated in", "stability not judged", "zones fixed", "static friction neglected", "undamped"}
 DOUBTS = tuple(kind for kind in EVENTS_BY_WEIGHT if kind not in NEWS)
 
 Floats = np.ndarray

@@ -245,7 +245,7 @@ def pendulums() -> Iterator[Case]:
             truth,
             source,
             must,
-            "coarse step|loses energy|gains energy|creates energy|turned by more",
+            "coarse step|numerical dissipation|gains energy|creates energy|turned by more",
         )
 
 
@@ -290,9 +290,9 @@ def twists() -> Iterator[Case]:
         if d["part"] > 1 and turns < 3:
             continue  # short of ten λ a clamped rod bears more than Greenhill's torque
         if d["part"] > 1:
-            must, cause = "warned or refused", "unstable|torque left out|twist from one cell to the next"
+            must, cause = "warned or refused", "unstable|torque neglected|twist from one cell to the next"
         elif d["model"] == "adaptive":
-            must, cause = "warned", "torque left out"
+            must, cause = "warned", "torque neglected"
         if angle / n > 2.8 and d["model"] == "rod":
             must, cause = "refused", "twist from one cell to the next"
         name = told(EI=EI, L=L, turns=turns, T=f"{T:.2g}", **{"M/Greenhill": d["part"]}, n=n, axis=d["axis"])
@@ -367,7 +367,7 @@ def blows() -> Iterator[Case]:
                 line = rod(L, 1e-7 * G * L**3, 1.0, rotary_inertia=0.0)
                 tables = scene(line, pinned(), end, model, 30, G, **clock(round(0.7 / dt), dt * beat, 0.5, 30))
                 name = told(L=L, dt=f"{dt:g} sqrt(L/g)")
-                cause = "snap|energy|tension of a catenary zone vanished"
+                cause = "snap|energy|goes into compression"
                 yield Case(
                     "inextensible blows",
                     name,
@@ -395,7 +395,7 @@ def presses() -> Iterator[Case]:
                 tables = scene(
                     line, pinned(), end, model, 20, 0.0, initial=initial, **clock(300, 6 * beat / 300, 0.5, 6)
                 )
-                cause = "unstable|out of plane" if model != "catenary" else "tension of a catenary zone vanished"
+                cause = "unstable|out of plane" if model != "catenary" else "goes into compression"
                 must = "warned" if model != "catenary" else "refused"
                 name = told(L=L, EA=f"{stiff:g} EI/L²")
                 yield Case(

@@ -65,13 +65,13 @@ def layers() -> Iterator[Case]:
         tables = scene(
             rod(L, EI), clamped((0, 0, 0), along), free(T * (np.cos(angle) * along + np.sin(angle) * side)), d["model"], n,
         )  # fmt: skip
-        must, cause = ("right", "") if d["ratio"] <= 1 else ("warned", "unresolved bend|clamp left out")
+        must, cause = ("right", "") if d["ratio"] <= 1 else ("warned", "unresolved bend|bending at clamp neglected")
         if d["model"] == "adaptive":  # a clamp that shifts the line by less than the tolerance has no moment
             shift = size * angle / L / 1e-3
             if 0.5 < shift < 2:
                 continue
             must = "warned" if shift < 1 else must
-            cause = "clamp left out|unresolved bend"
+            cause = "bending at clamp neglected|unresolved bend"
         name = told(EI=EI, T=T, **{"h/λ": d["ratio"]}, angle=angle, L=f"{L:.3g}", n=n, axis=d["axis"])
         yield Case("boundary layers", name, d["model"], tables, truth, source, must, cause)
 
@@ -121,7 +121,7 @@ def columns() -> Iterator[Case]:
             truth,
             source,
             must,
-            "tension of a catenary zone vanished|no unique solution|did not converge",
+            "goes into compression|no unique solution|did not converge",
         )
 
 
@@ -153,9 +153,7 @@ def pressed() -> Iterator[Case]:
 
                 tables = scene(rod(L, EI), pinned(), pinned(apart * L * along), model, n)
                 must = "refused" if model == "catenary" else "right"
-                cause = (
-                    "nothing tautens it" if apart < 0.999 else "tension of a catenary zone vanished|no unique solution"
-                )
+                cause = "nothing tautens it" if apart < 0.999 else "goes into compression|no unique solution"
                 name = told(EI=EI, L=L, apart=f"{apart:g} L", axis=axis)
                 yield Case("pressed together", name, model, tables, truth, source, must, cause)
 
@@ -323,7 +321,16 @@ def points() -> Iterator[Case]:
         if d["model"] == "adaptive":
             must = "right or warned"
         name = told(EI=EI, L=L, T=f"{T:.2g}", slope=angle, **{"h/λ": d["ratio"]}, n=n)
-        yield Case("point loads", name, d["model"], tables, truth, source, must, "unresolved bend|point left out")
+        yield Case(
+            "point loads",
+            name,
+            d["model"],
+            tables,
+            truth,
+            source,
+            must,
+            "unresolved bend|bending at point load neglected",
+        )
 
 
 CASES = [*layers(), *columns(), *pressed(), *arcs(), *sagging_cantilevers(), *points()]

@@ -17,7 +17,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.tables import zones_over_time
-from hybrid.errors import LEFT_OUT, ZONE_EVENTS
+from hybrid.errors import OMITTED, ZONE_EVENTS
 from hybrid.store import writer as record
 
 STEP, PERIOD = 0.05, 40.0  # s: of a step, and of the coming and going of a rod
@@ -95,6 +95,6 @@ def test_events_that_repeat_are_counted_and_not_all_written(tmp_path: Path, monk
     kinds = Counter(event.kind for event in everything.events)
     repeated = {kind: n for kind, n in kinds.items() if n > 3}
     assert repeated
-    left = {event.criterion: event.value for event in few.events if event.kind == LEFT_OUT}
+    left = {event.criterion: event.value for event in few.events if event.kind == OMITTED}
     assert left == {kind: n - 3 for kind, n in repeated.items()}
     assert zones_over_time(few)["zone_changes"] == zones_over_time(everything)["zone_changes"]

@@ -242,7 +242,7 @@ def test_pull_of_the_ends_is_estimated():
     for end in ("start", "end"):
         true = np.abs(np.diff([np.linalg.norm(x[f"reaction_{end}"], axis=1) for x in (a, b)], axis=0)[0])
         clear = true > 0.1 * true.max()
-        ratio = a[f"errors/model/pull_{end}"][clear] / true[clear]
+        ratio = a[f"errors/model/end_force_{end}"][clear] / true[clear]
         assert np.median(ratio) == pytest.approx(1.0, abs=0.1)
 
 
@@ -388,7 +388,7 @@ def test_error_beyond_a_tenth_of_the_length_is_clipped_and_said():
     data["ends"]["end"] = {"kind": "free"}
     data["model"] = {"kind": "catenary", "slack": "warn"}
     result = hybrid.run(hybrid.validate_scene(data))
-    assert any(e.kind == "error beyond estimate" for e in result.events)
+    assert any(e.kind == "model error not estimated" for e in result.events)
     assert 0.0 < result["errors/model/position"].max() < 0.15 * 20.3  # between nodes a cubic overshoots
 
 

@@ -122,7 +122,7 @@ def test_an_error_of_one_order_is_found_exactly(order):
     # the largest at t = 1 s; at outputs in between the error is interpolated, and here it is linear
     assert found.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
     assert found.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
-    assert found.largest("total", "pull_end") == pytest.approx(0.03, rel=1e-6)
+    assert found.largest("total", "end_force_end") == pytest.approx(0.03, rel=1e-6)
     better = sketch(Effort(2.5, 0.03, None, 1e-3), 300, order)
     estimate.follow(better)
     assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02 / 2.5**order, rel=1e-6)
@@ -149,7 +149,7 @@ def test_without_the_rougher_runs_an_order_in_between_is_taken():
 
 def test_judging_and_refining():
     errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
-                     "total": {"position": np.full((2, 3), 0.4), "pull_end": np.full(2, 1.0)}})  # fmt: skip
+                     "total": {"position": np.full((2, 3), 0.4), "end_force_end": np.full(2, 1.0)}})  # fmt: skip
     effort = Effort(1.0, 0.1, 1e-3, 1e-3)
     run = Sketch(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
     verdict = judge(Asked(0.1, None, None), errors, run)
@@ -208,7 +208,7 @@ def test_what_is_asked_is_met_and_the_figure_is_true(truth, model, percent):
     result = hybrid.run(swinging(accuracy=f"{percent}%", model=model))
     position = np.linalg.norm(result.position - truth.position, axis=2).max()
     force = np.abs(pull(result) - pull(truth)).max()
-    said = result.attributes["error_total_position"], result.attributes["error_total_pull"]
+    said = result.attributes["error_total_position"], result.attributes["error_total_end_force"]
     print(
         f"{model}, {percent} %: position {position:.1e} m, estimated {said[0]:.1e}; pull {force:.1e} N of "
         f"{pull(truth).max():.3g}, estimated {said[1]:.1e}; {result.attributes['effort_runs']} runs"
@@ -227,7 +227,7 @@ def test_what_the_file_holds():
         for name in ("position", "tension", "curvature", "bending_moment"):
             assert result[f"errors/{kind}/{name}"].shape == (61, 21)
             assert np.isfinite(result[f"errors/{kind}/{name}"]).all()
-        assert result[f"errors/{kind}/pull_end"].shape == (61,)
+        assert result[f"errors/{kind}/end_force_end"].shape == (61,)
     assert result.units["errors/total/position"] == "m"
     assert result.dims("errors/total/tension") == ("t", "s")
     assert result.errors["total/position"].max() == result.attributes["error_total_position"]
@@ -405,7 +405,7 @@ def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
         hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
     assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
     with hybrid.open(tmp_path / "run.h5") as result:
-        assert result.attributes["error_total_pull"] > 0.01
+        assert result.attributes["error_total_end_force"] > 0.01
         (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
         assert "stopped" in missed.text
 
@@ -433,7 +433,7 @@ def made_up(notes=(), model=(), bound=0.0, fineness=1.0, steps=100):
 def test_notes_and_model_error_are_of_the_runs_that_count():
     """What a result said that was replaced by a finer one, or a model error of zones before, is not told."""
     said = iter([made_up([("vibrations damped", "first")]), made_up(fineness=9.0, steps=900)])
-    before = made_up([("error beyond estimate", "before")], 0.004, 0.1, 0.5, 50)
+    before = made_up([("model error not estimated", "before")], 0.004, 0.1, 0.5, 50)
     after = made_up((), 0.0005, 0.1, 4.5, 450)
     comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
     climb = Climb(Asked(0.005, None, None), True, True, True, True, lambda _: next(comparisons), lambda _: next(said))
@@ -448,13 +448,13 @@ def test_a_model_error_that_cannot_be_true_is_not_counted():
     assert estimate.errors.largest("model", "position") == 0.4
     estimate.take_model(made_up((), 40.0, 0.1, 0.5, 50))
     assert estimate.errors.largest("model", "position") == 0.0
-    assert [kind for kind, _ in estimate.notes] == ["error beyond estimate"]
+    assert [kind for kind, _ in estimate.notes] == ["model error not estimated"]
 
 
 def test_a_pull_that_outputs_do_not_show_is_said():
     """A pendulum's pull swings between outputs that come once a period: the curve through them is a straight line."""
     rare = hybrid.run(swinging(accuracy="1%", output={"every": 0.6, "points": 5}, time={"duration": 6.0}))
     often = hybrid.run(swinging(accuracy="1%", output={"every": 0.02, "points": 5}, time={"duration": 6.0}))
-    assert [e.kind for e in often.events if e.kind == "pull between outputs"] == []
-    said = [e.text for e in rare.events if e.kind == "pull between outputs"]
+    assert [e.kind for e in often.events if e.kind == "end force between outputs"] == []
+    said = [e.text for e in rare.events if e.kind == "end force between outputs"]
     assert len(said) == 2 and all("leaves the curve" in x and "output.every: 0.06" in x for x in said)

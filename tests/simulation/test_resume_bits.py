@@ -8,7 +8,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
-from hybrid.errors import LEFT_OUT
+from hybrid.errors import OMITTED
 from hybrid.store import writer as record
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -90,7 +90,7 @@ def test_events_that_are_too_many_are_counted_on(tmp_path, monkeypatch):
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["time.duration=30"])
     stopping = Stopping(monkeypatch)
     with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
-        assert [e.value for e in whole.events if e.kind == LEFT_OUT]
+        assert [e.value for e in whole.events if e.kind == OMITTED]
     assert went_on(scene, tmp_path / "run.h5", stopping, [280]) == 1
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 

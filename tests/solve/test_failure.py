@@ -113,7 +113,7 @@ def test_a_coarse_bend_is_noted():
         "end": {"kind": "free", "moment": [0.0, 0.01 * 2 * np.pi, 0.0]},
     }
     result = hybrid.static(scene("rod", environment={"gravity": 0.0}, ends=ends, mesh={"cells": 5}, time=None))
-    assert {e.kind for e in result.events} == {"unresolved bend", "not judged"}
+    assert {e.kind for e in result.events} == {"unresolved bend", "stability not judged"}
     assert any("would do" in e.text for e in result.events)
 
 

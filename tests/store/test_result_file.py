@@ -397,6 +397,7 @@ def test_the_recorder_and_the_reader_import_no_solver_and_no_plot() -> None:
         "hybrid.store.checkpoint",
         "hybrid.store.format",
         "hybrid.store.integrity",
+        "hybrid.store.old_names",
         "hybrid.store.reader",
         "hybrid.store.writer",
         "hybrid.store.disk_space",

@@ -23,7 +23,7 @@ def test_the_largest_tension_is_that_of_all_outputs_and_points() -> None:
     found = fact(reported(), "tension")
     assert found.values["tension"] == pytest.approx(21e3) and (found.t, found.s) == (2.5, 100.0)
     assert found.text.startswith("21 kN at the end (s = 100 m), t = 2.5 s.")
-    assert "Between outputs the pull on the end reaches 22.05 kN, at t = 2.5 s." in found.text
+    assert "Between outputs the force at the end reaches 22.05 kN, at t = 2.5 s." in found.text
     assert "Between" not in fact(reported(steps=False), "tension").text
     assert "(± 100 N)" in fact(reported(errors=True), "tension").text
 
@@ -93,22 +93,26 @@ def test_touchdown_is_told_with_its_range() -> None:
 
 def test_errors_are_told_by_cause_or_said_not_to_be_estimated() -> None:
     found = fact(reported(errors=True), "errors")
-    assert found.values["mesh_position"] == 0.03 and found.values["total_pull"] == 42.0
-    assert "Position 0.042 m, pulls at the ends 42 N" in found.text
+    assert found.values["mesh_position"] == 0.03 and found.values["total_end_force"] == 42.0
+    assert "Position 0.042 m, end forces 42 N" in found.text
     assert fact(reported(), "errors").text.startswith("Not estimated")
 
 
 def test_warnings_come_by_weight_and_news_are_none() -> None:
-    events = [(1.0, 0.0, 100.0, "turned in", "news"), (3.0, 5.0, 5.0, "snap", "a blow"), (2.0, 0, 9, "slack", "loose")]
+    events = [
+        (1.0, 0.0, 100.0, "end rotated in", "news"),
+        (3.0, 5.0, 5.0, "snap", "a blow"),
+        (2.0, 0, 9, "slack", "loose"),
+    ]
     events += [(4.0, 0.0, 9.0, "slack", "loose again"), (5.0, 1.0, 2.0, "grow", "bend 1.05 > 1")]
     found = [f for f in facts_of(reported(events=events)) if f.key == "warning"]
     assert [(f.values["kind"], f.weight) for f in found] == [
         ("slack", "alarm"),
         ("snap", "alarm"),
-        ("turned in", "note"),
+        ("end rotated in", "note"),
     ]
     assert "(2 times; this is the first)" in found[0].text and found[0].t == 2.0
-    assert EVENTS_BY_WEIGHT.index("slack") < EVENTS_BY_WEIGHT.index("snap") and "turned in" in NEWS
+    assert EVENTS_BY_WEIGHT.index("slack") < EVENTS_BY_WEIGHT.index("snap") and "end rotated in" in NEWS
 
 
 def test_what_needs_attention_begins_with_how_it_ended() -> None:

@@ -417,7 +417,7 @@ def test_what_stands_still_is_a_straight_line_of_histories() -> None:
 
 
 EVENTS = [
-    (0.0, "turned in", "the tangent is missed by $30$ deg"),
+    (0.0, "end rotated in", "the tangent is missed by $30$ deg"),
     (3.0, "slack", "tension -1 N: " + "what follows is grid noise " * 9),
     (2.0, "slack", "tension -0.1 N\n in a catenary zone " + "and so on " * 30),
     (1.0, "rod", "of no concern"),
@@ -437,7 +437,7 @@ def test_warnings_are_mentioned_in_two_lines_the_worst_first() -> None:
 def test_news_are_no_alarm() -> None:
     why = "the tangent is missed by $30$ deg"
     for more in ("", " and is turned in over the first second or so; start from an equilibrium to avoid this" * 2):
-        figure = plot.plot_summary(made(sag, nt=0, events=[(0.0, "turned in", why + more), *EVENTS[3:]]))
+        figure = plot.plot_summary(made(sag, nt=0, events=[(0.0, "end rotated in", why + more), *EVENTS[3:]]))
         (note,) = [t for t in figure.texts if t.get_text().startswith("Note")]
         assert note.get_text().replace("\n", " ") == f"Note: {why}{more}" and note.get_color() == "#6E6E6E"
         assert note.get_text().count("\n") == bool(more)

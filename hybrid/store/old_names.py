@@ -1,0 +1,23 @@
+"""Names in files of older versions, and what they are called now: the reader understands both."""
+
+from __future__ import annotations
+
+OLD_NAMES = {
+    f"{table}/pull_{end}": f"{table}/end_force_{end}"
+    for table in ("steps", *(f"errors/{cause}" for cause in ("mesh", "time", "model", "total")))
+    for end in ("start", "end")
+}
+OLD_ATTRIBUTES = {f"error_{cause}_pull": f"error_{cause}_end_force" for cause in ("mesh", "time", "model", "total")}
+OLD_EVENTS = {
+    "pull between outputs": "end force between outputs",
+    "clamp left out": "bending at clamp neglected",
+    "point left out": "bending at point load neglected",
+    "torque left out": "torque neglected",
+    "friction left out": "static friction neglected",
+    "zones held": "zones fixed",
+    "turned in": "end rotated in",
+    "events left out": "events omitted",
+    "error beyond estimate": "model error not estimated",
+    "not judged": "stability not judged",
+    "loses energy": "numerical dissipation",
+}
