@@ -20,11 +20,8 @@ from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import advance, shares
 from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, twist_of_rods, weigh
 from hybrid.model.layout import Layout, edges
-from hybrid.model.material import Material
+from hybrid.model.material import Material, tension_floor
 
-# The tension below which a stretch must be rod, in (EI w^2)^(1/3): there a cable bends under its weight as much as
-# its tension straightens it.
-FLOOR = 0.2
 # Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
 # is what straightens a cable.
 BUFFER = 2.0
@@ -126,15 +123,14 @@ class DomainManager:
         s = layout.nodes
         middle = 0.5 * (s[:-1] + s[1:])
         cable = self.cable
-        of = np.clip(np.searchsorted(cable.bounds, middle) - 1, 0, cable.mass.size - 1)
+        of = cable.piece(middle)
         pad = np.concatenate([[of[0]], of, [of[-1]]])
-        EI = cable.B[:, :2].mean(axis=1)
-        weight = np.abs(cable.weight - np.nan_to_num(cable.buoy))
+        EI, weight = cable.mean_bending, np.abs(cable.submerged_weight)
         self.s, self.EI = s, np.maximum(EI[pad[:-1]], EI[pad[1:]])
         self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
         self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, SMOOTH).astype(np.int8)
-        self.node[np.searchsorted(s, cable.at - 1e-9 * s[-1])] = LOAD
-        self.floor = np.maximum(FLOOR * np.cbrt(self.EI * self.w**2), 1e-6 * self.scale)
+        self.node[cable.point_nodes(s)] = LOAD
+        self.floor = tension_floor(self.EI, self.w, self.scale)
         self.weightless = bool((self.floor < WEIGHTLESS * self.scale).any())
         self.base_of_cell = layout.base_of_cell
         bent = np.linalg.norm(cable.kappa[of, :2], axis=1)

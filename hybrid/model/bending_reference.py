@@ -5,11 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.state import Floats
-from hybrid.model.material import Material
-
-# The tension below which tension and bending are no longer apart, in (EI w^2)^(1/3), as of the criterion `slack`; and
-# the least that counts at all, as a part of the tension scale.
-FLOOR, LEAST = 0.2, 1e-6
+from hybrid.model.material import Material, tension_floor
 
 # Part of the error that a corrected result still has: a quarter, because correction has left 2 to 18 % of it, and 26 %
 # where a cable is bent by a clamp through 60 degrees (docs/zones.md).
@@ -21,12 +17,11 @@ def full_bending(cable: Material, s: Floats, h: Floats, scale: float) -> tuple[F
 
     h: (N,) m, true lengths of the cells; scale: tension scale, N.
     """
-    of = np.clip(np.searchsorted(cable.bounds, 0.5 * (s[:-1] + s[1:])) - 1, 0, cable.mass.size - 1)
-    EI = cable.B[of, :2].mean(axis=1)
+    of = cable.piece(0.5 * (s[:-1] + s[1:]))
+    EI = cable.mean_bending[of]
     gives = 0.5 * h / np.maximum(EI, 1e-300)
     with np.errstate(over="ignore"):
         ki = 1.0 / (np.append(gives, 0.0) + np.append(0.0, gives))
     ki[np.append(EI, EI[-1]) <= 0.0] = 0.0
     ki[np.append(EI[0], EI) <= 0.0] = 0.0
-    weight = np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of]))
-    return ki, np.maximum(FLOOR * np.cbrt(EI * weight**2), LEAST * scale)
+    return ki, tension_floor(EI, np.abs(cable.submerged_weight[of]), scale)

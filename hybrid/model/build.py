@@ -25,9 +25,10 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plane import in_plane, planar
-from hybrid.model.properties import merged_sections, tension_scale
 from hybrid.model.resolution import Effort, first_effort, mesh_is_free
+from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
+from hybrid.model.sections import merged_sections
 from hybrid.scene.schema import (
     AdaptiveModel,
     CorrectedModel,
@@ -192,6 +193,7 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length
 # over which a cable without tension bends under its weight; the most rod cells in a base cell.
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
+LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
 GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends that have been seen
 FEWEST_CELLS = 4  # of a zone, however little is asked
 
@@ -247,13 +249,10 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
     As a part of the length over which a cable bends under its weight; where it is known how the cable bends, no
     shorter than that asks for.
     """
-    of = np.clip(np.searchsorted(cable.bounds, s) - 1, 0, cable.mass.size - 1)
-    EI = cable.B[of, :2].min(axis=1)
-    weight = np.maximum(np.abs(cable.weight[of] - np.nan_to_num(cable.buoy[of])), 1e-3 * 9.81 * cable.mass[of])
     asked = scene.model.rod_cell if isinstance(scene.model, AdaptiveModel) else None
     if asked:
         return np.full(s.size, asked)
-    bend = np.cbrt(EI / weight)
+    bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(s)]
     return np.asarray(ROD_CELL * bend if grading is None else np.minimum(grading.cell(s), GRADED_ROD_CELL * bend))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.model.properties import net_weight
+from hybrid.model.scales import net_weight
 from hybrid.scene.schema import Body, Free, Scene
 
 # A line that is longer than taut by less than this part of its length is not called slack.

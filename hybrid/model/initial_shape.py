@@ -11,7 +11,7 @@ from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
-from hybrid.model.properties import net_weight
+from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel

@@ -11,9 +11,9 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import FORCES
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
-from hybrid.model.properties import weight
 from hybrid.model.resolution import USUAL, asked, first_effort, mesh_is_free, wants_errors
 from hybrid.model.sea import current_table
+from hybrid.model.sections import weight
 from hybrid.scene.schema import AdaptiveModel, Scene
 
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.

@@ -17,14 +17,14 @@ def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, 
     h = np.diff(s)
     n = h.size
     middle = 0.5 * (s[:-1] + s[1:])
-    of = np.clip(np.searchsorted(material.bounds, middle) - 1, 0, material.mass.size - 1)
+    of = material.piece(middle)
     bits = material.bits | more_bits
     rotary = polar = np.full(n, np.nan)
     if sections_turn and rod.any() and (material.polar[of] > 0.0).any():
         bits |= ROTARY
         rotary, polar = h * rod * material.rotary[of], h * rod * material.polar[of]
     point = {name: np.full(n + 1, 0.0 if name == "point_mass" or bits & BODIES else np.nan) for name in material.points}
-    place = np.searchsorted(s, material.at - 1e-9 * s[-1])
+    place = material.point_nodes(s)
     for name, values in material.points.items():
         if name == "point_mass" or bits & BODIES:
             point[name][place] = values

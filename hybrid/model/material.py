@@ -12,17 +12,21 @@ import numpy as np
 
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, MASS_DAMPING, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.kernels.state import Floats
-from hybrid.model.properties import (
+from hybrid.model.scales import pressing
+from hybrid.model.sections import (
     attachments_at,
     bending_stiffness,
     damping,
     merged_sections,
     modules_of,
-    pressing,
     rotary_inertia,
     torsional_stiffness,
 )
 from hybrid.scene.schema import Scene, Section
+
+# The tension below which bending counts as much as tension, in (EI w^2)^(1/3): there a cable bends under its weight as
+# much as its tension straightens it.  A cable without weight or stiffness has a least one, as a part of the scale.
+TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright")
@@ -58,9 +62,44 @@ class Material:
     points: dict[str, Floats] = field(default_factory=dict)  # POINT -> (P,)
 
     @property
+    def mean_bending(self) -> Floats:
+        """(K,) N m2, mean EI of both axes: of models that do not know how a section lies (catenaries, criteria)."""
+        return np.asarray(self.B[:, :2].mean(axis=1))
+
+    @property
+    def weakest_bending(self) -> Floats:
+        """(K,) N m2, EI about the weaker axis: over the shortest length, which a mesh has to resolve, it bends."""
+        return np.asarray(self.B[:, :2].min(axis=1))
+
+    @property
+    def submerged_weight(self) -> Floats:
+        """(K,) N/m, downwards, with all of its volume under the surface; in air where there is no fluid."""
+        return np.asarray(self.weight - np.nan_to_num(self.buoy))
+
+    def bending_length(self, least: Floats | float) -> Floats:
+        """(K,) m, (EI/w)^(1/3): over it a cable without tension bends under its weight; w at least `least` N/m."""
+        return np.asarray(np.cbrt(self.weakest_bending / np.maximum(np.abs(self.submerged_weight), least)))
+
+    def piece(self, s: Floats) -> np.ndarray:
+        """Piece that each of the arc lengths s (m) lies in."""
+        return np.clip(np.searchsorted(self.bounds, s) - 1, 0, self.mass.size - 1)
+
+    def point_nodes(self, s: Floats) -> np.ndarray:
+        """Of nodes at s (N+1,) m, those (P,) where points are."""
+        return np.searchsorted(s, self.at - 1e-9 * s[-1])
+
+    @property
     def cuts(self) -> list[float]:
         """Arc lengths at which a node must lie."""
         return sorted({*self.bounds[1:-1].tolist(), *self.at[(self.at > 0.0) & (self.at < self.bounds[-1])].tolist()})
+
+
+def tension_floor(EI: Floats, w: Floats, scale: float) -> Floats:
+    """Tension, N, below which a cable of bending stiffness EI (N m2) and submerged weight w (N/m) is no catenary.
+
+    scale: tension scale of the scene, N.
+    """
+    return np.asarray(np.maximum(TENSION_FLOOR * np.cbrt(EI * w**2), LEAST_TENSION * scale))
 
 
 def material(scene: Scene) -> Material:

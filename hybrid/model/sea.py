@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid.kernels.state import Floats, Sea, no_sea
 from hybrid.model.ends import rise
-from hybrid.model.properties import pressing
+from hybrid.model.scales import pressing
 from hybrid.scene.schema import (
     CurrentProfile,
     JonswapWaves,

@@ -82,7 +82,7 @@ class _TurnOfEnds:
 
     def __init__(self, model: Model) -> None:
         cable, line = model.cable, model.line
-        of = np.clip(np.searchsorted(cable.bounds, 0.5 * (line.s[:-1] + line.s[1:])) - 1, 0, cable.mass.size - 1)
+        of = cable.piece(0.5 * (line.s[:-1] + line.s[1:]))
         stiffness = cable.B[of, 2]
         self.held = all(cable.held_twist) and all(cable.held_tangent) and bool((stiffness > 0.0).all())
         self.compliance = float(np.sum(line.h / stiffness)) if self.held else math.inf

@@ -18,8 +18,8 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plan import output_times
-from hybrid.model.properties import allowed_radius, weakest_bending
 from hybrid.model.resolution import Effort, mesh_is_free, wants_errors
+from hybrid.model.sections import allowed_radius, weakest_bending
 from hybrid.outputs.probes import Observer, output_points
 from hybrid.scene.motion import ramp_ends
 from hybrid.scene.read import scene_text
@@ -433,9 +433,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         if end.held_tangent is None or line.spin[cell]:
             continue
         s, far = float(line.s[cell]), float(line.s[-1])
-        bend = float(model.cable.B[cell, :2].mean())
-        weight = max(abs(float(model.cable.weight[cell])), 1e-9 * model.tension_scale / far)
-        reach = min(4.0 * (bend / weight) ** (1.0 / 3.0), far)
+        reach = min(4.0 * float(model.cable.bending_length(1e-9 * model.tension_scale / far)[cell]), far)
         stretch = f"[0, {reach:.3g}]" if cell == 0 else f"[{far - reach:.5g}, {far:.5g}]"
         text = (
             f"the clamp at ends.{name} shifts the cable by less than the tolerance: it is left out, and has no moment, "

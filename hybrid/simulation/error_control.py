@@ -293,13 +293,13 @@ def survey_grading(model: Model, s: Floats, run: Mapping[str, np.ndarray], rod_c
     """
     curvature = run["curvature"].max(axis=0)
     material = model.cable
-    of = np.clip(np.searchsorted(material.bounds, s) - 1, 0, material.mass.size - 1)
+    of = material.piece(s)
     fade, disturbed = np.zeros(s.size), []
     if rod_cell is None:
         middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
         rod = np.interp(s, middle, model.line.spin.astype(float)) > 0.5
         low = np.maximum(run["tension"].min(axis=0), 1e-3 * model.tension_scale)
-        fade[rod] = np.sqrt(material.B[of, 0] / low)[rod]
+        fade[rod] = np.sqrt(material.weakest_bending[of] / low)[rod]
         disturbed = [z.s_b for z in model.zones[:-1]] + list(model.attached)
         disturbed += [x for x, held in zip((0.0, model.length), material.held_tangent, strict=True) if held]
     found = grading(s, curvature, fade, disturbed, model.length)

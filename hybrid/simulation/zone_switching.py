@@ -315,7 +315,7 @@ class Zoning:
         """The state on the new nodes, with the twist that the cable has had since its ends lost each other."""
         manager, cable = self.manager, self.model.cable
         kinks = np.zeros(new.rod.size + 1, bool)
-        kinks[np.searchsorted(new.base, cable.at - 1e-9 * new.base[-1])] = True
+        kinks[cable.point_nodes(new.base)] = True
         frames = ends.frame.reshape(2, 3, 3)
         clamps: list[Clamp | None] = [
             (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None

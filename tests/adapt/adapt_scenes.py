@@ -15,8 +15,8 @@ import numpy as np
 from problems import Scene, clamped, pinned, scene
 
 from hybrid import run
-from hybrid.adapt.manager import FLOOR
 from hybrid.kernels.criteria import CRITERIA
+from hybrid.model.material import TENSION_FLOOR
 from hybrid.store.reader import Event, Result
 
 Floats = np.ndarray
@@ -24,7 +24,7 @@ GRAVITY = 10.0
 LENGTH, CELLS, EI = 10.0, 50, 0.64
 CELL = LENGTH / CELLS
 DWELL = 0.5
-FLOORED = FLOOR * (EI * (1.0 * GRAVITY) ** 2) ** (1 / 3)  # N, for a cable of 1 kg/m
+FLOORED = TENSION_FLOOR * (EI * (1.0 * GRAVITY) ** 2) ** (1 / 3)  # N, for a cable of 1 kg/m
 OFF = {x.name: x.off for x in CRITERIA}
 
 

@@ -15,15 +15,16 @@ import numpy as np
 import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
 
-from hybrid.adapt.manager import FLOOR, HARD, HORIZON, MOST_AHEAD, DomainManager
+from hybrid.adapt.manager import HARD, HORIZON, MOST_AHEAD, DomainManager
 from hybrid.adapt.zone_rules import wanted
 from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_criteria import FORESEEN
+from hybrid.model.material import TENSION_FLOOR
 
 EI, GJ, W = 2.0, 1.5, 1.0 * GRAVITY  # of `cable()`
-FLOORED = FLOOR * (EI * W**2) ** (1 / 3)  # N
+FLOORED = TENSION_FLOOR * (EI * W**2) ** (1 / 3)  # N
 TOL = 1e-2  # m
 ROUND = 1e-11
 
@@ -215,7 +216,9 @@ def test_jump_of_stiffness():
     assert ratio[POINT] == pytest.approx(expected, rel=ROUND)
     bend = 2 * np.sin(0.02) / 50.0 / TOL * np.array([2.0] * 6 + [8.0] * 4)
     assert ratio[BEND] == pytest.approx(bend, rel=ROUND)
-    slack = FLOOR * np.cbrt(np.array([2.0] * 5 + [8.0] * 5) * W**2) / 50.0  # the node in between has the stiffer floor
+    slack = (
+        TENSION_FLOOR * np.cbrt(np.array([2.0] * 5 + [8.0] * 5) * W**2) / 50.0
+    )  # the node in between has the stiffer floor
     assert ratio[SLACK] == pytest.approx(slack, rel=ROUND)
 
 

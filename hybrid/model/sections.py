@@ -1,4 +1,4 @@
-"""What a section of cable is per length: weight, stiffness, inertia, damping, with the defaults that a plan states."""
+"""Numbers of a section of cable, or of what is attached to it: as the scene writes them, or by default."""
 
 from __future__ import annotations
 
@@ -6,8 +6,7 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from hybrid.scene.ends import SHIFTS
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section, Straight
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
 
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
@@ -83,13 +82,6 @@ def weight(section: Section, scene: Scene) -> float:
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
-def pressing(scene: Scene) -> float:
-    """The least weight per length (N/m) that a cable of the scene puts on its bed; its dry weight if it would float."""
-    heavy = [w for w in (weight(x, scene) for x in scene.cable.sections) if w > 0.0]
-    dry = [x.mass * (scene.environment.gravity or 1.0) for x in scene.cable.sections]
-    return min(heavy or dry)
-
-
 def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Body]]:
     """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
     for x in scene.cable.attachments:
@@ -117,52 +109,3 @@ def attached_weights(scene: Scene) -> list[float]:
 
     points = [sinks(x) for _, x in attachments_at(scene)]
     return points + [sinks(m) * (m.over[1] - m.over[0]) for m in modules_of(scene)]
-
-
-def net_weight(scene: Scene) -> float:
-    """Weight of the whole line with its attachments in its surroundings, N, positive downwards."""
-    return sum(weight(x, scene) * x.length for x in scene.cable.sections) + sum(attached_weights(scene))
-
-
-def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fastest: float = 0.0) -> float:
-    """A tension typical of the scene, N: the largest that weight, loads, bending, drag, motion or speed can ask for.
-
-    bending: whether bending counts, as it does where there is a rod; fastest: the current's highest speed, m/s.
-    """
-    length = scene.length
-    mass = sum(s.mass * s.length for s in sections)
-    candidates = [
-        sum(abs(weight(s, scene)) * s.length for s in sections) + sum(abs(x) for x in attached_weights(scene))
-    ]
-    if bending:
-        candidates += [max(bending_stiffness(s)) / length**2 for s in sections]
-    fluid = scene.environment.fluid
-    if fluid and fastest:
-        candidates += [
-            0.5 * fluid.density * s.diameter * s.drag.normal * fastest**2 * s.length
-            for s in sections
-            if s.drag and s.diameter
-        ]
-        candidates += [0.5 * fluid.density * x.drag_area * fastest**2 for _, x in attachments_at(scene)]
-    for end in scene.ends.both:
-        for load in end.loads:
-            candidates.append(float(np.abs(load.value).max()) / (length if load.what == "moment" else 1.0))
-        motion = end.prescribed_motion
-        if motion is not None:
-            candidates += [
-                mass * abs(x.amplitude) * (2 * np.pi / x.period) ** 2
-                for name, parts in motion.harmonics().items()
-                if name in SHIFTS
-                for x in parts
-            ]
-    first, last = (end.held_position for end in scene.ends.both)
-    if first and last and all(s.axial_stiffness for s in sections):
-        free = length / sum(s.length / s.axial_stiffness for s in sections if s.axial_stiffness)  # N per unit strain
-        candidates.append(free * max(0.0, float(np.linalg.norm(np.subtract(last, first))) / length - 1.0))
-    velocity = scene.initial.velocity if isinstance(scene.initial, Straight) else None
-    if velocity:
-        candidates.append(mass / length * float(np.dot(velocity, velocity)))
-    scale = max(candidates)
-    if scale > 0.0:
-        return scale
-    return mass / length * (length / scene.time.duration) ** 2 if scene.time else 1.0
