@@ -289,14 +289,6 @@ def test_check_motions_names_the_end_without_a_file() -> None:
     assert caught.value.complaints[0].line is None
 
 
-def test_at_is_cheap() -> None:
-    """A translation costs microseconds, for it is asked for at every Newton step (bound 10 x the usual 1.6 us)."""
-    import timeit
-
-    motion = EndMotion(Motion(heave=Harmonic(amplitude=2.0, period=8.0), ramp=16.0), PLACE)
-    assert min(timeit.repeat(lambda: motion.at(20.0), number=1000, repeat=5)) / 1000 < 16e-6
-
-
 def test_the_motion_files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
     scene, code, begin = (re.findall(rf"^```{x}\n(.*?)^```$", page, re.S | re.M)[0] for x in ("yaml", "python", "csv"))

@@ -108,6 +108,7 @@ def test_any_plane_where_nothing_is_heavy(axis: tuple[float, float, float]) -> N
     assert np.abs(found.position - straight.position @ R.T).max() < SAME * straight.s[-1]
 
 
+@pytest.mark.slow  # 20 s
 def test_random_scenes_in_a_vertical_plane() -> None:
     """Two sections, a moving end, current, seabed with friction, a float, an end moment, damping of both kinds."""
     told = 0

@@ -282,6 +282,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
     assert_drawn(tmp_path / "trade.png")
 
 
+@pytest.mark.slow  # a ladder of runs
 def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
@@ -313,6 +314,7 @@ def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch:
     assert not (tmp_path / "trade.md").exists()
 
 
+@pytest.mark.slow  # a ladder of runs
 def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
@@ -334,6 +336,7 @@ def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
     assert len(counted) == 5 and whole.missing == 0 and len(whole.rows) == 6
 
 
+@pytest.mark.slow  # a ladder of runs
 def test_a_half_written_run_is_made_again(tmp_path: Path, counted: list[str]) -> None:
     hybrid.trade(scene(), tmp_path, **LADDER)
     counted.clear()
@@ -426,6 +429,7 @@ def test_another_program_agrees(code: str) -> None:
     assert answer.cpu > 0.0 and answer.steps > 10
 
 
+@pytest.mark.slow  # a ladder of runs
 def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
     real = peers.answer

@@ -58,6 +58,7 @@ def test_energy_ledger(kind, damping, report):
     assert np.abs(p - 2.0).max() <= 0.1
 
 
+@pytest.mark.slow  # 20 s
 def test_link_is_twist_and_writhe(report):
     """A ring whose end is turned twice: it buckles, and passes through itself (there is no contact; link changes by 2).
 

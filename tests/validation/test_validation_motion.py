@@ -105,6 +105,7 @@ def test_added_mass_of_a_slanting_rod(report):
     assert error <= 1e-12
 
 
+@pytest.mark.slow  # 20 s
 def test_folded_chain(report):
     """Time to 0.9 L and v^2 at half the way.  Steps of 0.25 ms resolve the fold's passage of a cell to 0.8 L."""
     step, wanted = 2.5e-4, folded_chain_time(0.9)

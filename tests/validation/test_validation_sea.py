@@ -396,6 +396,7 @@ def test_dragged_over_the_bed(model, sideways, report):
     assert max(worst, works) <= (2e-3 if sideways else 1e-6)
 
 
+@pytest.mark.slow  # a minute for all
 @pytest.mark.parametrize("across", [False, True], ids=["down the slope", "across"])
 @pytest.mark.parametrize("model", ["rod", "catenary"])
 def test_on_a_slope(model, across, report):

@@ -64,6 +64,7 @@ def test_torsional_buckling(torsional_stiffness, report):
     assert abs(p - 2.0) <= 0.1
 
 
+@pytest.mark.slow  # 20 s
 @pytest.mark.parametrize(("load", "cells"), [(400.0, 200), pytest.param(1600.0, 400, marks=pytest.mark.slow)])
 def test_torsional_buckling_of_longer_rods(load, cells, report):
     """As many cells per sqrt(EI/T) as above: the same 0.2 %."""

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import time
 from xml.etree import ElementTree
 
 import pytest
@@ -57,10 +56,5 @@ def test_titles_are_escaped_and_failures_said() -> None:
     assert "<script>" not in shown and "&lt;script&gt;" in shown and "failed: it diverged" in shown
 
 
-def test_a_cell_costs_little() -> None:
-    result = reported(outputs=501)
-    begin = time.perf_counter()
-    shown = result._repr_html_()
-    seconds = time.perf_counter() - begin
-    print(f"\na result of 501 outputs in a notebook: {len(shown) / 1e3:.0f} kB, made in {1e3 * seconds:.0f} ms")
-    assert seconds < 1.0  # some tens of milliseconds; the bound is for a busy machine
+def test_a_cell_of_a_long_run_is_small() -> None:
+    assert len(reported(outputs=501)._repr_html_()) < 100e3
