@@ -108,17 +108,9 @@ def test_accuracy_asked_and_achieved():
     assert np.mean(silent) <= 0.05
 
 
-class Quiet:
-    stage = ""
-
-    def __call__(self, *args, **more):
-        pass
-
-
 def runs(scene, efforts):
     """Errors of position against the last of the efforts, and CPU seconds, median of five."""
     job = Job(scene, None)
-    job.told = Quiet()
     exact = job.sketch(efforts[-1])
     out = []
     for effort in efforts[:-1]:

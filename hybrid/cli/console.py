@@ -31,7 +31,7 @@ from hybrid.errors import EXPECTED, weight_of_event
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
     from hybrid.model.mesh import Zone
-    from hybrid.simulation.api import Progress
+    from hybrid.simulation.progress import Progress
     from hybrid.store.reader import Event
     from hybrid.studies.runs import Doing
 
@@ -68,7 +68,7 @@ def zones_in_short(zones: tuple[Zone, ...], width: int) -> str:
 
 
 def live_line() -> LiveLine:
-    """A line for a run; call it with each `hybrid.simulation.api.Progress`."""
+    """A line for a run; call it with each `hybrid.simulation.progress.Progress`."""
     return LiveLine()
 
 
@@ -123,8 +123,8 @@ class LiveLine:
         widest = len(f"{p.duration:.{places}f}")
         time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
         step, rate, left = f"step {p.step:<5d}", *self._pace(p)
-        if p.stage:
-            step = f"{p.stage:<9s}  {step}"
+        if p.runs > 1:
+            step = f"run {p.run} of {p.runs}: {p.name:<16s}  {step}"
         for zones, newton, real in (
             (40, " Newton", " x real time"),
             (18, " Newton", " x real time"),

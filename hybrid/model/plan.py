@@ -12,6 +12,7 @@ from hybrid.model.build import build
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import first_effort, wants_errors
+from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
 
 
@@ -107,8 +108,9 @@ def count_steps(scene: Scene) -> int:
     return whole * parts(every, step) + parts(last, step)
 
 
-def plan(scene: Scene) -> Plan:
-    """Say what would be computed for a scene, and compute nothing."""
+def plan(scene: SceneLike) -> Plan:
+    """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed."""
+    scene = as_scene(scene)
     if scene.time:
         refuse_too_much(scene)
     model = build(scene)

@@ -28,7 +28,10 @@ from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_tex
 LARGEST_SCENE = 1_000_000
 
 
-def as_scene(scene: Scene | str | PathLike[str] | Mapping[str, Any]) -> Scene:
+SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
+
+
+def as_scene(scene: SceneLike) -> Scene:
     """The scene given as a `Scene`, as the path of a scene file, or as a dict of its tables.
 
     SceneError if it is refused; TypeError if it is none of these.

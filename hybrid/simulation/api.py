@@ -13,22 +13,22 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError, SceneError
-from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
 from hybrid.scene.motion import check_motions
+from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Job
-from hybrid.simulation.error_control import Climb, Errors, Sketch, summary
+from hybrid.simulation.error_control import Climb, Errors, Sketch, comparison_efforts, summary, survey_effort
 from hybrid.simulation.freeze import freeze
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.restart import Remainder, remainder
-from hybrid.simulation.transient import Motion
 from hybrid.simulation.undersampling import undersampled_end_forces
 from hybrid.store.checkpoint import claimed
 from hybrid.store.format import Field
@@ -36,43 +36,28 @@ from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import amend, check_target
 
 Record = Callable[[Effort, Path | io.BytesIO], Sketch]
-REPORT_EVERY = 0.1  # s of wall time between two calls of `progress`
-
-
-@dataclass(frozen=True)
-class Progress:
-    """Where a run is: time and duration (s), step number, Newton iterations of the last step, zones, wall time (s).
-
-    stage: which run, where several tell the error: "looking" how the cable bends, "comparing", "result"; else empty.
-    """
-
-    t: float
-    duration: float
-    step: int
-    iterations: int
-    zones: tuple[Zone, ...]
-    wall: float
-    stage: str = ""
 
 
 def run(
-    scene: Scene,
+    scene: SceneLike,
     output: str | Path | None = None,
     *,
-    progress: bool | Callable[[Progress], None] = False,
+    progress: bool | Listener = False,
     overwrite: bool = True,
     criterion: UserCriterion | None = None,
 ) -> Result:
     """Integrate a scene over its duration.
 
-    output: the HDF5 file to write; None keeps the result in memory.  progress: True for a
-    live line, or a function called about ten times a second.  overwrite: replace an
+    scene: a Scene, the path of a scene file, or a dict of its tables.  output: the HDF5 file to write; None keeps the
+    result in memory.  progress: True for a line on the error stream, or a function that gets a
+    `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an
     existing result (never another program's file).  criterion: for zones that move, one more: it gets a
     `hybrid.Look` at every step and gives a number (N+1,) per node, 1 or more where the cable must be a rod.
 
     Raises SceneError when the scene is refused and ComputationError when the computation
     stops; what was computed until then is in the file, and the last good state beside it.
     """
+    scene = as_scene(scene)
     if scene.time is None:
         raise SceneError([missing_time(scene)])
     check_motions(scene)
@@ -98,7 +83,7 @@ def resume(
     until: float | None = None,
     settings: Sequence[str] = (),
     start: float | None = None,
-    progress: bool | Callable[[Progress], None] = False,
+    progress: bool | Listener = False,
     criterion: UserCriterion | None = None,
 ) -> Result:
     """Go on with a run that was cut off, from the last checkpoint in its file; or beyond its end, or with other loads.
@@ -161,7 +146,9 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
             climb = Climb(
                 asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
             )
-            if left is None and asked(scene):
+            surveys = left is None and asked(scene) is not None
+            _expect(job, effort, surveys and mesh_is_free(scene))
+            if surveys:
                 effort = replace(effort, grading=job.survey(effort))
             final, errors = climb.reach(effort)
     except KeyboardInterrupt:
@@ -173,17 +160,29 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
     _amend(target, scene, final, errors, climb, clock.process_time() - begin)
 
 
+def _expect(job: Job, effort: Effort, surveys: bool) -> None:
+    """Tell the progress which passes are to come: surveys, whether the first looks how the cable bends."""
+    passes = [(PRE_RUN, survey_effort(effort))] if surveys else []
+    passes += [(ESTIMATION, x) for x in comparison_efforts(effort, moves=True)]
+    job.progress.expect([*passes, (RESULT, effort)], effort)
+
+
 @contextmanager
-def _working(job: Job, progress: bool | Callable[[Progress], None]) -> Iterator[None]:
+def _working(job: Job, progress: bool | Listener) -> Iterator[None]:
     """Hear of interrupts, and tell of the progress, until a run is done."""
     assert job.scene.time is not None
-    with _interrupts() as interrupted, _Told(progress, job.scene.time.duration) as told:
-        job.told, job.interrupted = told, interrupted
+    listener = listener_of(progress)
+    with _interrupts() as interrupted, ProgressReporter(listener, job.scene.time.duration) as reporter:
+        job.progress, job.interrupted = reporter, interrupted
         yield
 
 
-def static(scene: Scene, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
-    """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.  Errors as of `run`."""
+def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
+    """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.
+
+    scene, output, overwrite and errors: as of `run`.
+    """
+    scene = as_scene(scene)
     check_motions(scene)
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import static_shooting
@@ -274,41 +273,6 @@ WORDS_OF_ERRORS = {
     "mesh": "error by the mesh", "time": "error by the time step", "model": "error by bending that is left out",
     "total": "error by all causes",
 }  # fmt: skip
-
-
-class _Told:
-    """Calls `progress` now and then, and closes a live line however the run ends."""
-
-    def __init__(self, progress: bool | Callable[[Progress], None], duration: float) -> None:
-        self._tell: Callable[[Progress], None] | None = None
-        if progress is True:
-            from hybrid.cli.console import live_line
-
-            self._tell = live_line()
-        elif progress:
-            self._tell = progress
-        self._duration, self.stage = duration, ""
-        self._begin: float | None = None  # s of the clock, at the first call
-        self._last = 0.0
-
-    def __enter__(self) -> _Told:
-        return self
-
-    def __exit__(self, *_: object) -> None:
-        close = getattr(self._tell, "close", None)
-        if close is not None:
-            close()
-
-    def __call__(self, motion: Motion, finished: bool = False) -> None:
-        if self._tell is None:
-            return
-        if self._begin is None:
-            self._begin = clock.perf_counter()
-        now = clock.perf_counter() - self._begin
-        if finished or now - self._last > REPORT_EVERY:
-            self._last = now
-            zones = motion.model.zones
-            self._tell(Progress(motion.t, self._duration, motion.steps, motion.iterations, zones, now, self.stage))
 
 
 def _beside(target: Path) -> Path:

@@ -7,7 +7,6 @@ scene; this file only carries its states into a result file.
 from __future__ import annotations
 
 import io
-from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +19,7 @@ from hybrid.outputs.probes import PROBES, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.shooting import ShootingState, simulate, static
+from hybrid.simulation.snapshot import write_snapshot
 from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
@@ -67,21 +67,10 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
         try:
             simulate(scene, record)
         except ComputationError as error:
-            left = _snapshot(scene, last[0], target) if last else None
+            left = write_snapshot(target, {"scene": scene_text(scene), **vars(last[0])}) if last else None
             raise ComputationError(error.outcome, error.t, error.s, error.detail, left) from None
         recorder.close("complete", "literal shooting")
     return open_result(target)
-
-
-def _snapshot(scene: Scene, state: ShootingState, target: Path | io.BytesIO) -> Path | None:
-    """The last good state, beside the result; None when it cannot be written."""
-    if not isinstance(target, Path):
-        return None
-    path = target.with_suffix(".snapshot.npz")
-    with suppress(OSError):
-        np.savez(path, scene=np.array(scene_text(scene)), **vars(state))
-        return path
-    return None
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

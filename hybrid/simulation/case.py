@@ -6,7 +6,6 @@ import io
 import time as clock
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Protocol
 
 import numpy as np
 
@@ -29,13 +28,13 @@ from hybrid.simulation.diagnostics import Watch
 from hybrid.simulation.equilibrium import equilibrium_of, zones_and_rest
 from hybrid.simulation.error_control import (
     COMPARED,
-    SURVEY_CELLS,
     SURVEY_POINTS,
-    SURVEY_STEPS,
     Sketch,
+    survey_effort,
     survey_grading,
 )
 from hybrid.simulation.freeze import freeze, program, thaw
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import Phase, changes_text
 from hybrid.simulation.transient import Motion
 from hybrid.simulation.zone_switching import Zoning
@@ -67,26 +66,19 @@ STEP_FIELDS = (
 )
 
 
-class Told(Protocol):
-    """What hears of every step; `stage` says which run it is of several."""
-
-    stage: str
-
-    def __call__(self, motion: Motion, finished: bool = False) -> None: ...
-
-
 class Job:
     """One scene, computed as often and as finely as it takes."""
 
     def __init__(self, scene: Scene, criterion: UserCriterion | None, changes: Sequence[Phase] = ()) -> None:
         """changes: scenes that hold from some time on; what they may differ in, `remainder` has looked at."""
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
-        self.told: Told
+        self.progress = ProgressReporter(None, 1.0)
+        self.results = 0  # that were begun
         self.interrupted: Callable[[], bool] = lambda: False
 
     def record(self, effort: Effort, target: Path | io.BytesIO, climb: bytes = b"") -> Sketch:
         """Compute the result into a file, or memory; what is to be compared of it.  climb: what was found before."""
-        begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
+        begin = self._begin_result(effort)
         model, equilibrium, zoning = self._model(effort)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
@@ -105,12 +97,12 @@ class Job:
 
     def go_on(self, source: Path, target: Path, climb: bytes = b"") -> Sketch:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
-        begin, self.told.stage = clock.process_time(), "result" if wants_errors(self.scene) else ""
         with opened(source) as file:
             point = read_checkpoint(file)
             if point is None:
                 raise ResultError(f"{source} has no checkpoint\n    try:      run its scene again")
             motion = self._thawed(point, source)
+            begin = self._begin_result(motion.effort)
             s = output_points(self.scene.output.points, motion.model.length)
             observer = self._observer(motion.model, motion.zoning, s)
             recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts, climb)
@@ -120,6 +112,15 @@ class Job:
         with recorder:
             self._finish(motion, output_times(self.scene))
         return self._seen(motion, target, clock.process_time() - begin)
+
+    def _begin_result(self, effort: Effort) -> float:
+        """The pass of a result begins; s of processor time."""
+        self.progress.begin(REFINEMENT if self.results else RESULT, effort)
+        self.results += 1
+        return clock.process_time()
+
+    def _report(self, motion: Motion, finished: bool = False) -> None:
+        self.progress(motion.t, motion.steps, motion.iterations, motion.model.zones, finished)
 
     @property
     def _texts(self) -> dict[str, str]:
@@ -179,7 +180,7 @@ class Job:
         self._move(motion, outputs)
         motion.keep(at_once=True)
         motion.watch.finish()
-        self.told(motion, finished=True)
+        self._report(motion, finished=True)
         motion.recorder.close("complete", f"{motion.steps} steps")
 
     def _seen(self, motion: Motion, target: Path | io.BytesIO, cpu: float) -> Sketch:
@@ -201,7 +202,8 @@ class Job:
 
         An effort with longer steps has as many times fewer outputs, so that these do not shorten its steps.
         """
-        begin, self.told.stage = clock.process_time(), "comparing" if points is None else "looking"
+        begin = clock.process_time()
+        self.progress.begin(ESTIMATION if points is None else PRE_RUN, effort)
         model, equilibrium, zoning = self._model(effort)
         s = output_points(self.scene.output.points, model.length) if points is None else points
         observer = self._observer(model, zoning, s, COMPARED)
@@ -213,7 +215,7 @@ class Job:
         motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning, correction)
         motion.save()
         self._move(motion, times)
-        self.told(motion, finished=True)
+        self._report(motion, finished=True)
         values = {name: notebook[name] for name in COMPARED if name in notebook}
         model_error = {name.removeprefix(MODEL): notebook[name] for name in notebook.names if name.startswith(MODEL)}
         spent = clock.process_time() - begin
@@ -227,7 +229,7 @@ class Job:
         """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
         if not mesh_is_free(self.scene):
             return None
-        coarse = effort.coarser(SURVEY_CELLS, SURVEY_STEPS)
+        coarse = survey_effort(effort)
         model = build(self.scene, coarse)
         s = np.linspace(0.0, model.length, SURVEY_POINTS)
         try:
@@ -312,7 +314,7 @@ class Job:
         for stop in sorted(t for t in stops if t > motion.t):
             for until in motion.ends_of_steps(stop):
                 motion.advance(until)
-                self.told(motion)
+                self._report(motion)
                 if self.interrupted():
                     motion.recorder.close("interrupted", f"stopped from outside at t = {motion.t:.6g} s")
                     raise KeyboardInterrupt

@@ -283,7 +283,20 @@ def finer(
     return replace(effort.coarser(cells, steps), zones=zones)
 
 
+def comparison_efforts(effort: Effort, moves: bool) -> tuple[Effort, Effort, Effort]:
+    """Of the runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well."""
+    longer = COARSER if moves else 1.0
+    return (
+        effort.coarser(COARSER, longer), effort.coarser(COARSER, longer**2), effort.coarser(COARSER**2, longer**2),
+    )  # fmt: skip
+
+
 # --- where cells should be ----------------------------------------------------------------------
+
+
+def survey_effort(effort: Effort) -> Effort:
+    """Of the run that looks how the cable bends."""
+    return effort.coarser(SURVEY_CELLS, SURVEY_STEPS)
 
 
 def survey_grading(model: Model, s: Floats, run: Mapping[str, np.ndarray], rod_cell: Floats | None) -> Grading:
@@ -433,13 +446,12 @@ class Climb:
         return run
 
     def _coarse(self, effort: Effort) -> tuple[Sketch, Sketch | None, Sketch | None] | None:
-        """Runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well."""
-        longer = COARSER if self.moves else 1.0
+        """The runs to compare with; None: the first has failed."""
         found: list[Sketch | None] = []
-        for cells, steps in ((COARSER, longer), (COARSER, longer**2), (COARSER**2, longer**2)):
+        for rough in comparison_efforts(effort, self.moves):
             try:
-                same = not self.moves and cells == COARSER and found
-                rough = replace(effort.coarser(cells, steps), follow=not found)
+                same = not self.moves and len(found) == 1
+                rough = replace(rough, follow=not found)
                 found.append(None if same else self._counted(self.sketch(rough)))
             except ComputationError as error:
                 if not found:

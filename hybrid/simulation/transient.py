@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import tempfile
 import time as clock
 from collections.abc import Iterator
 from dataclasses import replace
@@ -29,6 +28,7 @@ from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Stop, Watch
 from hybrid.simulation.freeze import freeze, program, thaw
 from hybrid.simulation.plane_monitor import Flat
+from hybrid.simulation.snapshot import write_snapshot
 from hybrid.simulation.zone_switching import Zoning, on_layout
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.step_control import Controller
@@ -450,17 +450,9 @@ class Motion:
         """The last good state with all that a repetition of the failed step needs; None when it cannot be written."""
         if self.target is None:
             return None
-        if isinstance(self.target, Path):
-            path = self.target.with_suffix(".snapshot.npz")
-        else:
-            path = Path(tempfile.gettempdir()) / f"hybrid-{clock.strftime('%Y%m%d-%H%M%S')}.snapshot.npz"
         content: dict[str, Any] = {"t": self.t, "dt": dt, "outcome": taken.outcome.name, "s": self.model.line.s}
         content |= {"scene": scene_text(self.scene), **self.state._asdict()}
-        try:
-            np.savez(path, **content)
-        except OSError:
-            return None
-        return path
+        return write_snapshot(self.target, content)
 
 
 def _same_plane(a: Floats | None, b: Floats | None) -> bool:

@@ -20,7 +20,8 @@ from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.read import scene_text, validate_scene
 from hybrid.scene.schema import Model, Scene
-from hybrid.simulation.api import Progress, run
+from hybrid.simulation.api import run
+from hybrid.simulation.progress import Progress
 from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row
 from hybrid.studies.machine import facts_of_machine
@@ -179,7 +180,7 @@ class Desk:
 
     def _follow(self, what: str) -> Callable[[Progress], None]:
         def follow(progress: Progress) -> None:
-            self.say(what, progress.t / progress.duration)
+            self.say(what, progress.fraction)
 
         return follow
 

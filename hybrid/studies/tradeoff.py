@@ -19,7 +19,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.resolution import Asked, asked
 from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
-from hybrid.scene.read import validate_scene
+from hybrid.scene.read import SceneLike, as_scene, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.store.tradeoff_table import CHECK, DONE, FAILED, OURS, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import COMPARED, FINENESS, Desk, Doing, Rung, key_of, kinds_of_models, rung_data, rung_of
@@ -35,7 +35,7 @@ PULLS = COMPARED[1:]
 
 
 def trade(
-    scene: Scene,
+    scene: SceneLike,
     folder: str | Path,
     *,
     models: Sequence[str] | None = None,
@@ -57,6 +57,7 @@ def trade(
     Raises SceneError when scene or ladder are refused, ComputationError when the reference fails.  KeyboardInterrupt
     leaves a table of what is done.
     """
+    scene = as_scene(scene)
     scene.require_time()
     names = _models(scene, models)
     goal = reference or _finer(scene, accuracies)

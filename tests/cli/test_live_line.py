@@ -11,7 +11,7 @@ from rich.console import Console
 
 from hybrid.cli.console import LiveLine, Voice, live_line, span, speed, zones_in_short
 from hybrid.model.mesh import Zone
-from hybrid.simulation.api import Progress
+from hybrid.simulation.progress import Progress
 
 TWO = (Zone("catenary", 0.0, 1.5), Zone("rod", 1.5, 2.0))
 SEVEN = tuple(Zone(("catenary", "rod")[k % 2], 10.0 * k, 10.0 * (k + 1)) for k in range(7))

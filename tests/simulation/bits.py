@@ -8,7 +8,7 @@ import h5py
 import numpy as np
 
 import hybrid
-from hybrid.simulation import api as simulate
+from hybrid.simulation import progress as reports
 from hybrid.store import writer as record
 
 CLOCKS = ("steps/cpu",)
@@ -41,13 +41,13 @@ class Stopping:
     """Hears of every step, and stops the run like Ctrl-C at one of them."""
 
     def __init__(self, monkeypatch, at_every_output: bool = True) -> None:
-        monkeypatch.setattr(simulate, "REPORT_EVERY", -1.0)
+        monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
         if at_every_output:  # checkpoints, which are otherwise some tenths of a second apart
             monkeypatch.setattr(record, "_PAUSE", 0.0)
             monkeypatch.setattr(record, "_PART", 0.0)
         self.left, self.heard = -1, 0
 
-    def __call__(self, progress: hybrid.simulation.api.Progress) -> None:
+    def __call__(self, progress: hybrid.simulation.progress.Progress) -> None:
         self.left -= 1
         self.heard += 1
         if self.left == 0:

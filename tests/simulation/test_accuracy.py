@@ -353,7 +353,7 @@ def test_a_reader_does_not_lose_the_figure(tmp_path):
     readers = []
 
     def look(progress):
-        if progress.stage == "result" and not readers and progress.t > 0.0:
+        if progress.name == "result" and not readers and progress.t > 0.0:
             readers.append(hybrid.open(target))
 
     result = hybrid.run(swinging(accuracy="3%"), target, progress=look)

@@ -1,0 +1,145 @@
+"""Progress of a run over all of its passes: the mesh pre-run, the runs that estimate errors, the result.
+
+One bar spans all passes.  Their costs are weighed beforehand by steps and cells; a refinement that turns out to be
+needed is added to the total when it begins, so that the fraction done falls back then.
+"""
+
+from __future__ import annotations
+
+import sys
+import time as clock
+from collections import deque
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import TextIO
+
+from hybrid.model.mesh import Zone
+from hybrid.model.resolution import Effort
+
+PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
+
+REPORT_EVERY = 0.1  # s of wall time between two calls of a listener
+# The speed of the last so many reports (about 5 s) gives the time left: the compilation of the first step, or a slow
+# stretch long past, says nothing about it.
+REMEMBERED = 50
+
+
+@dataclass(frozen=True)
+class Progress:
+    """Where a run is.
+
+    t, duration: s, of the present pass; step: its number; iterations: of Newton's method in the last step; zones;
+    wall: s since the first report.  run, runs: number of the present pass, from 1, and of all that are expected; name:
+    what it is for, one of PRE_RUN, ESTIMATION, RESULT, REFINEMENT.  fraction: part that is done of all passes, 0 to 1;
+    seconds_left: s of wall time that all of them still take, None while that is not known.
+    """
+
+    t: float
+    duration: float
+    step: int
+    iterations: int
+    zones: tuple[Zone, ...]
+    wall: float
+    run: int = 1
+    runs: int = 1
+    name: str = RESULT
+    fraction: float = 0.0
+    seconds_left: float | None = None
+
+    @property
+    def text(self) -> str:
+        """One line for people."""
+        which = f"run {self.run} of {self.runs}: {self.name}, " if self.runs > 1 else ""
+        left = f", {self.seconds_left:.2g} s left" if self.seconds_left is not None else ""
+        return f"{which}t = {self.t:.4g} of {self.duration:g} s, {100 * self.fraction:.0f} % done{left}"
+
+
+Listener = Callable[[Progress], None]
+
+
+def listener_of(progress: bool | Listener) -> Listener | None:
+    """The listener that a caller asks for; True: one line on the error stream."""
+    return StatusLine() if progress is True else progress or None
+
+
+def cost_of(effort: Effort, result: Effort) -> float:
+    """Cost of a pass over that of the result: by steps, and half by cells, the other half being the same for all."""
+    return result.step / effort.step * 0.5 * (1.0 + effort.fineness / result.fineness)
+
+
+class ProgressReporter:
+    """Tells a listener of the steps of all passes, about ten times a second; a context manager that closes it."""
+
+    def __init__(self, listener: Listener | None, duration: float) -> None:
+        self._listener, self._duration = listener, duration
+        self._expected: list[tuple[str, float]] = []  # name and cost of passes to come
+        self._result: Effort | None = None  # whose cost is 1
+        self._name, self._run = RESULT, 0
+        self._done, self._cost = 0.0, 0.0  # of passes that have ended, of the present one
+        self._begin: float | None = None  # s of the clock, at the first report
+        self._last = -REPORT_EVERY  # s of wall time, of the last report
+        self._past: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)  # wall time and fraction of reports
+
+    def __enter__(self) -> ProgressReporter:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        close = getattr(self._listener, "close", None)
+        if close is not None:
+            close()
+
+    def expect(self, passes: Sequence[tuple[str, Effort]], result: Effort) -> None:
+        """The passes to come, in their order, by name and effort; the cost of the result is the unit."""
+        self._result = result
+        self._expected = [(name, cost_of(effort, result)) for name, effort in passes]
+
+    def begin(self, name: str, effort: Effort) -> None:
+        """A pass begins; those expected before it that did not take place are dropped."""
+        cost = cost_of(effort, self._result or effort)
+        names = [expected for expected, _ in self._expected]
+        if name in names:
+            del self._expected[: names.index(name) + 1]
+        self._done, self._cost = self._done + self._cost, cost
+        self._name, self._run = name, self._run + 1
+
+    def __call__(self, t: float, step: int, iterations: int, zones: tuple[Zone, ...], finished: bool = False) -> None:
+        """A step has ended at t (s); finished: the last of its pass."""
+        if self._listener is None:
+            return
+        now = clock.perf_counter()
+        self._begin = now if self._begin is None else self._begin
+        wall = now - self._begin
+        if not finished and wall - self._last < REPORT_EVERY:
+            return
+        self._last = wall
+        total = self._done + self._cost + sum(cost for _, cost in self._expected)
+        fraction = min((self._done + self._cost * t / self._duration) / total, 1.0)
+        if self._past and fraction < self._past[-1][1]:
+            self._past.clear()
+        self._past.append((wall, fraction))
+        before, earlier = self._past[0]
+        rate = (fraction - earlier) / (wall - before) if wall > before else 0.0
+        left = (1.0 - fraction) / rate if rate > 0.0 else None
+        runs = self._run + len(self._expected)
+        self._listener(
+            Progress(t, self._duration, step, iterations, zones, wall, self._run, runs, self._name, fraction, left)
+        )
+
+
+class StatusLine:
+    """A line that is written over itself, on the error stream: what `progress=True` shows."""
+
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream, self._width = stream or sys.stderr, 0
+
+    def __call__(self, progress: Progress) -> None:
+        text = progress.text
+        self._stream.write("\r" + text.ljust(self._width))
+        self._stream.flush()
+        self._width = len(text)
+
+    def close(self) -> None:
+        """End the line, if one was begun."""
+        if self._width:
+            self._stream.write("\n")
+            self._width = 0

@@ -1,0 +1,88 @@
+"""The door to a computation: what may be given as a scene, and what a failed run leaves."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+
+WIRE: dict[str, Any] = {
+    "cable": {"sections": [{"length": 2.0, "mass": 1.0}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, -20]}},
+    "initial": "equilibrium",
+    "model": "catenary",
+    "mesh": {"cells": 4},
+    "time": {"duration": 0.1, "step": 0.05},
+}
+# Let go and pushed upwards: it goes into compression.
+PUSHED = WIRE | {
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": [0, 0, 400.0]}},
+    "initial": {"kind": "straight", "direction": [0, 0, -1]},
+}
+
+
+@pytest.fixture
+def file(tmp_path: Path) -> Path:
+    path = tmp_path / "wire.yaml"
+    path.write_text(hybrid.scene_text(hybrid.validate_scene(WIRE)))
+    return path
+
+
+def test_a_scene_is_a_scene_a_path_or_a_dict(file: Path) -> None:
+    scene = hybrid.load_scene(file)
+    want = hybrid.run(scene)
+    for given in (file, str(file), WIRE):
+        with hybrid.run(given) as result:
+            np.testing.assert_array_equal(result.position, want.position)
+        with hybrid.static(given) as rest:
+            np.testing.assert_array_equal(rest.position[0], want.position[0])
+        assert hybrid.plan(given) == hybrid.plan(scene)
+
+
+@pytest.mark.parametrize("given", [None, 3, ["wire.yaml"], b"wire.yaml"])
+def test_anything_else_is_refused_with_what_is_expected(given: Any, tmp_path: Path) -> None:
+    for call in (hybrid.run, hybrid.static, hybrid.plan, lambda x: hybrid.trade(x, tmp_path / "trade")):
+        with pytest.raises(TypeError, match=r"path.*dict") as refused:
+            call(given)
+        assert type(given).__name__ in str(refused.value)
+
+
+def test_a_bad_dict_is_refused_like_a_bad_file() -> None:
+    with pytest.raises(hybrid.SceneError, match="model"):
+        hybrid.run(WIRE | {"model": "string"})
+
+
+# --- snapshots -----------------------------------------------------------------------------------
+
+
+def failed(output: Path | None) -> Path:
+    """The snapshot of a run that fails."""
+    with pytest.raises(hybrid.ComputationError) as stopped:
+        hybrid.run(PUSHED, output)
+    assert stopped.value.snapshot is not None and str(stopped.value.snapshot) in str(stopped.value)
+    return stopped.value.snapshot
+
+
+def test_a_snapshot_replaces_a_link_and_does_not_follow_it(tmp_path: Path) -> None:
+    victim = tmp_path / "victim.txt"
+    victim.write_text("precious")
+    link = tmp_path / "run.snapshot.npz"
+    link.symlink_to(victim)
+    assert failed(tmp_path / "run.h5").resolve() == link.resolve() and not link.is_symlink()
+    assert victim.read_text() == "precious"
+    with np.load(link) as snapshot:
+        assert snapshot["outcome"] == "SLACK" and snapshot["r"].shape == (5, 3)
+
+
+def test_snapshots_of_runs_in_memory_have_names_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    one, other = failed(None), failed(None)
+    assert one != other and one.parent == other.parent == tmp_path
+    assert os.stat(one).st_mode & 0o077 == 0, "nobody else reads it"
+    with np.load(one) as snapshot:
+        assert float(snapshot["t"]) >= 0.0

@@ -1,0 +1,121 @@
+"""One bar over all passes of a run: which pass, how much of all is done, how long all still take."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.model.resolution import Effort
+from hybrid.simulation import progress as module
+from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
+
+HANGING = """
+cable: {sections: [{length: 10.0, mass: 1.0}]}
+ends: {start: {kind: pinned, position: [0, 0, 0]}, end: {kind: pinned, position: [8, 0, 0], motion: {surge: {amplitude: 0.2, period: 2.0}, ramp: 1.0}}}
+initial: equilibrium
+model: catenary
+"""
+
+
+@pytest.fixture
+def heard(monkeypatch: pytest.MonkeyPatch) -> list[Progress]:
+    """A listener that hears of every step."""
+    monkeypatch.setattr(module, "REPORT_EVERY", -1.0)
+    return []
+
+
+def test_every_pass_is_named_and_one_bar_spans_them(heard: list[Progress]) -> None:
+    scene = hybrid.parse_scene(HANGING + "time: {duration: 2.0}\naccuracy: 10 %\n")
+    hybrid.run(scene, progress=heard.append).close()
+    names = [p.name for k, p in enumerate(heard) if k == 0 or p.run != heard[k - 1].run]
+    assert names[:5] == [PRE_RUN, ESTIMATION, ESTIMATION, ESTIMATION, RESULT]
+    assert set(names[5:]) <= {REFINEMENT, ESTIMATION}
+    planned = [p for p in heard if p.run <= 5]
+    assert {p.runs for p in planned} == {5}
+    fractions = [p.fraction for p in planned]
+    assert fractions == sorted(fractions) and 0.0 < fractions[0] < 0.1 and fractions[-1] == pytest.approx(1.0)
+    assert heard[-1].fraction == pytest.approx(1.0) and heard[-1].seconds_left == pytest.approx(0.0)
+    assert all(p.seconds_left is None or p.seconds_left >= 0.0 for p in heard)
+    assert "run 2 of 5: error estimation" in next(p.text for p in heard if p.run == 2)
+
+
+def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress]) -> None:
+    scene = hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n")
+    hybrid.run(scene, progress=heard.append).close()
+    assert {(p.run, p.runs, p.name) for p in heard} == {(1, 1, RESULT)}
+    assert [p.step for p in heard[:3]] == [1, 2, 3] and heard[4].fraction == pytest.approx(0.5)
+    assert "run 1" not in heard[0].text
+
+
+def reporter(listener: Any) -> tuple[ProgressReporter, Effort]:
+    made, effort = ProgressReporter(listener, 10.0), Effort(1.0, 0.1, None, 1e-3)
+    return made, effort
+
+
+def test_passes_that_did_not_take_place_are_dropped(heard: list[Progress]) -> None:
+    made, effort = reporter(heard.append)
+    made.expect([(ESTIMATION, effort.coarser(2, 2))] * 3 + [(RESULT, effort)], effort)
+    made.begin(ESTIMATION, effort.coarser(2, 2))  # it fails, and the others are not tried
+    made.begin(RESULT, effort)
+    made(5.0, 1, 1, ())
+    assert (heard[-1].run, heard[-1].runs, heard[-1].name) == (2, 2, RESULT)
+
+
+def test_a_refinement_is_added_when_it_begins(heard: list[Progress]) -> None:
+    made, effort = reporter(heard.append)
+    made.expect([(RESULT, effort)], effort)
+    made.begin(RESULT, effort)
+    made(10.0, 100, 1, (), finished=True)
+    made.begin(REFINEMENT, effort.coarser(1.0, 0.5))
+    made(0.0, 1, 1, ())
+    assert (heard[-1].run, heard[-1].runs) == (2, 2)
+    assert heard[0].fraction == 1.0 and heard[-1].fraction == pytest.approx(1 / 3)
+    assert heard[-1].seconds_left is None, "the speed of the pass before says little"
+
+
+def test_reports_come_about_ten_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, heard = [0.0], []
+    monkeypatch.setattr(module.clock, "perf_counter", lambda: now[0])
+    made, effort = reporter(heard.append)
+    made.begin(RESULT, effort)
+    for k in range(1, 101):
+        now[0] = 0.01 * k
+        made(0.05 * k, k, 2, ())
+    assert 9 <= len(heard) <= 11
+    assert heard[-1].seconds_left == pytest.approx(1.0, rel=0.05), "5 s of 10 took 1 s"
+
+
+def test_true_shows_a_line_on_the_error_stream(capsys: pytest.CaptureFixture[str]) -> None:
+    hybrid.run(hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n"), progress=True).close()
+    out, err = capsys.readouterr()
+    assert out == "" and "t = 1 of 1 s, 100 % done" in err and err.endswith("\n")
+
+
+def test_a_shorter_line_covers_a_longer_one() -> None:
+    stream = io.StringIO()
+    line = StatusLine(stream)
+    for t, runs in ((0.123, 4), (10.0, 1)):
+        line(Progress(t, 10.0, 1, 1, (), 0.0, runs=runs))
+    line.close()
+    line.close()
+    long, short = stream.getvalue().strip("\n").split("\r")[1:]
+    assert len(long) == len(short) and stream.getvalue().count("\n") == 1
+
+
+def test_the_line_is_closed_when_the_run_fails() -> None:
+    class Closing:
+        closed = False
+
+        def __call__(self, progress: Progress) -> None:
+            raise KeyboardInterrupt
+
+        def close(self) -> None:
+            self.closed = True
+
+    listener = Closing()
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n"), progress=listener)
+    assert listener.closed
