@@ -86,12 +86,13 @@ def _output(help: str) -> Any:
 SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene to read.", show_default=False)]
 RunFile = Annotated[Path | None, _output("Result; else SCENE.h5, in this folder.")]
 StaticFile = Annotated[Path | None, _output("Result; else SCENE.static.h5, here.")]
-Picture = Annotated[Path | None, _output("PNG, PDF, SVG ..; else RUN.png, RUN.zones.png.")]
+Picture = Annotated[Path | None, _output("PNG, PDF or SVG; else RUN.png, RUN.zones.png.")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
 ]
 Drawn = Annotated[bool, _flag("--plot", help="Draw it as well, as PNG beside it.")]
 Keep = Annotated[bool, _flag("--no-overwrite", help="Refuse to replace an older result.")]
+Foreign = Annotated[bool, _flag("--overwrite", help="Replace a file that is not of hybrid.")]
 Quiet = Annotated[bool, _flag("--quiet", "-q", help="Print nothing but errors.")]
 Json = Annotated[bool, _flag("--json", help="Print JSON, one object per line.")]
 
@@ -117,11 +118,12 @@ def run(
         asked = _load(say, scene, settings)
         duration = asked.require_time().duration
         target = say.will_write(output or Path(f"{scene.stem}.h5"))
+        picture = _picture(target, plot)
         cold = say.compiling(_kernels(asked))
         begin = clock.perf_counter()
         with say.progress() as tell:
             result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
-        _ended(say, asked, result, target, clock.perf_counter() - begin, duration, cold, plot)
+        _ended(say, asked, result, target, clock.perf_counter() - begin, duration, cold, picture)
 
 
 @app.command()
@@ -143,13 +145,14 @@ def resume(
 
         say.source = str(result)
         target, changed = say.will_write(output or result), settings or []
+        picture = _picture(target, plot)
         left = remainder(result.resolve(), until, changed, start)
         cold = say.compiling(_kernels(left.scene))
         begin = clock.perf_counter()
         with say.progress() as tell:
             more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=tell)
         computed = left.scene.require_time().duration - left.reached
-        _ended(say, left.scene, more, target, clock.perf_counter() - begin, computed, cold, plot)
+        _ended(say, left.scene, more, target, clock.perf_counter() - begin, computed, cold, picture)
 
 
 @app.command()
@@ -161,13 +164,15 @@ def static(
     with _speaking(as_json, quiet) as say:
         asked = _load(say, scene, settings)
         target = say.will_write(output or Path(f"{scene.stem}.static.h5"))
+        picture = _picture(target, plot)
         say.compiling(["newton.newton"])
         from hybrid.cli.console import span
 
         begin = clock.perf_counter()
         result = hybrid.static(asked, target, overwrite=not keep)
         wall = clock.perf_counter() - begin
-        picture = _draw(result, target.with_suffix(".png")) if plot else None
+        if picture:
+            hybrid.plot(result, picture)
         facts = equilibrium_facts(result)
         errors = errors_facts(result)
         say.show(lambda: equilibrium_table(facts))
@@ -200,6 +205,7 @@ def plot(
     ] = None,
     zones: Annotated[bool, _flag("--zones", help="Draw zones along s over time instead.")] = False,
     film: Annotated[bool, _flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
+    overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -210,13 +216,14 @@ def plot(
         raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
     with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
         if film:
-            _film(say, opened, result, output)
+            _film(say, opened, result, output, overwrite)
             return
         if zones:
             picture = output or result.with_suffix(".zones.png")
-            hybrid.plot_zones(opened, picture)
+            hybrid.plot_zones(opened, picture, overwrite=overwrite)
         else:
-            picture = _draw(opened, output or result.with_suffix(".png"), times=times, history=history)
+            picture = output or result.with_suffix(".png")
+            hybrid.plot(opened, picture, times=times, history=history, overwrite=overwrite)
         n = len(opened.times)
         over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
         say.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)
@@ -226,6 +233,7 @@ def plot(
 def report(
     result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to report.", show_default=False)],
     output: Annotated[Path | None, _output("Page; else RUN.html, beside it.")] = None,
+    overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
@@ -233,7 +241,7 @@ def report(
     with _speaking(as_json, quiet) as say, hybrid.open(result) as opened:
         from hybrid.view.summary import facts_of
 
-        page = hybrid.report(opened, output or result.with_suffix(".html"))
+        page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite)
         size, facts = page.stat().st_size, [fact._asdict() for fact in facts_of(opened)] if as_json else []
         say.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
 
@@ -420,12 +428,20 @@ def _kernels(scene: Scene) -> list[str]:
 
 
 def _ended(
-    say: Voice, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool, plot: bool
+    say: Voice,
+    asked: Scene,
+    result: Result,
+    target: Path,
+    wall: float,
+    computed: float,
+    cold: bool,
+    picture: Path | None,
 ) -> None:
     """What there is to say of a run that has come to its end; computed: s of it, just now."""
     from hybrid.cli.console import span, speed
 
-    picture = _draw(result, target.with_suffix(".png")) if plot else None
+    if picture:
+        hybrid.plot(result, picture)
     steps = len(result["steps/t"]) if "steps/t" in result else 0
     pace = "compilation included" if cold else f"{speed(computed / wall)} x real time"
     duration = asked.require_time().duration
@@ -450,19 +466,21 @@ def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:
     return hybrid.load_scene(path, say.settings)
 
 
-def _film(say: Voice, result: Result, source: Path, output: Path | None) -> None:
+def _film(say: Voice, result: Result, source: Path, output: Path | None, overwrite: bool) -> None:
     """Make a film, as mp4 where this machine can."""
     from hybrid.view.animation import animate, ffmpeg
 
     suffix = ".mp4" if output or ffmpeg() else ".gif"
     if suffix == ".gif":
         say.note('note: there is no ffmpeg for mp4, so it is a gif; pip install "hybrid-cable[video]" brings one')
-    film = animate(result, output or source.with_suffix(suffix))
+    film = animate(result, output or source.with_suffix(suffix), overwrite=overwrite)
     size = film.path.stat().st_size
     facts = {"status": result.status, "size": size} | {k: v for k, v in film._asdict().items() if k != "path"}
     say.done(f"{film.text}, {size / 1e6:.1f} MB", film.path, **facts)
 
 
-def _draw(result: Result, picture: Path, **chosen: Any) -> Path:
-    hybrid.plot(result, picture, **chosen)
-    return picture
+def _picture(target: Path, plot: bool) -> Path | None:
+    """Where a picture beside a result goes, checked before the work; None: none is asked for."""
+    from hybrid.view.save import PICTURES, check_target
+
+    return check_target(target.with_suffix(".png"), PICTURES) if plot else None

@@ -94,7 +94,7 @@ def trade(
         table = judged(table, limits)
         table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
         table.write(desk.folder, "trade.png")
-        plot_trade(table, desk.folder / "trade.png")
+        plot_trade(table, desk.folder / "trade.png", overwrite=True)  # the folder is of this program
     return table
 
 

@@ -5,7 +5,6 @@ Every frame is an output of the result, none is made up between them.  What does
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from collections.abc import Iterator
@@ -19,6 +18,7 @@ from hybrid.store.reader import Result, Zone
 from hybrid.view.decimate import even
 from hybrid.view.panels import draw_sea, place_along
 from hybrid.view.projections import View, aspect_of, extent_in, magnification, views_of, whole_zones
+from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
 from hybrid.view.style import BODY, GREY, INK, KIND_COLOURS, NORMAL, legend_row, mark, new_page, prefix, style
 
@@ -49,10 +49,16 @@ class Film(NamedTuple):
         return f"{self.frames} frames{of}, {self.seconds:.3g} s at {self.factor:g} x real time"
 
 
-def animate(result: Result, path: str | Path) -> Film:
-    """Write a film, in the format of its name; ResultError if nothing moves or it cannot be written."""
-    target = Path(path).expanduser()
-    suffix = _checked(target)
+def animate(result: Result, path: str | Path, *, overwrite: bool = False) -> Film:
+    """Write a film, in the format of its name; ResultError if nothing moves or it cannot be written.
+
+    overwrite: also replace a file that hybrid did not make.
+    """
+    target = check_target(path, FORMATS, overwrite=overwrite)
+    suffix = target.suffix.lower()
+    if suffix == ".mp4" and ffmpeg() is None:
+        advice = 'pip install "hybrid-cable[video]", or a name that ends in .gif'
+        raise ResultError(f"{target} needs the program ffmpeg, which is not here\n    try:      {advice}")
     n = len(result.times)
     if n < 2:
         held = "one output" if n else "no output"
@@ -65,15 +71,9 @@ def animate(result: Result, path: str | Path) -> Film:
         pause = max(round(pause, 2), 0.02)  # it counts in hundredths, and viewers slow down what is faster
         factor = float(f"{span / (pause * len(frames)):.3g}")
     seconds = pause * len(frames)
-    new = target.with_name(f".{target.stem}.{os.getpid()}.new{suffix}")
-    try:
-        pictures = _pictures(result, frames, factor, _DPI[suffix])
-        (_write_mp4 if suffix == ".mp4" else _write_gif)(new, pictures, 1.0 / pause)
-        os.replace(new, target)
-    except OSError as error:
-        raise ResultError(f"the film cannot be saved as {target}\n    detail:   {error}") from error
-    finally:
-        new.unlink(missing_ok=True)
+    pictures = _pictures(result, frames, factor, _DPI[suffix])
+    write = _write_mp4 if suffix == ".mp4" else _write_gif
+    write_file(target, lambda new: write(new, pictures, 1.0 / pause))
     return Film(target, len(frames), seconds, factor, n)
 
 
@@ -88,21 +88,6 @@ def ffmpeg() -> str | None:
         return str(get_ffmpeg_exe())
     except (ImportError, RuntimeError):  # not installed; or installed without the program
         return None
-
-
-def _checked(target: Path) -> str:
-    """The format of a film's name; ResultError if it cannot be written."""
-    suffix = target.suffix.lower()
-    if target.is_dir():
-        raise ResultError(f"{target} is a folder\n    try:      name a file in it, such as {target / 'run.mp4'}")
-    if suffix not in FORMATS:
-        raise ResultError(f"a film cannot be saved as {target}\n    expected: a name that ends in .mp4 or .gif")
-    if not target.parent.is_dir():
-        raise ResultError(f"there is no folder {target.parent}\n    try:      mkdir -p {target.parent}")
-    if suffix == ".mp4" and ffmpeg() is None:
-        advice = 'pip install "hybrid-cable[video]", or a name that ends in .gif'
-        raise ResultError(f"{target} needs the program ffmpeg, which is not here\n    try:      {advice}")
-    return suffix
 
 
 def _frames(result: Result, most: int) -> np.ndarray:
@@ -242,7 +227,19 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], rate: float) -> None:
     assert program is not None  # asked before
     given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}", "-r", f"{rate:.6g}", "-i", "-"]
     # yuv420p and faststart: what every browser and every office program plays
-    kept = ["-an", "-c:v", "libx264", "-crf", _CRF, "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
+    kept = [
+        "-metadata",
+        f"comment={COMMENT}",
+        "-an",
+        "-c:v",
+        "libx264",
+        "-crf",
+        _CRF,
+        "-pix_fmt",
+        "yuv420p",
+        "-movflags",
+        "+faststart",
+    ]
     command = [program, "-y", "-loglevel", "error", *given, *kept, str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stderr=subprocess.PIPE) as process:
         assert process.stdin is not None and process.stderr is not None
@@ -270,4 +267,12 @@ def _write_gif(path: Path, pictures: Iterator[np.ndarray], rate: float) -> None:
         sheet.paste(image, (0, k * height))
     palette = sheet.quantize(128, dither=Image.Dither.NONE)
     frames = [image.quantize(palette=palette, dither=Image.Dither.NONE) for image in images]
-    frames[0].save(path, save_all=True, append_images=frames[1:], duration=round(1000.0 / rate), loop=0, optimize=False)
+    frames[0].save(
+        path,
+        save_all=True,
+        append_images=frames[1:],
+        duration=round(1000.0 / rate),
+        loop=0,
+        optimize=False,
+        comment=COMMENT,
+    )

@@ -23,7 +23,8 @@ from hybrid.view.projections import (
     views_of,
     whole_zones,
 )
-from hybrid.view.style import legend_row, new_page, save
+from hybrid.view.save import save_figure
+from hybrid.view.style import legend_row, new_page
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -58,11 +59,17 @@ _TWO_VIEWS_BED += [([[[["s"], ["S"]], _BLOCK_BED]], [w, 1], [1], r) for w, r in 
 
 
 def plot_summary(
-    result: Result, path: str | Path | None = None, *, times: Numbers | None = None, history: Numbers | None = None
+    result: Result,
+    path: str | Path | None = None,
+    *,
+    times: Numbers | None = None,
+    history: Numbers | None = None,
+    overwrite: bool = False,
 ) -> Figure:
     """One page: shape, tension and moment along the cable, and histories at some points.
 
-    path: where to save it (png, pdf, svg ...).  times: which earlier shapes (s).  history:
+    path: where to save it, as .png, .pdf or .svg; a file that hybrid did not make is replaced only with
+    overwrite.  times: which earlier shapes (s).  history:
     which arc lengths to follow (m); else those recorded as `history`, else the middle and
     the ends that move.  A static result shows curvature and tangent in place of histories; a
     cable that touches a seabed also shows the force of contact and, over time, where it does.
@@ -98,7 +105,7 @@ def plot_summary(
                 axes[upper].set_xlabel("")
                 axes[upper].tick_params(labelbottom=False)
         _legends(figure, axes["s"], axes["h"] if len(points) else None, foot)
-    return save(figure, path)
+    return save_figure(figure, path, overwrite=overwrite)
 
 
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:

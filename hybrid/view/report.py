@@ -8,7 +8,6 @@ it takes a third of the space, and browsers of 2023 or later unpack it themselve
 from __future__ import annotations
 
 import gzip
-import os
 import re
 from base64 import b64encode
 from html import escape
@@ -18,34 +17,26 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.view.decimate import MOST_ON_CURVE, Kept, Store, kept, script_json
 from hybrid.view.figures import energy, energy_parts, histories, ranges
 from hybrid.view.notebook_card import picture
+from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.scenery import scenery
 from hybrid.view.style import prefix
 from hybrid.view.summary import CAUSES, Fact, amount, attention, facts_of, length_of, short
 from hybrid.view.zone_map import event_rows, shares, zone_map
 
-_MARK = b"<!-- hybrid report -->"
-_HEAD = 400  # bytes of a file in which the mark stands
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
 
-def write_report(result: Result, path: str | Path) -> Path:
-    """Write the report of a result and return where it is; ResultError where it cannot be written."""
-    target = Path(path).expanduser()
-    _check_target(target)
-    new = target.with_name(f".{target.name}.{os.getpid()}.new")
-    try:
-        new.write_text(html(result), encoding="utf-8")
-        os.replace(new, target)
-    except OSError as error:
-        new.unlink(missing_ok=True)
-        advice = "a folder you may write to, with free space"
-        raise ResultError(f"{target} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
-    return target
+def write_report(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
+    """Write the report of a result as .html or .htm and return where it is; ResultError where it cannot be written.
+
+    overwrite: also replace a file that is not a report of hybrid.
+    """
+    target = check_target(path, PAGES, overwrite=overwrite)
+    return write_file(target, lambda new: new.write_text(html(result), encoding="utf-8"))
 
 
 def html(result: Result) -> str:
@@ -80,6 +71,7 @@ def html(result: Result) -> str:
         "settings": _settings(result),
         "scene": escape(result.scene_text),
         "footer": escape(_footer()),
+        "mark": REPORT_MARK,
         "index": script_json(index),
         "data": _packed(store.block),
         "plotly": _packed(_plotly().encode()),
@@ -88,23 +80,6 @@ def html(result: Result) -> str:
     }
     # In one pass: nothing that is put in is looked at again.
     return re.sub(r"\{\{(\w+)\}\}", lambda m: parts[m[1]], _file("report.html"))
-
-
-def _check_target(target: Path) -> None:
-    """ResultError if a report cannot be written there; only a report of ours is replaced."""
-    if target.is_dir():
-        raise ResultError(f"{target} is a folder\n    try:      name a file in it, such as {target / 'run.html'}")
-    if target.exists():
-        try:
-            with target.open("rb") as file:
-                ours = _MARK in file.read(_HEAD) or target.stat().st_size == 0
-        except OSError:
-            ours = False
-        if not (ours and os.access(target, os.W_OK)):
-            why = "is write-protected" if ours else "is not a report of hybrid"
-            raise ResultError(f"{target} exists and {why}\n    try:      another name, or delete the file yourself")
-    if not target.parent.is_dir():
-        raise ResultError(f"there is no folder {target.parent}\n    try:      mkdir -p {target.parent}")
 
 
 def _file(name: str) -> str:

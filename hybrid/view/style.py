@@ -7,10 +7,9 @@ one colour on a whole page; grey is what was earlier; sand and water are pale, b
 from __future__ import annotations
 
 import math
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from hybrid.errors import EVENTS_BY_WEIGHT, ResultError, weight_of_event
+from hybrid.errors import EVENTS_BY_WEIGHT, weight_of_event
 from hybrid.store.reader import Result
 
 if TYPE_CHECKING:
@@ -112,16 +111,6 @@ def new_page(result: Result, facts: list[str]) -> tuple[Figure, float]:
     if len(result.times) == 0:
         figure.text(0.5, 0.5, "no output was saved", ha="center", fontsize=NORMAL, color=GREY)
     return figure, foot
-
-
-def save(figure: Figure, path: str | Path | None) -> Figure:
-    """Save it where a path says so, in the format of its name."""
-    if path is not None:
-        try:
-            figure.savefig(path, dpi=150)
-        except (OSError, ValueError) as error:
-            raise ResultError(f"the figure cannot be saved as {path}\n    detail:   {error}") from error
-    return figure
 
 
 def legend_row(figure: Figure, y: float, entries: list[tuple[str, Any]]) -> None:

@@ -12,7 +12,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from hybrid.store.tradeoff_table import OURS, Row, TradeTable
-from hybrid.view.style import GREY, INK, KIND_COLOURS, NORMAL, SMALL, save, style
+from hybrid.view.save import save_figure
+from hybrid.view.style import GREY, INK, KIND_COLOURS, NORMAL, SMALL, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -31,10 +32,10 @@ _BESIDE_A_POINT = ((7, 2), (-7, -6), (7, -8), (-7, 4))
 Figures = Callable[[Row], float | None]
 
 
-def plot_trade(table: TradeTable, path: str | Path | None = None) -> Figure:
+def plot_trade(table: TradeTable, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
     """One page: error against CPU time on logarithmic axes, the front and what is recommended marked.
 
-    path: where to save it (png, pdf, svg ...).
+    path: where to save it, as .png, .pdf or .svg (see plot_summary).
     """
     from matplotlib.backends.backend_agg import FigureCanvasAgg
     from matplotlib.figure import Figure
@@ -49,7 +50,7 @@ def plot_trade(table: TradeTable, path: str | Path | None = None) -> Figure:
     figure.set_layout_engine(ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=body))
     if not table.choices:
         figure.text(0.5, 0.5, "no run came to an end", ha="center", fontsize=NORMAL, color=GREY)
-        return save(figure, path)
+        return save_figure(figure, path, overwrite=overwrite)
     part = table.asked_for if table.asked_for.strip().endswith("%") else ""
     scale = float(part.strip().rstrip("%")) if part else 1.0
     axes = figure.subplot_mosaic([["score", "position"], ["score", "pull"]], width_ratios=[1.7, 1.0])
@@ -74,7 +75,7 @@ def plot_trade(table: TradeTable, path: str | Path | None = None) -> Figure:
         handles, names, loc="lower center", bbox_to_anchor=(0.5, 0.012), ncols=8, frameon=False, fontsize=SMALL,
         handlelength=1.8, columnspacing=1.4, labelcolor=INK,
     )  # fmt: skip
-    return save(figure, path)
+    return save_figure(figure, path, overwrite=overwrite)
 
 
 def panel(ax: Axes, table: TradeTable, figure_of: Figures, named: bool = False) -> None:

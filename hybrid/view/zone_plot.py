@@ -14,7 +14,8 @@ import numpy as np
 
 from hybrid.store.reader import Result, Zone
 from hybrid.view.projections import STILL, free_edges, whole_zones
-from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL, legend_row, new_page, prefix, save, style
+from hybrid.view.save import save_figure
+from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL, legend_row, new_page, prefix, style
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -100,12 +101,12 @@ def rod_share(result: Result) -> np.ndarray:
     return np.array([length(zones, "rod") / (length(zones) or 1.0) for zones in result.zones])
 
 
-def plot_zones(result: Result, path: str | Path | None = None) -> Figure:
+def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
     """One page: the zones along s over time, rods by their curvature and catenaries by their tension, and the share
     of rod.
 
-    path: where to save it (png, pdf, svg ...).  Also drawn, where the file has them: where the cable touches down,
-    what is attached to it, and where zones were split, merged or a step retried.
+    path: where to save it, as .png, .pdf or .svg (see plot_summary).  Also drawn, where the file has them: where the
+    cable touches down, what is attached to it, and where zones were split, merged or a step retried.
     """
     figure, foot = new_page(result, _facts(result))
     if len(result.times):
@@ -121,7 +122,7 @@ def plot_zones(result: Result, path: str | Path | None = None) -> Figure:
         axes["map"].tick_params(labelbottom=False)
         entries = zip(*axes["map"].get_legend_handles_labels()[::-1], strict=True)
         legend_row(figure, foot + 0.015, list(dict(entries).items()))
-    return save(figure, path)
+    return save_figure(figure, path, overwrite=overwrite)
 
 
 def plot_zone_map(ax: Axes, result: Result, cells: Cells | None = None) -> dict[str, Any]:

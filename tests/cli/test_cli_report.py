@@ -73,7 +73,8 @@ def test_report_gives_facts_to_programs(call: Call) -> None:
     [
         (("report", "run.h5", "-o", "."), "is a folder"),
         (("report", "run.h5", "-o", "missing/run.html"), "there is no folder missing"),
-        (("report", "run.h5", "-o", "run.h5"), "is not a report of hybrid"),
+        (("report", "run.h5", "-o", "run.h5"), "unknown file format"),
+        (("report", "run.h5", "-o", "run.pdf"), "ends in .html or .htm"),
         (("report", "other.h5"), "there is no file"),
         (("plot", "run.h5", "--animate", "-o", "run.avi"), "ends in .mp4 or .gif"),
         (("plot", "run.h5", "--animate", "--zones"), "one at a time"),
@@ -85,6 +86,21 @@ def test_what_cannot_be_written_is_refused(call: Call, arguments: tuple[str, ...
     assert code == 1 and not out and words in err and ("    try:      " in err or "    expected: " in err)
     with hybrid.open("run.h5") as result:
         assert len(result.times) == 6
+
+
+def test_a_file_of_others_is_replaced_only_with_overwrite(call: Call) -> None:
+    for command, name in (("plot", "run.png"), ("report", "run.html")):
+        Path(name).write_bytes(b"a holiday")
+        code, _, err = call(command, "run.h5")
+        assert code == 1 and "was not made by hybrid" in err and Path(name).read_bytes() == b"a holiday"
+        assert call(command, "run.h5", "--overwrite")[0] == 0 and call(command, "run.h5")[0] == 0
+
+
+def test_a_picture_that_may_not_be_written_stops_a_run_before_it_begins(call: Call) -> None:
+    Path("scene.yaml").write_text(SCENE)
+    Path("scene.png").write_bytes(b"a holiday")
+    code, _, err = call("run", "scene.yaml", "--plot")
+    assert code == 1 and "scene.png exists and was not made by hybrid" in err and not Path("scene.h5").exists()
 
 
 def test_a_film_is_an_mp4_where_that_can_be_written_else_a_gif(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:

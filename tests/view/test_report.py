@@ -171,7 +171,7 @@ def test_only_a_report_of_ours_is_replaced(tmp_path: Path, monkeypatch: pytest.M
     other = tmp_path / "other.html"
     other.write_text("<html>mine</html>")
     for target, words in (
-        (other, "is not a report of hybrid"),
+        (other, "was not made by hybrid"),
         (tmp_path, "is a folder"),
         (tmp_path / "missing" / "run.html", "there is no folder"),
     ):
