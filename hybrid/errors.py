@@ -115,6 +115,7 @@ EVENTS_BY_WEIGHT = (
     "zones fixed",
     "static friction neglected",
     "end rotated in",
+    "other program",
     "events omitted",
 )
 
@@ -123,6 +124,8 @@ EVENTS_BY_WEIGHT = (
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 # All kinds that are part of a normal run: changes of zones, and changes of loads that `resume` was asked for.
 EXPECTED = (*ZONE_EVENTS, "loads change")
+# Kind of the event of a run that another program had begun.
+OTHER_PROGRAM = "other program"
 # Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.
 OMITTED = EVENTS_BY_WEIGHT[-1]
 

@@ -8,9 +8,9 @@ tensions of a while ago.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -35,6 +35,13 @@ LOST, WEIGHTLESS = 0.3, 1e-3  # part of the tension that is left of what is lost
 MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
 SHORTEST = 2.0  # base cells that make a zone
 ASKED = 2.0  # ratio of what the scene says is always rod
+
+
+# What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
+REMEMBERED = (
+    "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
+    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age",
+)  # fmt: skip
 
 
 class Look(NamedTuple):
@@ -156,6 +163,22 @@ class DomainManager:
         self.haste[fresh] = np.where(urgent[fresh], HASTE, 1.0)
         self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
         self.follow(new)
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What it remembers beside the layout."""
+        return {name: getattr(self, name) for name in REMEMBERED}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+        allowed, cells = self.tolerance, self.base_of_cell.size
+        vars(self).update(saved)
+        good = 0.0 < self.tolerance <= allowed and self.past.shape == self.recent.shape in ((0,), (cells,))
+        loudest = self.calmed[0]
+        if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
+            raise ValueError("a memory that no domain manager has")
+        if not (0.0 <= self.grown.min() <= self.grown.max() <= 1.0 and min(self.age, self.recent_age) >= 0.0):
+            raise ValueError("bending that is more than all of it, or a past that is to come")
+        self._see_who_comes()
 
     # --- watching ------------------------------------------------------------------------------
 

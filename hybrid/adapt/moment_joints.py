@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from hybrid.kernels.state import Floats, Line, State
@@ -24,6 +27,14 @@ class Joints:
         self.beside = np.where(before, turns - 1, turns + 1)  # the rod's last element
         self.moment = self.next = np.zeros((turns.size, 3))
         self.force = np.zeros((line.s.size, 3))
+
+    def checkpoint(self) -> dict[str, Any]:
+        """The moments, between two steps."""
+        return {"moment": self.moment}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on with these moments."""
+        self.moment = saved["moment"]
 
     def on(self, line: Line) -> Joints:
         """The joints of another line; those that stay keep their moments."""

@@ -71,9 +71,12 @@ class Model:
     follows_error: bool = False  # whether the error of leaving bending out is followed
     corrected: bool = False  # whether results are corrected for it
 
-    def __getstate__(self) -> dict[str, object]:
-        """For a checkpoint: without the states that a run may start from."""
-        return vars(self) | {"start": blank_state(0), "other_starts": ()}
+    @property
+    def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:
+        """What `build` makes a model of the same mesh from."""
+        if self.layout is None:
+            return self.line.s, self.zones
+        return self.layout._replace(rod=np.ones_like(self.layout.rod))
 
     @property
     def cells(self) -> int:
@@ -113,8 +116,12 @@ def corrects(scene: Scene) -> bool:
     return isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)
 
 
-def build(scene: Scene, effort: Effort | None = None) -> Model:
+def build(
+    scene: Scene, effort: Effort | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None
+) -> Model:
     """Make the model that a scene requires; effort: how finely, None: as it asks for.
+
+    mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as effort places them.
 
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
@@ -124,7 +131,11 @@ def build(scene: Scene, effort: Effort | None = None) -> Model:
     cuts = sorted({*cable.cuts, *corners(scene)})
     effort = effort or first_effort(scene)
     layout = None
-    if isinstance(scene.model, AdaptiveModel):
+    if isinstance(mesh, Layout):
+        layout, s, zones = mesh, mesh.nodes, mesh.zones
+    elif mesh is not None:
+        s, zones = mesh
+    elif isinstance(scene.model, AdaptiveModel):
         wanted = (*(scene.model.always_rod or ()), *(scene.model.always_catenary or ()))
         edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
         layout = _layout(scene, cable, sorted({*cuts, *edges}), effort)

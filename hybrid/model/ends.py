@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Literal, NamedTuple, Protocol
+from collections.abc import Mapping, Sequence
+from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
@@ -106,10 +106,38 @@ class EndConditions:
 
     def take_frames(self, old: EndConditions) -> None:
         """Stand at rest as other conditions do: what no scene says of a frame hangs on the shape it started from."""
-        self._given = (old._given[0].copy(), self._given[1])
-        self.values.frame[:] = old._given[0]
+        self._stand_at(old._given[0])
+
+    def _stand_at(self, frame: Floats) -> None:
+        self._given = (frame.copy(), self._given[1])
+        self.values.frame[:] = frame
         for k, motion in self.motions.items():
-            motion.turn_from(old._given[0][k].reshape(3, 3))
+            motion.turn_from(frame[k].reshape(3, 3))
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What hangs on the shape that the run started from, and where the ends are."""
+        turns = np.zeros((2, 4))
+        for k, (axis, angle) in self._turns.items():
+            turns[k] = [*axis, angle]
+        ramps = np.array([x.ramp or 0.0 for x in self._loads])
+        given = {"frame": self._given[0], "turns": turns, "bring_in": self._bring_in, "ramps": ramps}
+        return given | {"position": self.values.position}
+
+    def restore(self, saved: Mapping[str, Any], t: float) -> float:
+        """Go on at t (s) as `checkpoint` has said; ValueError where that cannot be.
+
+        Returns the distance (m) of an end from where it was then: 0 if it moves as before.
+        """
+        if not (saved["bring_in"] > 0.0 and saved["ramps"].min(initial=0.0) >= 0.0):
+            raise ValueError("a time that is not positive")
+        self._stand_at(saved["frame"])
+        self._turns = {k: (x[:3], float(x[3])) for k, x in enumerate(saved["turns"]) if x[3]}
+        self._bring_in = saved["bring_in"]
+        ramps = saved["ramps"].tolist()
+        self._loads = tuple(x._replace(ramp=ramp or None) for x, ramp in zip(self._loads, ramps, strict=True))
+        self.set_loads(t)
+        self.at(t)
+        return float(np.abs(saved["position"] - self.values.position).max())
 
     def at(self, t: float) -> Ends:
         """Positions, frames and loads at t; the arrays returned are overwritten by the next call.

@@ -26,12 +26,13 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Job
 from hybrid.simulation.error_control import Climb, Errors, Sketch, comparison_efforts, summary, survey_effort
-from hybrid.simulation.freeze import freeze
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.restart import Remainder, remainder
+from hybrid.simulation.restore import refused
 from hybrid.simulation.undersampling import undersampled_end_forces
-from hybrid.store.checkpoint import claimed
 from hybrid.store.format import Field
+from hybrid.store.lock import locked
+from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import amend, check_target
 
@@ -64,12 +65,12 @@ def run(
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import run_shooting
 
-        with claimed(_path(output)):
+        with locked(_path(output)):
             return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
     job, target = Job(scene, criterion), _target(output, overwrite)
-    with claimed(_path(output)), _working(job, progress):
+    with locked(_path(output)), _working(job, progress):
         if isinstance(target, Path):
             _beside(target).unlink(missing_ok=True)  # of a run that was cut off
         _run(job, target)
@@ -101,7 +102,7 @@ def resume(
         open_result(path)  # which says what is there instead
     if target != path:
         check_target(target, True)
-    with claimed(path), claimed(target if target != path else None):
+    with locked(path), locked(target if target != path else None):
         left = remainder(path, until, settings, start)
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
@@ -117,7 +118,7 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
     scene, begin = job.scene, clock.process_time()
     assert scene.time is not None
     anew = left is None or left.anew
-    climb = left.climb if left is not None else None
+    climb: Climb | None = None
 
     def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
         if anew or source is None or isinstance(to, io.BytesIO):
@@ -129,8 +130,8 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
             return job.go_on(to, to, kept())
         return job.record(effort, to, kept())
 
-    def kept() -> bytes:
-        return freeze(climb) if climb is not None else b""
+    def kept() -> Tree:
+        return climb.checkpoint() if climb is not None else {}
 
     effort = first_effort(scene) if left is None else left.effort
     if not wants_errors(scene):
@@ -138,14 +139,15 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
         return
     compute = _kept(target, first, later)
     try:
-        if climb is not None:
-            climb.sketch, climb.result = job.sketch, compute
+        steps_are_free = scene.time.controlled and scene.time.tolerance is None
+        climb = Climb(
+            asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
+        )
+        if left is not None and left.before:
+            with refused(source or Path()):
+                climb.restore(left.before, scene)
             final, errors = climb.go_on()
         else:
-            steps_are_free = scene.time.controlled and scene.time.tolerance is None
-            climb = Climb(
-                asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
-            )
             surveys = left is None and asked(scene) is not None
             _expect(job, effort, surveys and mesh_is_free(scene))
             if surveys:
@@ -187,11 +189,11 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import static_shooting
 
-        with claimed(_path(output)):
+        with locked(_path(output)):
             return static_shooting(scene, output, overwrite)
     job, begin = Job(scene, None), clock.process_time()
     target, effort = _target(output, overwrite), first_effort(scene)
-    with claimed(_path(output)):
+    with locked(_path(output)):
         if not wants_errors(scene):
             job.record_rest(effort, target)
             return open_result(target)

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Protocol
+from collections.abc import Mapping
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -52,6 +53,18 @@ class Correction:
         self.corrector.step(
             stepper, self.model.sea.values, ends, state, dt, before, rho, self._twisted.torque(ends, state)
         )
+
+    def checkpoint(self) -> dict[str, Any]:
+        """The error after the last step."""
+        watched = self._twisted if isinstance(self._twisted, _TurnOfEnds) else None
+        return {"error": self.corrector.error, "slid": self.corrector.slid, "twist": watched.twist if watched else 0.0}
+
+    def restore(self, saved: Mapping[str, Any], ends: Ends) -> None:
+        """Go on as `checkpoint` has said."""
+        self.ends, self.corrector.sea = ends, self.model.sea.values
+        self.corrector.error, self.corrector.slid = saved["error"], saved["slid"]
+        if isinstance(self._twisted, _TurnOfEnds):
+            self._twisted.twist = saved["twist"]
 
     def switch(self, model: Model) -> None:
         """Zones have changed: the error goes on from where it was."""

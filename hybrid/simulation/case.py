@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
-from hybrid.errors import ComputationError, ResultError
+from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.kernels.state import Floats
@@ -33,9 +33,9 @@ from hybrid.simulation.error_control import (
     survey_effort,
     survey_grading,
 )
-from hybrid.simulation.freeze import freeze, program, thaw
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import Phase, changes_text
+from hybrid.simulation.restore import effort_from, effort_tree, program, refused, restored_parts
 from hybrid.simulation.transient import Motion
 from hybrid.simulation.zone_switching import Zoning
 from hybrid.solve.statics import Equilibrium
@@ -43,6 +43,7 @@ from hybrid.solve.stepper import POWERS
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
 from hybrid.store.format import Field
 from hybrid.store.memory_recorder import Notebook
+from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import Result, is_result, open_result, opened
 from hybrid.store.writer import Recorder
 
@@ -76,40 +77,50 @@ class Job:
         self.results = 0  # that were begun
         self.interrupted: Callable[[], bool] = lambda: False
 
-    def record(self, effort: Effort, target: Path | io.BytesIO, climb: bytes = b"") -> Sketch:
-        """Compute the result into a file, or memory; what is to be compared of it.  climb: what was found before."""
+    def record(self, effort: Effort, target: Path | io.BytesIO, before: Tree | None = None) -> Sketch:
+        """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
         begin = self._begin_result(effort)
         model, equilibrium, zoning = self._model(effort)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
-        keeps = climb if isinstance(target, Path) else None
+        keeps = before or {} if isinstance(target, Path) else None
         recorder = _recorder(self.scene, model, observer, target, len(outputs), equilibrium, keeps, self._texts)
         recorder.files = self._files
         if zoning and zoning.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones fixed", HELD)
         with recorder:
             correction = _correction(model, zoning)
-            motion = Motion(self.scene, model, effort, observer, recorder, target, equilibrium, zoning, correction)
+            motion = Motion(self.scene, model, effort, observer, recorder, target, zoning, correction)
+            motion.begin(equilibrium)
             motion.save()
             motion.keep()
             self._finish(motion, outputs)
         return self._seen(motion, target, clock.process_time() - begin)
 
-    def go_on(self, source: Path, target: Path, climb: bytes = b"") -> Sketch:
+    def go_on(self, source: Path, target: Path, before: Tree | None = None) -> Sketch:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         with opened(source) as file:
             point = read_checkpoint(file)
-            if point is None:
-                raise ResultError(f"{source} has no checkpoint\n    try:      run its scene again")
-            motion = self._thawed(point, source)
-            begin = self._begin_result(motion.effort)
-            s = output_points(self.scene.output.points, motion.model.length)
-            observer = self._observer(motion.model, motion.zoning, s)
-            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts, climb)
-        now = self.changes[motion.changes - 1].scene if motion.changes else self.scene
-        motion.rejoin(now, observer, recorder, target)
+            self._check(point, source)
+            scenes = (self.scene, *(x.scene for x in self.changes))
+            with refused(source):
+                effort = effort_from(point.effort, self.scene)
+                begin = self._begin_result(effort)
+                model, zoning, correction = restored_parts(scenes, effort, point.state, self.criterion)
+                observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
+                now = scenes[point.state["changes"]]
+                motion = Motion(now, model, effort, observer, Notebook(), target, zoning, correction)
+                motion.restore(point.state)
+                if not point.t <= motion.t <= self.scene.require_time().duration:
+                    raise ValueError(f"t = {motion.t:g} s after an output at {point.t:g} s")
+            recorder = Recorder.again(file, target, observer.fields, STEP_FIELDS, point, self._texts, before or {})
+        motion.write_to(recorder)
         recorder.files = self._files
         with recorder:
+            if point.program != program():
+                wrote, this = (x.split()[0] for x in (point.program, program()))
+                text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
+                recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
             self._finish(motion, output_times(self.scene))
         return self._seen(motion, target, clock.process_time() - begin)
 
@@ -138,15 +149,18 @@ class Job:
         """Whether a file holds a run with this effort that was cut off."""
         if not is_result(source):
             return False
-        with opened(source) as file:
-            point = read_checkpoint(file)
         with open_result(source) as result:
             if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
                 return False
-        return point is not None and point.program == program() and point.effort == freeze(thaw(freeze(effort)))
+        try:
+            with opened(source) as file:
+                point = read_checkpoint(file)
+        except ResultError:
+            return False
+        return pack(point.effort) == pack(effort_tree(effort))
 
-    def _thawed(self, point: Checkpoint, source: Path) -> Motion:
-        """The motion of a checkpoint.  ResultError: its criterion is missing, or the ends move otherwise."""
+    def _check(self, point: Checkpoint, source: Path) -> None:
+        """ResultError: the criterion of a run is missing, or the files that it reads have changed."""
         if point.asks and self.criterion is None:
             advice = "hybrid.resume(path, criterion=...) with the function that it was run with"
             raise ResultError(f"{source} was computed with a criterion of its own\n    try:      {advice}")
@@ -155,25 +169,6 @@ class Job:
         if changed:
             detail = f"{', '.join(changed)}: other than when the run began"
             raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
-        effort = thaw(point.effort)
-        outside: dict[str, object] = {"recorder": None, "criterion": self.criterion}
-        before = None
-        for n, scene in enumerate((self.scene, *(x.scene for x in self.changes))):
-            ends = build(scene, effort).ends
-            if before is not None:
-                ends.take_frames(before)
-            outside |= {f"motion {n} {k}": x for k, x in ends.motions.items()}
-            before = ends
-        motion = thaw(point.state, outside)
-        if not isinstance(motion, Motion):
-            raise ResultError(f"{source} has a checkpoint that is no run\n    try:      run its scene again")
-        was = motion.model.ends.values.position.copy()
-        motion.model.ends.at(motion.t)
-        if not np.array_equal(was, motion.model.ends.values.position):
-            apart = float(np.abs(was - motion.model.ends.values.position).max())
-            detail = f"an end is {apart:.3g} m from where it was at t = {motion.t:.6g} s: has its motion file changed?"
-            raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
-        return motion
 
     def _finish(self, motion: Motion, outputs: Sequence[float]) -> None:
         """From where a motion is to its end, and close its file."""
@@ -212,7 +207,8 @@ class Job:
         if effort.every > 1:
             times = [*times[effort.every - 1 : -1 : effort.every], times[-1]]
         correction = _correction(model, zoning)
-        motion = Motion(self.scene, model, effort, observer, notebook, None, equilibrium, zoning, correction)
+        motion = Motion(self.scene, model, effort, observer, notebook, None, zoning, correction)
+        motion.begin(equilibrium)
         motion.save()
         self._move(motion, times)
         self._report(motion, finished=True)
@@ -247,6 +243,7 @@ class Job:
         with _recorder(self.scene, model, observer, target, 0, found) as recorder:
             ends = model.ends.at(np.inf)
             watch = Watch(recorder, model)
+            watch.begin()
             watch.equilibrium(found)
             watch.strain(0.0, found.state)
             watch.mesh(0.0, found.state)
@@ -386,7 +383,7 @@ def _recorder(
     target: Path | io.BytesIO,
     outputs: int,
     found: Equilibrium | None = None,
-    climb: bytes | None = None,
+    before: Tree | None = None,
     texts: Mapping[str, str] | None = None,
 ) -> Recorder:
     """The file of a result; whether it may be replaced was asked before anything was computed."""
@@ -404,7 +401,7 @@ def _recorder(
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, texts=texts or {"scene": scene_text(scene)}, fixed=fixed,
-        outputs=outputs + 1, overwrite=True, climb=climb,
+        outputs=outputs + 1, overwrite=True, before=before,
     )  # fmt: skip
     for s, text in _clamps_left_out(scene, model):
         recorder.event(0.0, s, s, "bending at clamp neglected", text)

@@ -59,6 +59,12 @@ TURNED = 0.01
 AT_REST = 1e-4
 # Inertia above this part of the load is a motion that has begun.
 LET_GO = 0.01
+NOWHERE: Floats = np.zeros((0, 3))
+# What a checkpoint holds of it as plain values.
+REMEMBERED = (
+    "_bend", "_twist", "_strain", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
+    "_rho", "_moved", "_steps", "_put_in", "_potential", "_alive",
+)  # fmt: skip
 
 Stop = tuple[Outcome, int] | None
 
@@ -81,9 +87,29 @@ class Watch:
         self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
         self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
-        for entry in model.ledger:
+
+    def begin(self) -> None:
+        """Note what the ledger says of the scene."""
+        for entry in self._model.ledger:
             if entry.event:
-                recorder.event(0.0, 0.0, model.length, entry.event, f"{entry.what}: {entry.why}")
+                self.recorder.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What has been noted so far, and what `finish` will judge by."""
+        worst = np.array(self._left).reshape(-1, 4)
+        return {name: getattr(self, name) for name in REMEMBERED} | {
+            "pulls": list(self._pulls), "worst": worst, "placed": self._placed if self._placed is not None else NOWHERE,
+        }  # fmt: skip
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+        vars(self).update({name: saved[name] for name in REMEMBERED})
+        places = self._model.line.s if self._model.layout is None else self._model.layout.base
+        placed, worst = saved["placed"], saved["worst"]
+        if placed.shape not in (NOWHERE.shape, (places.size, 3)) or worst.shape[1:] != (4,) or len(worst) > SEVERAL:
+            raise ValueError("places of another line")
+        self._placed = placed if placed.size else None
+        self._pulls, self._left = tuple(saved["pulls"]), [tuple(x) for x in worst.tolist()]
 
     def follow(self, model: Model) -> None:
         """Watch the same line with other zones."""

@@ -9,8 +9,9 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from math import sqrt
+from typing import Any
 
 import numpy as np
 
@@ -18,7 +19,12 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.mesh_grading import Grading, grading
-from hybrid.model.resolution import Asked, Effort
+from hybrid.model.plan import output_times
+from hybrid.model.resolution import Asked, Effort, first_effort
+from hybrid.outputs.probes import output_points
+from hybrid.scene.schema import Scene
+from hybrid.simulation.restore import effort_from, effort_tree
+from hybrid.store.named_arrays import Tree, matched
 
 # The order that errors are taken to fall with, where three runs do not show it, and what they may show.  A smooth
 # motion has 2, contact and blows have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.
@@ -82,6 +88,43 @@ class Sketch:
             (float(np.linalg.norm(self.values[x], axis=1).max()) for x in END_FORCES if x in self.values), default=0.0
         )
 
+    def checkpoint(self) -> Tree:
+        """All of it, as named arrays and plain values."""
+        return {x.name: getattr(self, x.name) for x in fields(self)} | {"effort": effort_tree(self.effort)}
+
+
+def sketch_from(tree: Any, scene: Scene, outputs: int) -> Sketch:
+    """A sketch from a checkpoint; outputs: of the result.  ResultError or ValueError: it is none of this scene."""
+    blank = Sketch(first_effort(scene), {}, 1, 1, 0.0).checkpoint()
+    saved = matched(tree, blank | dict.fromkeys(("effort", "values", "model_error", "notes")), "run")
+    if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
+        raise ValueError("a run without cells, steps or outputs")
+    count = _thin(outputs, saved["every"]).size
+    return Sketch(
+        **saved | {
+            "effort": effort_from(saved["effort"], scene), "values": arrays_from(saved["values"], scene, count),
+            "model_error": arrays_from(saved["model_error"], scene, count), "notes": notes_from(saved["notes"]),
+        }
+    )  # fmt: skip
+
+
+def arrays_from(tree: Any, scene: Scene, count: int) -> dict[str, np.ndarray]:
+    """Outputs (count, ...) by name from a checkpoint.  ResultError: they are of another shape."""
+    ns, points = output_points(scene.output.points, scene.length).size, {"position": (3,)}
+    template = {}
+    for name, value in tree.items():
+        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else (count, ns)
+        scalar = name == "position" and np.ndim(value) == 2  # of an error, its size
+        template[name] = np.zeros((*full, *(() if scalar else points.get(name, ()))))
+    if not set(tree) <= {*COMPARED, *END_FORCES.values()}:
+        raise ValueError(f"outputs that are not compared: {', '.join(tree)}")
+    return dict(matched(tree, template, "outputs"))
+
+
+def notes_from(tree: Any) -> tuple[tuple[str, str], ...]:
+    """Events, kind and text, from a checkpoint."""
+    return tuple((kind, text) for kind, text in matched(tree, [["", ""]] * len(tree), "notes"))
+
 
 @dataclass(frozen=True)
 class Errors:
@@ -125,6 +168,25 @@ class Estimate:
                 continue
             change = final.at(name, coarse.every) - coarse.values[name]
             self.cells[name] = self._of_cells(name, _spread(change, len(final.values[name]), coarse.every), coarse)
+
+    def checkpoint(self) -> Tree:
+        """All of it, as named arrays and plain values."""
+        found = {"order": self.order, "late": self.late, "cells": self.cells, "model": self._model, "notes": self.notes}
+        return found | {"run": self.run.checkpoint()}
+
+    @classmethod
+    def restored(cls, tree: Any, scene: Scene, outputs: int) -> Estimate:
+        """An estimate from a checkpoint.  ResultError or ValueError: it is none of this scene."""
+        self = cls.__new__(cls)
+        self.run, self.notes = sketch_from(tree["run"], scene, outputs), notes_from(tree["notes"])
+        self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
+        late, cells, model = (arrays_from(tree[name], scene, outputs) for name in ("late", "cells", "model"))
+        self.late, self.cells, self._model = late, cells, model
+        if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
+            raise ValueError("errors of outputs that are not there")
+        if not all(ORDERS[0] <= p <= ORDERS[1] for p in self.order.values()):
+            raise ValueError("orders that no errors have")
+        return self
 
     def _of_cells(self, name: str, change: np.ndarray, before: Sketch) -> np.ndarray:
         """What cells make wrong, by a change since a run with others: less what steps have changed."""
@@ -330,8 +392,8 @@ class Climb:
     """Chooses efforts until what is asked is met.
 
     asked: None asks for an error figure alone.  sketch: computes with an effort, for comparison; result: computes
-    the result; both raise ComputationError.  What it has found until then is in the file of every result (`freeze`
-    leaves out what computes), so that a climb that was cut off goes on with `go_on`.
+    the result; both raise ComputationError.  What it has found until then is in the file of every result, so that a
+    climb that was cut off goes on with `go_on`.
     """
 
     asked: Asked | None
@@ -349,8 +411,30 @@ class Climb:
     _finer: int = 0  # results that were judged
     _notes: list[tuple[str, str]] = field(default_factory=list)
 
-    def __getstate__(self) -> dict[str, object]:
-        return {name: x for name, x in vars(self).items() if name not in ("sketch", "result")}
+    def checkpoint(self) -> Tree:
+        """What it has found until now, as named arrays and plain values."""
+        return {
+            "runs": np.array(self.runs), "next": self.next and effort_tree(self.next),
+            "coarse": self.coarse and [x and x.checkpoint() for x in self.coarse],
+            "estimate": self.estimate and self.estimate.checkpoint(),
+            "ratio": self._ratio, "finer": self._finer, "notes": self._notes,
+        }  # fmt: skip
+
+    def restore(self, tree: Mapping[str, Any], scene: Scene) -> None:
+        """Go on as `checkpoint` has said.  ResultError or ValueError: it is none of this scene."""
+        template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0}
+        saved = matched(tree, template | dict.fromkeys(("next", "coarse", "estimate", "notes")), "error control")
+        outputs = len(output_times(scene)) + 1
+        self.runs, self._ratio, self._finer = saved["runs"].tolist(), saved["ratio"], saved["finer"]
+        self._notes = list(notes_from(saved["notes"]))
+        self.next = effort_from(saved["next"], scene) if saved["next"] is not None else None
+        if saved["coarse"] is not None:
+            first, second, third = (x and sketch_from(x, scene, outputs) for x in saved["coarse"])
+            self.coarse = first, second, third
+        if saved["estimate"] is not None:
+            self.estimate = Estimate.restored(saved["estimate"], scene, outputs)
+        if self.next is None and self.estimate is None:
+            raise ValueError("neither a result nor one that is to come")
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:

@@ -31,24 +31,27 @@ Note = Callable[[int, str, str], None]
 class Flat:
     """The plane of a motion, for as long as there is one."""
 
-    def __init__(self, scene: Scene, model: Model, state: State, note: Note) -> None:
+    def __init__(self, scene: Scene) -> None:
         self.insists = scene.dimension == 2
         self.push: Push | None = None
-        self.model = model
+
+    def begin(self, model: Model, state: State, note: Note) -> Model:
+        """The model that the motion begins with, in the plane if it is in one; what leaves the plane is noted."""
         if model.plane is None:
-            return
+            return model
         out = np.abs((state.r - state.r[0]) @ model.plane[2])
         if not self.insists and out.max() > IN_PLANE * model.length:
             text = "the equilibrium found leaves the plane of the scene: it goes on in space"
             note(int(np.argmax(out)), "out of plane", text)
-            self.model = replace(model, plane=None)
-            return
-        self.model = replace(model, line=planar(model.line, model.plane))
-        n = model.plane[2]
+            return replace(model, plane=None)
+        plane = model.plane
+        model = replace(model, line=planar(model.line, plane))
+        n = plane[2]
         for x, origin in ((state.r, state.r[0].copy()), (state.e, np.zeros(3))):  # what Newton's tolerance has left
             x -= np.outer((x - origin) @ n, n)
-        untwist(self.model.line, model.ends.values, model.cable.held_tangent, state)
+        untwist(model.line, model.ends.values, model.cable.held_tangent, state)
         self.push = Push(model.line, model.length, model.time_scale)
+        return model
 
     def carry(self, stepper: Stepper) -> None:
         """Let the push go along with the steps of a (new) stepper."""

@@ -19,9 +19,9 @@ from hybrid.model.resolution import Effort
 from hybrid.scene.motion import check_motions
 from hybrid.scene.read import parse_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.error_control import Climb
-from hybrid.simulation.freeze import program, thaw
-from hybrid.store.checkpoint import Checkpoint, climb_of, read_checkpoint
+from hybrid.simulation.restore import effort_from, refused
+from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
+from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import open_result, opened
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
@@ -45,14 +45,14 @@ class Phase:
 class Remainder:
     """What is to be done: a scene, what changes later, and where to begin.
 
-    climb: what the run is part of, as it was; None: it begins anew, with `effort`.  anew: from t = 0, not from the
-    checkpoint; reached: s, where it begins.
+    before: what was found before the run, of what it is part of; {}: nothing, it begins with `effort`.  anew: from
+    t = 0, not from the checkpoint; reached: s, where it begins.
     """
 
     scene: Scene
     changes: tuple[Phase, ...]
     effort: Effort
-    climb: Climb | None
+    before: Tree
     anew: bool
     reached: float
 
@@ -64,20 +64,13 @@ def remainder(
 
     ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
     """
-    scene, changes, status, climb, point = _found(path)
-    if point.program != program():
-        wrote, this = (x.split()[0] for x in (point.program, program()))
-        said = f"{path} was computed by hybrid-cable {wrote}" + " in another state" * (wrote == this)
-        why = f"this is {this}, whose numbers may differ: a run goes on with the program that began it"
-        raise ResultError(f"{said}\n    detail:   {why}\n    try:      that version, or run its scene again")
-    effort = thaw(point.effort)
-    before = thaw(climb) if climb else None
-    if not (isinstance(effort, Effort) and isinstance(before, Climb | None)):
-        raise ResultError(f"{path} has a checkpoint that is no run\n    try:      run its scene again")
+    scene, changes, status, before, point = _found(path)
+    with refused(path):
+        effort = effort_from(point.effort, scene)
     if start is not None and not settings:
         raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
-        if status == "complete" and not climb:
+        if status == "complete" and not before:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
         return Remainder(scene, changes, effort, before, False, point.t)
@@ -95,7 +88,7 @@ def remainder(
         if end != scene.require_time().duration:
             scene, changes = _longer(scene, changes, end, point.t)
         changes, anew = (*changes, Phase(begin, changed)), begin < point.t
-    return Remainder(scene, changes, effort, None, anew, 0.0 if anew else point.t)
+    return Remainder(scene, changes, effort, {}, anew, 0.0 if anew else point.t)
 
 
 def changes_text(changes: Sequence[Phase]) -> str:
@@ -103,9 +96,9 @@ def changes_text(changes: Sequence[Phase]) -> str:
     return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
 
 
-def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, bytes, Checkpoint]:
+def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, Tree, Checkpoint]:
     with opened(path) as file:
-        climb, point = climb_of(file), read_checkpoint(file)
+        before, point = read_before(file), read_checkpoint(file)
         with open_result(path) as result:
             scene = parse_scene(result.scene_text)
             status = result.status
@@ -115,12 +108,7 @@ def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, bytes, Checkpoint
             except (ValueError, TypeError, KeyError) as error:
                 advice = f"    detail:   {error}\n    try:      run its scene again"
                 raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
-    if point is None:
-        why = "it is an equilibrium, was kept in memory first, or ended before its first output"
-        raise ResultError(
-            f"{path} has no checkpoint to go on from\n    detail:   {why}\n    try:      run its scene again"
-        )
-    return scene, changes, status, climb, point
+    return scene, changes, status, before, point
 
 
 def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float) -> tuple[Scene, tuple[Phase, ...]]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from math import sqrt
 from pathlib import Path
@@ -16,7 +16,7 @@ from hybrid.adapt.manager import Change
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.report import BEND, CONTACT_WORK, FORCE_A, FRICTION_WORK, SEABED_ENERGY, TWIST_NODE
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, State, blank_state
 from hybrid.model.build import Model, build
 from hybrid.model.plan import step_ends
 from hybrid.model.plane import in_space, planar
@@ -26,20 +26,23 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Stop, Watch
-from hybrid.simulation.freeze import freeze, program, thaw
 from hybrid.simulation.plane_monitor import Flat
+from hybrid.simulation.restore import effort_tree, mesh_tree, program
 from hybrid.simulation.snapshot import write_snapshot
 from hybrid.simulation.zone_switching import Zoning, on_layout
+from hybrid.solve.plane_stability import Push
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.step_control import Controller
 from hybrid.solve.stepper import POWERS, Stepper, Taken
 from hybrid.store.memory_recorder import Notebook
+from hybrid.store.named_arrays import matched
 from hybrid.store.writer import Recorder
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 MOST_RESCUES = 20  # of one step, by more rod
 CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
-OUTSIDE = ("scene", "observer", "recorder", "target")  # of a motion: what a checkpoint does not hold
+REMEMBERED = ("t", "dt", "steps", "iterations", "changes", "_stored", "_beyond")  # plain values of a checkpoint
+SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 
 
@@ -54,13 +57,11 @@ class Motion:
         observer: Observer,
         recorder: Recorder | Notebook,
         target: Path | io.BytesIO | None,
-        equilibrium: Equilibrium | None,
         zoning: Zoning | None = None,
         correction: Correction | None = None,
     ) -> None:
         """target: the file of the result, beside which a failure leaves a snapshot; None: a run to compare with, which
-        leaves none and is not watched."""
-        assert scene.time is not None
+        leaves none and is not watched.  `begin` or `restore` gives it a state."""
         self.scene, self.model, self.observer, self.recorder, self.target = scene, model, observer, recorder, target
         floor = model.slack_floor if model.slack == "stop" else -np.inf
         self.correction, self._beyond = correction, -np.inf
@@ -75,6 +76,15 @@ class Motion:
         self.work = [0.0] * len(POWERS)
         self._loaded = [any(abs(x - s) < 1e-9 * model.length for x in model.attached) for s in (0.0, model.length)]
         self._stored = 0.0  # J, in the seabed
+        self.flat = Flat(scene)
+        self.state = self.spare = model.start
+        self.power = [0.0] * CONTACT
+
+    def begin(self, equilibrium: Equilibrium | None) -> None:
+        """From an equilibrium, or from the shape that the scene gives."""
+        model, scene = self.model, self.scene
+        assert scene.time is not None
+        self.watch.begin()
         if equilibrium is None:
             self.state = model.start.copy()
             self._bring_ends_in()
@@ -83,9 +93,9 @@ class Motion:
         else:
             self.state = equilibrium.state.copy()
             self.watch.equilibrium(equilibrium)
-        self.flat = Flat(scene, model, self.state, lambda node, kind, text: self.watch.note(self.t, node, kind, text))
-        if self.flat.model is not model:
-            self._on(self.flat.model)
+        begun = self.flat.begin(model, self.state, lambda node, kind, text: self.watch.note(0.0, node, kind, text))
+        if begun is not model:
+            self._on(begun)
         self._ignite()
         if self.zoning is not None:
             self.zoning.begin(model.ends.values, self.state)
@@ -98,42 +108,72 @@ class Motion:
         self._look(self.watch.still(model.ends.values, self.state))
         if scene.time.rho_inf == 1.0 and not model.line.ck.all():
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
-            recorder.event(0.0, 0.0, model.length, "undamped", text)
+            self.recorder.event(0.0, 0.0, model.length, "undamped", text)
 
-    def __getstate__(self) -> dict[str, Any]:
-        """What `rejoin` does not give it."""
-        return {name: x for name, x in vars(self).items() if name not in OUTSIDE} | {
-            "cpu": clock.process_time() - self.cpu, "first_energy": self.observer.first_energy,
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next steps hang on, between two steps: named arrays and plain values (simulation.restore)."""
+        model, push = self.model, self.flat.push
+        plain = {name: getattr(self, name) for name in REMEMBERED} | {
+            "cpu": clock.process_time() - self.cpu, "first_energy": self.observer.first_energy or 0.0,
+            "floor": self.stepper.floor, "work": np.array(self.work), "power": np.array(self.power),
+        }  # fmt: skip
+        parts: dict[str, Any] = {
+            "ends": model.ends, "watch": self.watch, "control": self.control, "zoning": self.zoning,
+            "correction": self.correction,
+        }  # fmt: skip
+        return plain | {name: x.checkpoint() if x is not None else None for name, x in parts.items()} | {
+            "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
+            "push": push.checkpoint(self.state) if push is not None else None,
         }  # fmt: skip
 
-    def rejoin(self, scene: Scene, observer: Observer, recorder: Recorder | Notebook, target: Path) -> None:
-        """Go on after a checkpoint, with what was not in it."""
-        self.scene, self.observer, self.recorder, self.target = scene, observer, recorder, target
-        self.cpu = clock.process_time() - self.cpu
-        observer.first_energy = self.__dict__.pop("first_energy")
-        self.watch.recorder = recorder
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has said, on a model that was made for it; ValueError or ResultError where that cannot
+        be."""
+        model = self.model
+        if saved["push"] is not None and model.plane is not None:
+            self.flat.push = Push(model.line, model.length, model.time_scale)
+        self._on(model)
+        self.state = blank_state(model.cells)
+        saved = matched(saved, self.checkpoint() | {"mesh": None, "plane": None, "first_energy": 0.0}, "state")
+        vars(self).update({name: saved[name] for name in REMEMBERED})
+        self.cpu = clock.process_time() - saved["cpu"]
+        self.observer.first_energy = saved["first_energy"]
+        self.work, self.power = saved["work"].tolist(), saved["power"].tolist()
+        self.state, self.stepper.floor = State(**saved["state"]), saved["floor"]
+        self.spare = self.state.copy()
+        self.watch.restore(saved["watch"])
+        model.sea.at(self.t)
+        apart = model.ends.restore(saved["ends"], self.t)
+        if apart > SAME_PLACE * model.length:
+            moved = f"an end is {apart:.3g} m from where it was at t = {self.t:.6g} s: has its motion file changed?"
+            raise ValueError(moved)
+        if self.control is not None:
+            self.control.restore(saved["control"])
+        if self.flat.push is not None:
+            self.flat.push.restore(saved["push"], self.state)
+        if self.zoning is not None:
+            self.zoning.restore(saved["zoning"])
+        if self.correction is not None:
+            self.correction.restore(saved["correction"], model.ends.values)
+
+    def write_to(self, recorder: Recorder) -> None:
+        """Write to a recorder from now on."""
+        self.recorder = self.watch.recorder = recorder
 
     def keep(self, at_once: bool = False) -> None:
         """Bring the file up to date, with a checkpoint at the output just written, if it is time to (or `at_once`)."""
         recorder = self.recorder
         if not isinstance(recorder, Recorder) or not (at_once or recorder.due):
             return
-        if isinstance(self.target, Path):
-            asks = self.zoning is not None and self.zoning.manager.user is not None
-            recorder.flush(program(), asks, lambda: (freeze(thaw(freeze(self.effort))), freeze(self, self.outside)))
-        else:
-            recorder.flush()
+        recorder.flush(self._content if isinstance(self.target, Path) else None)
 
-    @property
-    def outside(self) -> dict[str, object]:
-        """What a checkpoint names but does not hold: it is made anew from the scene."""
-        manager = self.zoning.manager if self.zoning is not None else None
-        motions = {f"motion {self.changes} {k}": motion for k, motion in self.model.ends.motions.items()}
-        return {"recorder": self.recorder, "criterion": manager and manager.user, **motions}
+    def _content(self) -> dict[str, Any]:
+        asks = self.zoning is not None and self.zoning.manager.user is not None
+        return {"program": program(), "asks": asks, "effort": effort_tree(self.effort), "state": self.checkpoint()}
 
     def _on(self, model: Model) -> None:
         """Go on with another line on the same nodes: in a plane, or in space."""
-        self.model = self.flat.model = model
+        self.model = model
         if self.zoning is not None:
             self.zoning.model = model
         self.watch.follow(model)
@@ -238,7 +278,7 @@ class Motion:
     def change(self, scene: Scene) -> None:
         """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
         old, flat = self.model, self.flat
-        model = build(scene, self.effort)
+        model = build(scene, self.effort, old.mesh)
         if self.zoning is not None:
             model = on_layout(model, self.zoning.manager.layout)
             self.zoning.settle_joints(self.state)

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -25,6 +27,7 @@ from hybrid.model.plane import planar, untwist
 from hybrid.simulation.bending_correction import Correction
 from hybrid.solve.statics import Equilibrium, solve_statics
 from hybrid.solve.stepper import Stepper
+from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
 LETTING_GO = 1.0
@@ -211,6 +214,32 @@ class Zoning:
     def torque(self, ends: Ends, state: State) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
         return self.manager.torque
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What is under way: bending, lengths, moments at joints, and what the manager remembers."""
+        line, x = self.model.line, self.relaxing
+        return {
+            "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
+            "strain": self.strain, "joints": self.joints and self.joints.checkpoint(),
+            "relaxing": x and {"lack": x.lack, "rate": x.rate, "since": x.since, "keeps": x.keeps},
+        }  # fmt: skip
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has said; ValueError or ResultError where that cannot be."""
+        line, relaxing, strain = self.model.line, saved["relaxing"], saved["strain"]
+        self.manager.restore(saved["manager"])
+        if self.joints is not None:
+            self.joints.restore(saved["joints"])
+        if not (
+            saved["h"].min() > 0.0 and saved["kb"].min() >= 0.0 and strain.shape in (NO_STRAIN.shape, line.kb.shape)
+        ):
+            raise ValueError("lengths, stiffness or strains that no line has")
+        if relaxing is not None:
+            cells = np.zeros(line.h.size)
+            template = {"lack": cells, "rate": cells, "since": cells - np.inf, "keeps": cells > 0.0}
+            self.relaxing = Relaxing(**matched(relaxing, template, "relaxing"))
+        line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
+        self.lengths, self.strain = line.h.copy(), strain
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""

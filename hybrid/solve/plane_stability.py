@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from hybrid.kernels.state import Floats, Line, State
@@ -24,6 +27,18 @@ class Push:
         self._pair = (self._seed(line.s), np.zeros((line.s.size, 4)))
         self._led: State | None = None  # the state that the step to `now` has led to
         self._energy = np.nan  # of the push when it was given, J; unknown before its first step
+
+    def checkpoint(self, state: State) -> dict[str, Any]:
+        """The push and what is known of its growth; state: that of the motion now."""
+        energy = self._energy if self._energy > 0.0 else 0.0
+        return {"pair": np.array(self._pair), "unit": self._unit, "energy": energy, "led": self._led is state}
+
+    def restore(self, saved: Mapping[str, Any], state: State) -> None:
+        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+        self._pair, self._unit, self._energy = tuple(saved["pair"]), saved["unit"], saved["energy"] or np.nan
+        self._led = state if saved["led"] else None
+        if not self._unit > 0.0:
+            raise ValueError("a push of no size")
 
     def _seed(self, s: Floats) -> Floats:
         """Velocities of the size of the unit, and nothing else."""

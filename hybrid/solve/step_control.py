@@ -7,7 +7,9 @@ jumps about, as it does over contact.  docs/theory.md, 2.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from math import ceil
+from typing import Any
 
 # Share of the tolerance aimed at: steps that come out a little worse than predicted still pass.
 SAFETY = 0.8
@@ -37,6 +39,16 @@ class Controller:
         self.most = float("inf")  # s, for the time being
         self._before = 1.0  # error over tolerance of the last accepted step
         self._wary = 0
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next steps hang on."""
+        return {"next": self.next, "before": self._before, "wary": self._wary}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+        self.next, self._before, self._wary = saved["next"], saved["before"], saved["wary"]
+        if not (self.smallest <= self.next <= self.largest and self._before > 0.0 and 0 <= self._wary <= WARY):
+            raise ValueError("steps that no controller chooses")
 
     def until(self, t: float, stop: float) -> float:
         """Where the next step from t should end, so that equal steps would end at `stop`."""

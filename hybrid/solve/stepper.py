@@ -70,8 +70,6 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
     return np.asarray(sea.slip_length * ((parts[0] / size)[:, None] * sea.axis + (parts[1] / size)[:, None] * side))
 
 
-# Work arrays by name, and those of them that hold nothing from one step to the next.
-WORKSPACE, SCRATCH = ("W", "X", "x", "report", "rows", "gaps"), ("W", "X", "x", "rows")
 OK, OUTCOMES = int(Outcome.OK), {int(x): x for x in Outcome}
 
 
@@ -85,20 +83,11 @@ class Stepper:
         self.line = line
         self.reach, self.scale = REACH * length, tension_scale
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        n, self.keep = line.h.size, keep
+        n = line.h.size
         self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n, keep)
         self.u = np.zeros((n + 1, 3))
         self.push: Push | None = None  # out of the plane, of a planar motion that is watched
         self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
-
-    def __getstate__(self) -> dict[str, object]:
-        """All but what every step writes before it reads it, which is most of it."""
-        return {name: x for name, x in vars(self).items() if name not in SCRATCH}
-
-    def __setstate__(self, state: dict[str, object]) -> None:
-        vars(self).update(state)
-        made = dict(zip(WORKSPACE, workspace(self.line.h.size, self.keep), strict=True))
-        vars(self).update({name: made[name] for name in SCRATCH})
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.

@@ -29,7 +29,8 @@ import h5py
 import numpy as np
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.checkpoint import CLIMB, Checkpoint, copied, create_slots, names_in, write_checkpoint, write_climb
+from hybrid.store.checkpoint import BEFORE, Checkpoint, create_slots, write_before, write_slot
+from hybrid.store.copying import copied, names_in
 from hybrid.store.disk_space import ask_for_room
 from hybrid.store.format import (
     BLOCK,
@@ -49,6 +50,7 @@ from hybrid.store.format import (
     write_texts,
 )
 from hybrid.store.integrity import sign
+from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import is_result
 
 # Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
@@ -121,7 +123,7 @@ class Recorder:
     is its own name becomes a dimension scale (the arc lengths of some probes, say).
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
-    climb: bytes for whoever goes on with the run, of what was found before it; None: nobody can, it has no checkpoints.
+    before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
     """
 
     def __init__(
@@ -136,7 +138,7 @@ class Recorder:
         fixed: Sequence[tuple[Field, np.ndarray]] = (),
         outputs: int | None = None,
         overwrite: bool = False,
-        climb: bytes | None = None,
+        before: Tree | None = None,
     ) -> None:
         check_names(fields, step_fields, fixed)
         tables = tables_of(fields, step_fields)
@@ -147,8 +149,8 @@ class Recorder:
             create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
             for group, columns in tables.items():
                 create_table(file, group, columns, outputs if group in ("/", "zones") else None)
-            if climb is not None:
-                create_slots(file, climb)
+            if before is not None:
+                create_slots(file, before)
 
         path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
         if isinstance(target, io.BytesIO):
@@ -163,7 +165,7 @@ class Recorder:
     @classmethod
     def again(
         cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
-        texts: Mapping[str, str], climb: bytes,
+        texts: Mapping[str, str], before: Tree,
     ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
@@ -174,8 +176,12 @@ class Recorder:
         if missing:
             raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
 
+        scales = [f"{group}/{columns[0].name}".lstrip("/") for group, columns in tables.items()]
+        if list(at.rows) != scales or not at.rows["t"] or source["t"][at.rows["t"] - 1] != at.t:
+            advice = "its rows are not those of the file\n    try:      run its scene again"
+            raise ResultError(f"{source.filename} has a checkpoint that does not fit\n    detail:   {advice}")
         ours = {f.name for f in fields}
-        later = {x for x in names_in(source, "errors") if x not in ours} | {CLIMB}  # known only when all is done
+        later = {x for x in names_in(source, "errors") if x not in ours} | {BEFORE}  # known only when all is done
 
         def fill(new: Path) -> None:
             ask_for_room(new, Path(source.filename).stat().st_size, "")
@@ -183,7 +189,7 @@ class Recorder:
             with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
                 set_status(file, "running", "")
                 write_texts(file, texts)
-                write_climb(file, climb)
+                write_before(file, before)
                 for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
                     del file.attrs[name]
 
@@ -274,43 +280,32 @@ class Recorder:
                 row = (max(self.last, 0.0), 0.0, 0.0, OMITTED, text, kind, float(left), nan, nan)
                 self._events.rows.append(row)
 
-    def flush(
-        self, program: str = "", asks: bool = False, frozen: Callable[[], tuple[bytes, bytes]] | None = None
-    ) -> None:
-        """Write what is held back, for readers to see; frozen: makes effort and state from which `program`
-        goes on, with a criterion of the user's if it `asks`."""
+    def flush(self, content: Callable[[], Mapping[str, Any]] | None = None) -> None:
+        """Write what is held back, for readers to see; content: makes `program`, `asks`, `effort` and `state` of a
+        checkpoint."""
         begin = monotonic()
-        point = None
-        if frozen is not None:
+        packed = b""
+        if content is not None:
             rows = {table.scale: table.count + len(table.rows) for table in self._all}
-            point = Checkpoint(
-                self._number,
-                self.last,
-                program,
-                asks,
-                dict(self.files),
-                rows,
-                dict(self._happened),
-                self._zones or [],
-                *frozen(),
-            )
-        self._write([self._events, self._zone_rows, self._steps, self._outputs], point)
-        if point is not None:
+            here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
+            packed = pack({**here, "happened": self._happened, "zones": self._zones or [], **content()})
+        self._write([self._events, self._zone_rows, self._steps, self._outputs], packed)
+        if packed:
             self._number += 1
             os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
         self._flushed = monotonic()
         self._took = self._flushed - begin
 
-    def _write(self, tables: Sequence[_Table], point: Checkpoint | None = None) -> None:
+    def _write(self, tables: Sequence[_Table], packed: bytes = b"") -> None:
         waiting = [table for table in tables if table.rows]
         if self.path is not None:
-            need = sum(table.room for table in waiting) + (len(point.state) if point is not None else 0)
-            ask_for_room(self.path, need, f", then `hybrid resume {self.path}`" if point is not None else "")
+            need = sum(table.room for table in waiting) + len(packed)
+            ask_for_room(self.path, need, f", then `hybrid resume {self.path}`" if packed else "")
         try:
             for table in waiting:
                 table.write()
-            if point is not None:
-                write_checkpoint(self._file, point)
+            if packed:
+                write_slot(self._file, self._number, packed)
             # HDF5 may write in any order between two flushes.  So: the data, then the scales that
             # say it is there, and t last, which says that the zones of the output are there too.
             self._file.flush()
@@ -384,7 +379,7 @@ def amend(
             new = where.with_name(f".{where.name}.{os.getpid()}.new")
             ask_for_room(where, where.stat().st_size, "")
             with h5py.File(where, "r", locking="best-effort") as old:
-                copied(old, new, _LIBVER, None, without={CLIMB} if done else ())
+                copied(old, new, _LIBVER, None, without={BEFORE} if done else ())
         with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
             for name, value in attributes.items():
                 file.attrs[name] = value

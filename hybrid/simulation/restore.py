@@ -1,0 +1,162 @@
+"""A run made again from its checkpoint: the model from scene and mesh, what moves its zones, how finely it is computed.
+
+A checkpoint holds named arrays and plain values alone.  What follows from the scene is made from the scene, and every
+number that is read is checked for its type, its shape and, where a wrong one would do harm, its size.
+"""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import fields, replace
+from functools import cache
+from importlib.metadata import version
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.adapt.manager import UserCriterion
+from hybrid.errors import ResultError
+from hybrid.kernels.compile import kernel_hash
+from hybrid.model.build import MOST_PARTS, Model, build, given_zones
+from hybrid.model.layout import Layout
+from hybrid.model.mesh import MOST_CELLS, Zone
+from hybrid.model.mesh_grading import Grading
+from hybrid.model.plane import in_space, planar
+from hybrid.model.resolution import Effort, first_effort
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.zone_switching import Zoning, manager_for, on_layout
+from hybrid.store.named_arrays import Tree, matched
+
+# Rooms that have a part in the numbers of a file.
+COMPUTES = ("adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
+# Times as fine or as coarse as the scene asks for that a run may be: far beyond what error control chooses.
+FARTHEST = 1e4
+
+
+@cache
+def program() -> str:
+    """Which program this is: version, and a hash of all that computes.  The same one gives the same bits."""
+    digest, package = hashlib.sha256(kernel_hash().encode()), Path(__file__).parents[1]
+    digest.update(f"scipy {version('scipy')} h5py {version('h5py')}".encode())
+    for file in sorted(package.rglob("*.py")):
+        if file.relative_to(package).with_suffix("").parts[0] in COMPUTES:
+            digest.update(file.read_bytes())
+    return f"{version('hybrid-cable')} {digest.hexdigest()[:16]}"
+
+
+@contextmanager
+def refused(source: Path) -> Iterator[None]:
+    """What a checkpoint raises that does not fit its scene, as a ResultError."""
+    try:
+        yield
+    except (ValueError, TypeError, KeyError, IndexError, AttributeError, ArithmeticError) as error:
+        detail = f"{type(error).__name__}: {error}".splitlines()[0]
+        raise ResultError(
+            f"{source} has a checkpoint that does not fit its scene\n    detail:   {detail}\n"
+            "    try:      run its scene again"
+        ) from error
+
+
+# --- how finely ---------------------------------------------------------------------------------
+
+
+def effort_tree(effort: Effort) -> Tree:
+    """An effort for a checkpoint."""
+    tree = {x.name: getattr(effort, x.name) for x in fields(effort)}
+    grading = effort.grading
+    return tree | {"grading": grading and {"s": grading.s, "density": grading.density}}
+
+
+def effort_from(tree: Any, scene: Scene) -> Effort:
+    """The effort again.  ResultError or ValueError: it is none for this scene."""
+    first = first_effort(scene)
+    saved = matched(tree, effort_tree(first) | {"grading": None}, "effort")
+    for name in ("fineness", "step", "local", "zones"):
+        asked, is_ = getattr(first, name), saved[name]
+        if (asked is None) != (is_ is None):
+            raise ValueError("steps that follow the motion in one place, fixed ones in the other")
+        if asked and not asked / FARTHEST <= is_ <= asked * FARTHEST:
+            raise ValueError(f"{name} = {is_:g}, where the scene asks for {asked:g}")
+    grading = saved["grading"]
+    if grading is not None:
+        grading = Grading(**matched(grading, {"s": np.zeros(0), "density": np.zeros(0)}, "grading"))
+        s, density = grading.s, grading.density
+        ordered = s.ndim == density.ndim == 1 and 1 < s.size == density.size and bool((np.diff(s) > 0.0).all())
+        within = ordered and 0.0 <= s[0] < s[-1] <= scene.length * (1 + 1e-9) and density.min() > 0.0
+        if not within or saved["fineness"] * density.max() * scene.length > MOST_CELLS:
+            raise ValueError("cells that no mesh has")
+    if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST):
+        raise ValueError("cells that no mesh has")
+    return Effort(**saved | {"grading": grading})
+
+
+# --- the model ----------------------------------------------------------------------------------
+
+
+def mesh_tree(model: Model) -> Tree:
+    """Where the nodes of a model are, and its zones, for a checkpoint."""
+    if model.layout is not None:
+        return model.layout._asdict()
+    return {"s": model.line.s, "zones": [[x.kind, x.s_a, x.s_b] for x in model.zones]}
+
+
+def restored_model(scene: Scene, effort: Effort, saved: Mapping[str, Any]) -> tuple[Model, Model]:
+    """The model of a checkpoint; before it, one of the same mesh whose zones are all rod."""
+    mesh, layout = saved["mesh"], None
+    if isinstance(scene.model, AdaptiveModel):
+        template = {"base": np.zeros(0), "parts": np.zeros(0, int), "rod": np.zeros(0, bool)}
+        layout = Layout(**matched(mesh, template, "mesh"))
+        _check_nodes(layout.base, scene)
+        fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
+        if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= MOST_PARTS):
+            raise ValueError("base cells that no mesh has")
+        first = build(scene, effort, layout._replace(rod=np.ones_like(layout.rod)))
+        model = on_layout(first, layout)
+    else:
+        s, zones = matched(mesh, {"s": np.zeros(0), "zones": None}, "mesh").values()
+        _check_nodes(s, scene)
+        zones = tuple(Zone(*zone) for zone in matched(zones, [["", 0.0, 0.0]] * len(zones), "zones"))
+        known = all(x.kind in ("rod", "catenary") and x.s_a < x.s_b for x in zones)
+        if not (known and zones and {x.s_b for x in zones} <= set(s.tolist()) and zones[-1].s_b == s[-1]):
+            raise ValueError("zones that no line has")
+        first = model = build(scene, effort, (s, zones))
+    plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None
+    line = in_space(model.line) if plane is None else planar(model.line, plane)
+    return first, replace(model, line=line, plane=plane)
+
+
+def _check_nodes(s: np.ndarray, scene: Scene) -> None:
+    whole = s.ndim == 1 and s.size > 1 and s[0] == 0.0 and abs(s[-1] - scene.length) <= 1e-9 * scene.length
+    if not (whole and (np.diff(s) > 1e-12 * scene.length).all() and s.size <= MOST_CELLS):
+        raise ValueError("nodes that are not those of the line")
+
+
+def restored_parts(
+    scenes: Sequence[Scene], effort: Effort, saved: Mapping[str, Any], criterion: UserCriterion | None
+) -> tuple[Model, Zoning | None, Correction | None]:
+    """What a motion consists of, as new: its model, what moves its zones, what follows its model error.
+
+    scenes: that of the start, and those of the changes; the one that holds is saved["changes"].
+    """
+    changes = matched(saved["changes"], 0, "changes")
+    if not 0 <= changes < len(scenes):
+        raise ValueError(f"change {changes} of {len(scenes) - 1}")
+    scene, zoning = scenes[changes], None
+    first, model = restored_model(scene, effort, saved)
+    wanted = scene.model
+    if isinstance(wanted, AdaptiveModel):
+        assert first.layout is not None and model.layout is not None
+        # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
+        start = first if not changes else build(scenes[0], effort, first.layout)
+        step = effort.step if effort.local is None else 0.0
+        given = given_zones(scene, first.layout)
+        manager = manager_for(start, effort.zones, wanted.dwell, given, step, criterion)
+        manager.moments = model.ends.moments
+        manager.loaded = bool(manager.moments.any())
+        manager.follow(model.layout)
+        zoning = Zoning(model, manager, loaded=wanted.joint == "curvature")
+    return model, zoning, Correction(model, zoning) if model.follows_error else None

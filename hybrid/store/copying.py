@@ -1,0 +1,75 @@
+"""Copies of result files: all rows or some, without what is left out, as a file that is whole and can be written to."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import h5py
+import numpy as np
+
+_BLOCK = 1 << 22  # bytes that are copied at a time
+
+
+def copied(
+    old: h5py.File, path: Path, libver: tuple[str, str], rows: Mapping[str, int] | None, without: Iterable[str] = ()
+) -> None:
+    """Copy a result to a new file; rows: of every table that are taken, by its scale (None: all that are complete)."""
+    left = set(without)
+    whole = [(name, data) for name, data in _datasets(old) if name not in left]
+    scales = [name for name, data in whole if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
+    kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
+    with h5py.File(path, "w", libver=libver, locking="best-effort") as new:
+        _annotations(old, new)
+        for name, data in whole:
+            _copied_dataset(data, new, name, kept)
+        for name in scales:
+            new[name].make_scale(_word(old[name].attrs.get("NAME", name)))
+        for name, data in whole:
+            for k, dim in enumerate(data.dims):
+                new[name].dims[k].label = dim.label
+                if dim.label in kept and dim.label != name:
+                    new[name].dims[k].attach_scale(new[dim.label])
+
+
+def names_in(file: h5py.File, group: str) -> list[str]:
+    """Names of all datasets in a group."""
+    return [name for name, _ in _datasets(file) if name.startswith(f"{group}/")]
+
+
+def _datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
+    found: list[tuple[str, h5py.Dataset]] = []
+    file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
+    if file.swmr_mode:
+        for _, data in found:
+            data.refresh()
+    return iter(found)
+
+
+def _copied_dataset(data: h5py.Dataset, new: h5py.File, name: str, kept: Mapping[str, int]) -> None:
+    first = data.dims[0].label if data.ndim else ""
+    count = min(kept.get(first, data.shape[0]), data.shape[0]) if data.ndim else 0
+    shape = (count, *data.shape[1:]) if data.ndim else ()
+    grows = data.chunks is not None
+    copy = new.create_dataset(
+        name, shape, data.dtype, maxshape=data.maxshape if grows else None, chunks=data.chunks if grows else None
+    )
+    if not data.ndim:
+        copy[()] = data[()]
+    else:
+        block = max(1, _BLOCK // max(1, data.dtype.itemsize * int(np.prod(data.shape[1:], dtype=int))))
+        for a in range(0, count, block):
+            copy[a : min(a + block, count)] = data[a : min(a + block, count)]
+    _annotations(data, copy)
+
+
+def _annotations(old: Any, new: Any) -> None:
+    """Attributes but those that HDF5 keeps for dimension scales."""
+    for key, value in old.attrs.items():
+        if key not in ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"):
+            new.attrs.create(key, value, dtype=old.attrs.get_id(key).dtype)
+
+
+def _word(value: Any) -> str:
+    return value.decode() if isinstance(value, bytes) else str(value)
