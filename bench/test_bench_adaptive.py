@@ -87,7 +87,7 @@ def test_adaptive_random(monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in range(200):
         kind, text = random_scene(seed)
         L, tolerance = length(text), text["model"]["tolerance"]
-        a, r = run(text), run(text, always_rod=[[0, L]])
+        a, r = run(text), run(text, force_rod=[[0, L]])
         assert a.status == "complete", seed
         assert lowest[0] > 0.0, seed
         ratio = apart(a, r) / L / tolerance
@@ -95,10 +95,10 @@ def test_adaptive_random(monkeypatch: pytest.MonkeyPatch) -> None:
         ratio_cpu.append(cpu(r) / cpu(a))
         if ratio > 2.0:
             # how well determined is the scene itself?  The rod with a tenth more cells, and with half the step
-            finer = run(text | {"mesh": {"cells": 66}}, always_rod=[[0, L]])
+            finer = run(text | {"mesh": {"cells": 66}}, force_rod=[[0, L]])
             shorter = copy.deepcopy(text)
             shorter["time"]["step"] /= 2
-            own = [apart(x, r) / L / tolerance for x in (finer, run(shorter, always_rod=[[0, L]]))]
+            own = [apart(x, r) / L / tolerance for x in (finer, run(shorter, force_rod=[[0, L]]))]
             worst.append((seed, kind, ratio, *own))
     x = np.array(ratios)
     print(f"\n200 random runs, distance to all rod over the tolerance: median {np.median(x):.2f}, ", end="")
@@ -120,7 +120,7 @@ def test_adaptive_suspension() -> None:
     """Error asked and achieved, rod share, CPU time; the suspension of Goyal and Perkins, let go from a straight line."""
     text = example("02_suspension") | {"mesh": {"cells": 40}}
     run(text)  # once for the compiler
-    r = run(text, kind="adaptive", always_rod=[[0, 2.0]])
+    r = run(text, kind="adaptive", force_rod=[[0, 2.0]])
     print("\nsuspension   asked (L)  achieved: at rest, on the way   rod share: begin, mean, end   CPU, all rod = 1")
     for asked in (1e-1, 5e-2, 2e-2, 1e-2, 3e-3, 1e-3):
         a = run(text, kind="adaptive", tolerance=asked)
@@ -166,7 +166,7 @@ LARGE = 0.1  # of the mean pull: a change that is counted
 def test_adaptive_switches(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """Length, mass, momentum to round-off; the pull at the ends from the step of a switch to the next; energy."""
     text = example(name)
-    r = run(text, always_rod=[[0, length(text)]])
+    r = run(text, force_rod=[[0, length(text)]])
     watched = Watched(monkeypatch)
     a = run(text)
     lost, mass, momentum, _ = np.abs(np.array(watched.rows)).max(axis=0)
@@ -352,7 +352,7 @@ def test_adaptive_speed(name: str) -> None:
         assert all(kinds.values()), f"{place:.2g} L, {pull:.1%}: not reached by {[k for k in kinds if not kinds[k]]}"
         rod, own = (min(kinds[k], key=lambda x: x[0]) for k in ("rod", "adaptive"))
         same = copy.deepcopy(own[3])
-        same["model"]["always_rod"] = [[0, L]]
+        same["model"]["force_rod"] = [[0, L]]
         rounds = [[cpu(run(x)) for x in (rod[3], own[3], same)] for _ in range(ROUNDS)]
         a, b, c = (median(x) for x in zip(*rounds, strict=True))
         print(
@@ -375,7 +375,7 @@ def test_adaptive_joints() -> None:
             text = example(name)
             text["model"] = {"kind": "adaptive", "tolerance": tolerance}
             L = length(text)
-            r = run(text, always_rod=[[0, L]])
+            r = run(text, force_rod=[[0, L]])
             cells = []
             for joint in ("spherical", "curvature"):
                 a = [run(text, joint=joint) for _ in range(3)]
@@ -491,13 +491,13 @@ def test_adaptive_limits(name: str) -> None:
     make, bound = LIMITS[name]
     text = make()
     L, tolerance = length(text), text["model"]["tolerance"]
-    r, a = run(text, always_rod=[[0, L]]), run(text)
+    r, a = run(text, force_rod=[[0, L]]), run(text)
     far = apart(a, r) / L / tolerance
     scheme = [float(np.abs(x["work/scheme"]).max()) for x in (a, r)]
     zones = float(np.abs(a["work/zones"]).max())
     said = f"\n{name:26s} {far:6.2f} tolerances; work/scheme {scheme[0]:.2g} J, all rod {scheme[1]:.2g} J, zones {zones:.2g} J"
     if name.startswith("stay"):
-        kept = run(text, always_rod=[[0, 3], [L - 3, L]])
+        kept = run(text, force_rod=[[0, 3], [L - 3, L]])
         said += f"; with rod at the clamps {apart(kept, r) / L / tolerance:.2f}"
         assert apart(kept, r) / L / tolerance < 1.0
     print(said)

@@ -148,7 +148,7 @@ def cases():
         )
         one, two = (
             plain.model_copy(update={"model": plain.model.model_copy(update=x)})
-            for x in ({"correct": True}, {"always_rod": ((0.0, plain.length),)})
+            for x in ({"correct": True}, {"force_rod": ((0.0, plain.length),)})
         )
         yield f"{name}, adaptive {tolerance:g}", plain, one, two
 
@@ -242,7 +242,7 @@ def test_model_error_correct_adaptive():
                 }
             )
             said, apart, rod = [], [], None
-            for update in ({"always_rod": ((0.0, scene.length),)}, {}, {"correct": True}):
+            for update in ({"force_rod": ((0.0, scene.length),)}, {}, {"correct": True}):
                 begin = time.process_time()
                 result = hybrid.run(scene.model_copy(update={"model": scene.model.model_copy(update=update)}))
                 took = time.process_time() - begin

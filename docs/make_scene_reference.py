@@ -15,7 +15,7 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
-from hybrid.scene.schema import Scene
+from hybrid.scene.schema import Scene, Table
 
 PAGE = Path(__file__).with_name("scene.md")
 
@@ -92,7 +92,7 @@ A table says its kind, and may have a `ramp`, the time over which the current gr
 environment:
   fluid:
     density: 1025
-    current: {kind: power_law, velocity: [0.8, 0, 0], top: 0, bottom: -100, exponent: 0.2, turn: 30}
+    current: {kind: power_law, velocity: [0.8, 0, 0], top: 0, bottom: -100, exponent: 0.2, veer: 30}
 cable:
   sections: [{length: 90, mass: 3.0, diameter: 0.03, axial_stiffness: 2.0e+7, drag: {normal: 1.2}}]
 ends:
@@ -115,7 +115,7 @@ environment:
     density: 1025
     surface: 0
     current: [{z: 0, velocity: [0.6, 0, 0]}, {z: -100, velocity: [0.1, 0, 0]}]
-    waves: {kind: jonswap, height: 3.0, period: 10.0, direction: 180, ramp: 20}
+    waves: {kind: jonswap, significant_height: 3.0, peak_period: 10.0, direction: 180, ramp: 20}
   seabed: {z: -100, stiffness: 2.0e+4, damping: 500, friction: {axial: 0.3, lateral: 0.5}}
 cable:
   sections:
@@ -123,7 +123,7 @@ cable:
   attachments:
     - {kind: float, at: 320, buoyancy: 2000, mass: 150, drag_area: 0.5, added_mass: 180}
     - {kind: clump, at: 200, mass: 300, volume: 0.04, drag_area: 0.2, added_mass: 40}
-    - {kind: modules, over: [330, 360], buoyancy: 50, mass: 12, drag_area: 0.2, added_mass: 20}
+    - {kind: modules, range: [330, 360], buoyancy: 50, mass: 12, drag_area: 0.2, added_mass: 20}
 ends:
   start: {kind: pinned, position: [0, 0, -100]}
   end:
@@ -182,7 +182,7 @@ model: catenary
 
 `model: adaptive`, or no `model` for a cable that bends: rod where bending, torsion or slack ask for it, catenary
 elsewhere, at every step anew; docs/zones.md says by which criteria.
-`tolerance` is a part of the length; `always_rod` and `always_catenary` take whole base cells and, for rods, a buffer;
+`tolerance` is a part of the length; `force_rod` and `force_catenary` take whole base cells and, for rods, a buffer;
 base cells are `mesh.cells` (60) or `mesh.nodes`, and each is divided into 1 to 32 rod cells no longer than `rod_cell`.
 
 ```yaml
@@ -194,7 +194,7 @@ ends:
   start: {kind: pinned, position: [0, 0, 0], motion: {heave: {amplitude: 1.0, period: 8.0}, ramp: 16}}
   end: {kind: clamped, position: [40, 0, -60], tangent: [1, 0, 0.5]}
 initial: equilibrium
-model: {kind: adaptive, tolerance: 5.0e-4, always_rod: [[95, 100]]}
+model: {kind: adaptive, tolerance: 5.0e-4, force_rod: [[95, 100]]}
 time: {duration: 60, step: 0.05}
 output: {every: 0.25, criteria: true}
 ```
@@ -326,6 +326,21 @@ def referred(schema: Any) -> Iterator[str]:
             yield from referred(value)
 
 
+def former_names() -> Iterator[str]:
+    """The keys that were renamed, table by table."""
+    yield "## Former names"
+    yield ""
+    yield "These keys were renamed.  The former name is still read, and a note says where it stands and what it became."
+    yield ""
+    yield "| table | former name | name of today |"
+    yield "|---|---|---|"
+    tables = [kind for base in Table.__subclasses__() for kind in (base, *base.__subclasses__())]
+    for table in sorted(tables, key=lambda kind: kind.__name__):
+        for old, new in table.former.items():
+            yield f"| [{table.__name__}](#{table.__name__.lower()}) | `{old}` | `{new}` |"
+    yield ""
+
+
 def page() -> str:
     """The whole page."""
     schema = Scene.model_json_schema()
@@ -343,7 +358,7 @@ def page() -> str:
     lines = [HEAD, "## Scene", "", schema["description"], "", *table(schema), ""]
     for name in order:
         lines += [f"### {name}", "", " ".join(tables[name]["description"].split()), "", *table(tables[name]), ""]
-    return "\n".join([*lines, TAIL])
+    return "\n".join([*lines, *former_names(), TAIL])
 
 
 def main(arguments: list[str]) -> int:

@@ -449,7 +449,7 @@ SINKING_ROD: Table = {
 }  # fmt: skip
 MODULES: Table = {
     "kind": "modules",
-    "over": [0, 5],
+    "range": [0, 5],
     "buoyancy": 10.0,
     "mass": 1.5,
     "drag_area": 0.05,
@@ -779,7 +779,7 @@ def everything(
     attachments = [
         {"kind": "float", "at": at["float"], "buoyancy": 900, "mass": 60, "drag_area": 0.3, "added_mass": 80},
         {"kind": "clump", "at": at["clump"], "mass": 80, "volume": 0.01, "drag_area": 0.05, "added_mass": 10},
-        {"kind": "modules", "over": over, "buoyancy": 20, "mass": 5, "drag_area": 0.05, "added_mass": 6},
+        {"kind": "modules", "range": over, "buoyancy": 20, "mass": 5, "drag_area": 0.05, "added_mass": 6},
     ]
     what = sea_scene(
         sections, *ends, fluid={"density": RHO, "surface": 0.0, "current": current, "waves": waves}, seabed=bed,

@@ -462,8 +462,14 @@ def _ended(
 
 
 def _load(say: Voice, path: Path, settings: list[str] | None) -> Scene:
+    from hybrid.scene.read import read_scene
+
     say.source, say.settings = str(path), settings or []
-    return hybrid.load_scene(path, say.settings)
+    scene, renamed = read_scene(path, say.settings)
+    for key in renamed:
+        say.json("note", text=str(key), **vars(key))
+        say.note(f"note: {key}")
+    return scene
 
 
 def _film(say: Voice, result: Result, source: Path, output: Path | None, overwrite: bool) -> None:

@@ -136,7 +136,7 @@ def build(
     elif mesh is not None:
         s, zones = mesh
     elif isinstance(scene.model, AdaptiveModel):
-        wanted = (*(scene.model.always_rod or ()), *(scene.model.always_catenary or ()))
+        wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
         edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
         layout = _layout(scene, cable, sorted({*cuts, *edges}), effort)
         s, zones = layout.nodes, layout.zones
@@ -214,7 +214,7 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
     assert isinstance(scene.model, AdaptiveModel)
     middle = 0.5 * (layout.base[:-1] + layout.base[1:])
     given = np.zeros(middle.size, int)
-    for stretches, sign in ((scene.model.always_catenary, -1), (scene.model.always_rod, 1)):
+    for stretches, sign in ((scene.model.force_catenary, -1), (scene.model.force_rod, 1)):
         for a, b in stretches or ():
             given[(middle > a) & (middle < b)] = sign
     return given

@@ -108,7 +108,7 @@ def material(scene: Scene) -> Material:
     ends = np.concatenate([[0.0], np.cumsum([x.length for x in sections])])
     length, near = float(ends[-1]), 1e-9 * float(ends[-1])
     modules = list(modules_of(scene))
-    edges = [*ends.tolist(), *(x for m in modules for x in m.over)]
+    edges = [*ends.tolist(), *(x for m in modules for x in m.range)]
     bounds = [0.0]
     for x in sorted(min(x, length) for x in edges):
         if x - bounds[-1] > near:
@@ -118,7 +118,7 @@ def material(scene: Scene) -> Material:
     of = [sections[int(i)] for i in np.clip(np.searchsorted(ends, middle) - 1, 0, len(sections) - 1)]
     out = _bare(scene, np.array(bounds), of)
     for m in modules:
-        on = (middle > m.over[0]) & (middle < m.over[1])
+        on = (middle > m.range[0]) & (middle < m.range[1])
         out.mass[on] += m.mass
         out.weight[on] += m.mass * scene.environment.gravity
     if scene.environment.fluid is not None:
@@ -165,7 +165,7 @@ def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> N
     disc = 0.25 * np.pi * width**2
     volume, area, extra = disc.copy(), np.zeros(len(of)), np.zeros(len(of))
     for m in modules_of(scene):
-        on = (middle > m.over[0]) & (middle < m.over[1])
+        on = (middle > m.range[0]) & (middle < m.range[1])
         volume[on] += m.volume_in(rho, gravity)
         area[on] += m.drag_area
         extra[on] += m.added_mass

@@ -116,7 +116,7 @@ def current_table(scene: Scene) -> tuple[Floats, Floats]:
     if isinstance(current, PowerLawCurrent):
         top = current.top_under(fluid.surface if fluid else None)
         part = (np.arange(POWER_LAW_HEIGHTS + 1) / POWER_LAW_HEIGHTS) ** CROWDING  # of the height above the foot
-        angle = np.radians(current.turn) * (1.0 - part)
+        angle = np.radians(current.veer) * (1.0 - part)
         x, y, up = current.velocity
         speed = part**current.exponent
         turned = np.column_stack(
@@ -143,8 +143,8 @@ def components(waves: RegularWaves | JonswapWaves, depth: float, gravity: float)
         phase = np.radians([waves.phase])
     else:
         n = waves.components
-        omega = frequencies(2 * np.pi / waves.period, waves.gamma, n)
-        amplitude = np.full(n, 0.25 * waves.height * math.sqrt(2.0 / n))
+        omega = frequencies(2 * np.pi / waves.peak_period, waves.gamma, n)
+        amplitude = np.full(n, 0.25 * waves.significant_height * math.sqrt(2.0 / n))
         phase = np.random.default_rng(waves.seed).uniform(0.0, 2 * np.pi, n)
     k = np.array([wavenumber(w, None if math.isinf(depth) else depth, gravity) for w in omega])
     towards = math.radians(waves.direction)

@@ -108,4 +108,4 @@ def attached_weights(scene: Scene) -> list[float]:
         return gravity * (x.mass - (density * x.volume_in(density, gravity) if fluid else 0.0))
 
     points = [sinks(x) for _, x in attachments_at(scene)]
-    return points + [sinks(m) * (m.over[1] - m.over[0]) for m in modules_of(scene)]
+    return points + [sinks(m) * (m.range[1] - m.range[0]) for m in modules_of(scene)]

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
     Direction,
@@ -237,13 +237,20 @@ class AdaptiveModel(Table):
     rod_cell: Positive | None = Field(
         default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
     )
-    dwell: Positive | None = Field(
+    hold_time: Positive | None = Field(
         default=None,
+        validation_alias=AliasChoices("hold_time", "dwell"),
         description="time for which a rod must have been calm before it becomes catenary; absent: chosen [s]",
     )
-    always_rod: Stretches | None = Field(default=None, description="stretches [s_a, s_b] that are always rod [m]")
-    always_catenary: Stretches | None = Field(
-        default=None, description="stretches [s_a, s_b] that are always catenary [m]"
+    force_rod: Stretches | None = Field(
+        default=None,
+        validation_alias=AliasChoices("force_rod", "always_rod"),
+        description="stretches [s_a, s_b] that are always rod [m]",
+    )
+    force_catenary: Stretches | None = Field(
+        default=None,
+        validation_alias=AliasChoices("force_catenary", "always_catenary"),
+        description="stretches [s_a, s_b] that are always catenary [m]",
     )
     joint: Literal["spherical", "curvature"] = Field(
         default="spherical",
@@ -275,7 +282,10 @@ Model = Annotated[
     Kinds(
         ("rod", "catenary", "corrected", "zones", "adaptive"),
         usual=("adaptive", "rod", "catenary"),
-        implied=(("zones", "zones"), *((key, "adaptive") for key in AdaptiveModel.model_fields if key != "kind")),
+        implied=(
+            ("zones", "zones"),
+            *((key, "adaptive") for key in (*AdaptiveModel.model_fields, *AdaptiveModel.former) if key != "kind"),
+        ),
     ),
 ]
 

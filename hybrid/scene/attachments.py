@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import Annotated, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, AliasChoices, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
     Finding,
@@ -95,7 +95,10 @@ class Modules(Table):
     """Buoyancy modules, fairings or ballast, spread evenly over a stretch; everything per metre of cable."""
 
     kind: Literal["modules"] = Field(default="modules", description="spread over a stretch")
-    over: NonNegativePair = Field(description="[from, to], the arc lengths between which they sit [m]")
+    range: NonNegativePair = Field(
+        validation_alias=AliasChoices("range", "over"),
+        description="[from, to], the arc lengths between which they sit [m]",
+    )
     buoyancy: Number | None = Field(
         default=None,
         description="net lift per length: weight of the displaced fluid minus their own; negative for ballast; "
@@ -117,8 +120,8 @@ class Modules(Table):
     @model_validator(mode="after")
     def _one_measure_and_a_stretch(self) -> Modules:
         _either(self)
-        if self.over[0] >= self.over[1]:
-            refuse([Finding(("over",), "two arc lengths, the smaller first, in m", "write [from, to]")])
+        if self.range[0] >= self.range[1]:
+            refuse([Finding(("range",), "two arc lengths, the smaller first, in m", "write [from, to]")])
         return self
 
 

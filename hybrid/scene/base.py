@@ -13,11 +13,21 @@ from __future__ import annotations
 
 import math
 import sys
+import warnings
 from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NoReturn
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, GetCoreSchemaHandler, GetJsonSchemaHandler
+from pydantic import (
+    AliasChoices,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+)
+from pydantic.fields import ComputedFieldInfo, FieldInfo
 from pydantic.functional_validators import AfterValidator
 from pydantic_core import CoreSchema, PydanticCustomError, core_schema
 
@@ -40,10 +50,65 @@ SHORTEST_DIRECTION, LONGEST_DIRECTION = 1e-9, 1e9
 PARALLEL = 1e-6
 
 
-class Table(BaseModel):
-    """Base of all tables: frozen, unknown keys refused, numbers finite."""
+def unit_of(field: FieldInfo | None) -> str:
+    """The unit in square brackets at the end of a description; empty if none or dimensionless."""
+    text = (field.description or "") if field is not None else ""
+    unit = text[text.rindex("[") + 1 : -1] if text.endswith("]") else ""
+    return "" if unit == "-" else unit
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+
+def _title(name: str, field: FieldInfo | ComputedFieldInfo) -> str:
+    """The title of a key in the JSON schema, which editors show: its name and unit."""
+    unit = unit_of(field) if isinstance(field, FieldInfo) else ""
+    return f"{name} ({unit})" if unit else name
+
+
+# Keys that were renamed: the names a key had before, by its name of today.
+FORMER_NAMES: dict[str, set[str]] = {}
+
+
+class Table(BaseModel):
+    """Base of all tables: frozen, unknown keys refused, numbers finite.
+
+    A key that was renamed keeps its former names, in `validation_alias=AliasChoices(name, former, ...)`.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, field_title_generator=_title)
+
+    former: ClassVar[Mapping[str, str]] = {}  # of each former name, the key of today
+
+    @classmethod
+    def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:
+        named = {name: field.validation_alias for name, field in cls.model_fields.items()}
+        cls.former = {
+            str(old): name
+            for name, alias in named.items()
+            if isinstance(alias, AliasChoices)
+            for old in alias.choices
+            if old != name
+        }
+        for old, name in cls.former.items():
+            FORMER_NAMES.setdefault(name, set()).add(old)
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            now = type(self).former.get(name)
+            if now is None:
+                return super().__getattr__(name)
+            warnings.warn(f"{name} is now {now}", DeprecationWarning, stacklevel=2)
+            return getattr(self, now)
+
+    def __dir__(self) -> list[str]:
+        """Without the names that pydantic has deprecated (`copy`, `dict`, `json`, ...) and its class methods."""
+        kept = {"model_copy", "model_dump", "model_dump_json"}
+        return sorted(n for n in super().__dir__() if n in kept or n.startswith("__") or not hasattr(BaseModel, n))
+
+
+def as_written(table: Mapping[str, Any], key: str) -> str:
+    """How a key of today is spelt in a table that may use a former name of it."""
+    former = FORMER_NAMES.get(key, ()) if key not in table else ()
+    return next((old for old in former if old in table), key)
 
 
 @dataclass(frozen=True)

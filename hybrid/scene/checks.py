@@ -138,14 +138,14 @@ def _corrections_know_the_bending(cable: Cable, model: Model) -> Iterator[Findin
 def _stretches_on_cable(cable: Cable, model: Model) -> Iterator[Finding]:
     if not isinstance(model, AdaptiveModel):
         return
-    rods = model.always_rod or ()
-    for key in ("always_rod", "always_catenary"):
+    rods = model.force_rod or ()
+    for key in ("force_rod", "force_catenary"):
         for i, (a, b) in enumerate(getattr(model, key) or ()):
             if not a < b <= cable.length * (1 + SAME_LENGTH):
                 expected = f"[s_a, s_b] with s_a < s_b <= {cable.length:.8g} m, the length of the cable"
                 yield Finding(("model", key, i), expected, "write [from, to], in m")
-            elif key == "always_catenary" and any(a < d and c < b for c, d in rods):
-                yield Finding(("model", key, i), "a stretch apart from those of always_rod", "let them end before")
+            elif key == "force_catenary" and any(a < d and c < b for c, d in rods):
+                yield Finding(("model", key, i), "a stretch apart from those of force_rod", "let them end before")
 
 
 def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:

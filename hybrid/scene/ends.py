@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Annotated, Literal, NamedTuple
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape, sphere_diameter
 from hybrid.scene.base import (
@@ -368,8 +368,9 @@ class Body(EndTable):
     """Carries a body, such as a vehicle or a buoy, that moves with the cable and is not held."""
 
     kind: Literal["body"] = Field(default="body", description="free, with a body on it")
-    near: Vector | None = Field(
+    initial_guess: Vector | None = Field(
         default=None,
+        validation_alias=AliasChoices("initial_guess", "near"),
         description="where the search of the equilibrium puts the body first, inertial frame; absent: chosen [m]",
     )
     mass: Positive = Field(description="mass, in air [kg]")
@@ -382,7 +383,7 @@ class Body(EndTable):
 
     @property
     def first_position(self) -> Triple | None:
-        return self.near
+        return self.initial_guess
 
     @property
     def loads(self) -> tuple[GivenLoad, ...]:
@@ -427,9 +428,9 @@ class Ends(Table):
         """Positions [m] of the ends that have one, by name (`start`, `end`)."""
         return {name: end.held_position for name, end in self.named().items() if end.held_position is not None}
 
-    def near(self) -> dict[str, Triple]:
+    def initial_guesses(self) -> dict[str, Triple]:
         """First positions [m] of the bodies that have one, by name (`start`, `end`)."""
-        return {name: end.near for name, end in self.bodies().items() if end.near is not None}
+        return {name: end.initial_guess for name, end in self.bodies().items() if end.initial_guess is not None}
 
     def bodies(self) -> dict[str, Body]:
         """The bodies at the ends, by name (`start`, `end`)."""

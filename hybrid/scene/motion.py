@@ -254,7 +254,7 @@ def _periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
     periods: dict[str, float] = {}
     waves = environment.fluid.waves if environment is not None and environment.fluid is not None else None
     if waves is not None:
-        periods["environment.fluid.waves"] = waves.period
+        periods["environment.fluid.waves"] = waves.main_period
     for here, _, motion in _motions(ends):
         for what, harmonics in motion.harmonics().items():
             listed = not isinstance(getattr(motion, what), Harmonic)
@@ -331,7 +331,7 @@ def resolution_findings(ends: Ends, environment: Environment | None, step: float
             found.append(Finding((*here, "travel", "over"), expected, fix, f"{motion.travel.over:g}"))
         if motion.follow is not None and waves is not None and waves.ramp is not None and waves.ramp < shortest:
             expected = f"a ramp of at least {steps}, because {dotted(here)} follows the waves"
-            fix = f"ramp: {2 * waves.period:.3g}, two periods"
+            fix = f"ramp: {2 * waves.main_period:.3g}, two periods"
             found.append(Finding(("environment", "fluid", "waves", "ramp"), expected, fix, f"{waves.ramp:g}"))
         if motion.file is not None:
             missed = _missed_between(read_record(motion.file), step)

@@ -164,7 +164,7 @@ def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterat
     """Everything in a scene that has a direction, what says most first."""
     for name, end in ends.named().items():
         if end.first_position is not None:
-            key = "position" if end.held_position is not None else "near"
+            key = "position" if end.held_position is not None else "initial_guess"
             yield Witness(("ends", name, key), "place", end.first_position)
         if end.held_tangent is not None:
             yield Witness(("ends", name, "tangent"), "along", end.held_tangent)
@@ -226,9 +226,9 @@ def _sea(environment: Environment) -> Iterator[Witness]:
     if isinstance(current, UniformCurrent | PowerLawCurrent):
         if any(current.velocity):
             yield Witness((*here, "velocity"), "along", current.velocity)
-        if isinstance(current, PowerLawCurrent) and current.turn != 0.0 and any(current.velocity[:2]):
+        if isinstance(current, PowerLawCurrent) and current.veer != 0.0 and any(current.velocity[:2]):
             x, y, _ = current.velocity
-            yield Witness((*here, "turn"), "along", (-y, x, 0.0))
+            yield Witness((*here, "veer"), "along", (-y, x, 0.0))
     elif current is not None:
         profile = isinstance(current, CurrentProfile)
         table = current.table if isinstance(current, CurrentProfile) else current

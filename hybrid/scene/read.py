@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import io
 import re
-from collections.abc import Iterable, Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import cache
 from os import PathLike
@@ -16,7 +17,7 @@ from ruamel.yaml import YAML
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import usual_model
-from hybrid.scene.base import Finding, Place, dotted
+from hybrid.scene.base import Finding, Place, Table, as_written, dotted
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion import motion_findings, resolution_findings
 from hybrid.scene.schema import Ends, Environment, Scene, Time
@@ -26,6 +27,17 @@ from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_tex
 # Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
 # some seconds.
 LARGEST_SCENE = 1_000_000
+
+
+class RenamedKey(FutureWarning):
+    """A key of a scene that is called otherwise today; what was written under its former name is read all the same."""
+
+    def __init__(
+        self, where: str, old: str, new: str, file: str = "", line: int | None = None, column: int | None = None
+    ) -> None:
+        self.where, self.old, self.new, self.file, self.line, self.column = where, old, new, file, line, column
+        place = ":".join(str(x) for x in (file or "scene", line, column) if x is not None)
+        super().__init__(f"{place}: {where}: {old} is now called {new}; please rename it")
 
 
 SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
@@ -50,13 +62,18 @@ def as_scene(scene: SceneLike) -> Scene:
 
 
 def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
-    """Read a scene file.
+    """Read a scene file; a `RenamedKey` warning for each key that is called otherwise today.
 
     overrides: changes such as ``time.step=0.005`` or ``cable.sections[0].mass=2``.  A motion file is
     looked for in the folder of the scene file, and the scene keeps its absolute path.
     SceneError with every complaint if the scene is refused.
     """
-    return parse_scene(_text_of(path), str(path), overrides)
+    return _told(*read_scene(path, overrides))
+
+
+def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
+    """Read a scene file as `load_scene` does; with what is to be told of renamed keys, instead of warning of it."""
+    return _parsed(_text_of(path), str(path), overrides)
 
 
 def _text_of(path: str | Path) -> str:
@@ -85,6 +102,10 @@ def _text_of(path: str | Path) -> str:
 
 def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
     """Read a scene from YAML text; `file` is its name in complaints and the folder of motion files."""
+    return _told(*_parsed(text, file, overrides))
+
+
+def _parsed(text: str, file: str, overrides: Sequence[str]) -> tuple[Scene, list[RenamedKey]]:
     try:
         root, complaints = from_text(text)
     except Unreadable as error:
@@ -108,7 +129,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
     complaints = []
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
-        place = _find(root, at, False)[1]
+        place = _find(root, at, False)[2]
         if complaint.line is None and place is not None:
             complaint = replace(complaint, line=place[0], column=place[1])
         complaints.append(complaint)
@@ -117,7 +138,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
 
 def validate_scene(data: Any) -> Scene:
     """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
-    return _validated(data, from_data(data), [], "")
+    return _told(*_validated(data, from_data(data), [], ""))
 
 
 def scene_text(scene: Scene) -> str:
@@ -145,7 +166,35 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
             here["file"] = str((folder / name).absolute())
 
 
-def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) -> Scene:
+def _told(scene: Scene, renamed: list[RenamedKey]) -> Scene:
+    for each in renamed:
+        warnings.warn(each, stacklevel=3)
+    return scene
+
+
+def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, str]]:
+    """Paths of the keys of `data` that are called otherwise today, and how; `scene` is what was made of them."""
+    if isinstance(scene, Table) and isinstance(data, Mapping):
+        for key, value in data.items():
+            now = scene.former.get(key, key)
+            if now != key:
+                yield (*path, key), now
+            yield from _renamed(value, getattr(scene, now, None), (*path, key))
+    elif isinstance(scene, tuple) and isinstance(data, list | tuple):
+        for i, (entry, made) in enumerate(zip(data, scene, strict=False)):
+            yield from _renamed(entry, made, (*path, i))
+
+
+def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
+    """A note for each renamed key, where it stands first."""
+    notes: dict[tuple[str, str], RenamedKey] = {}
+    for path, now in _renamed(data, scene):
+        line, column = _find(root, path, at_key=True)[2] or (None, None)
+        notes.setdefault((str(path[-1]), now), RenamedKey(dotted(path), str(path[-1]), now, file, line, column))
+    return list(notes.values())
+
+
+def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) -> tuple[Scene, list[RenamedKey]]:
     scene: Scene | None = None
     found: list[tuple[Finding, bool]] = []
     if not isinstance(data, dict | Scene):
@@ -171,7 +220,7 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
     complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
         raise SceneError(_in_order(complaints), file)
-    return scene
+    return scene, _notes(data, scene, root, file)
 
 
 @cache
@@ -196,19 +245,22 @@ def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
 
 
 def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
-    node, place, missing = _find(root, finding.at, at_key)
+    at, node, place, missing = _find(root, finding.at, at_key)
     given = finding.given or ("nothing" if missing else node.show())
     if at_key and not missing:
-        given = f"{dotted(finding.at[-1:])}: {given}"
+        given = f"{dotted(at[-1:])}: {given}"
     line, column = place if place is not None else (None, None)
-    return Complaint(dotted(finding.at) or "scene", given, finding.expected, finding.fix, line, column)
+    return Complaint(dotted(at) or "scene", given, finding.expected, finding.fix, line, column)
 
 
-def _find(root: Node, path: Place, at_key: bool) -> tuple[Node, Spot | None, bool]:
-    """Where a path leads: the value, else the key if that is wrong, else the table it is missing from; if it is."""
-    node, place = root, root.place
-    for part in path:
+def _find(root: Node, path: Place, at_key: bool) -> tuple[Place, Node, Spot | None, bool]:
+    """Where a path leads: the path with keys as they are written, the value and its place (that of the key, if the
+    key is what is wrong; else of the table it is missing from), and whether it is missing."""
+    node, place, at = root, root.place, list(path)
+    for i, part in enumerate(path):
         inside = node.value
+        if isinstance(inside, dict) and isinstance(part, str):
+            part = at[i] = as_written(inside, part)
         if isinstance(inside, dict) and part in inside and isinstance(part, str):
             key_place = node.key_places.get(part)
             node = inside[part]
@@ -219,8 +271,8 @@ def _find(root: Node, path: Place, at_key: bool) -> tuple[Node, Spot | None, boo
         else:
             # `model: adaptive` has no key `kind`, the word itself is the kind; what else a bare word lacks is missing.
             missing = isinstance(inside, dict | list) or inside is None or (isinstance(inside, str) and part != "kind")
-            return node, place, missing
-    return node, place, False
+            return tuple(at), node, place, missing
+    return tuple(at), node, place, False
 
 
 def _in_order(complaints: Iterable[Complaint]) -> list[Complaint]:

@@ -18,7 +18,7 @@ import annotated_types
 from pydantic import Tag
 from pydantic.fields import FieldInfo
 
-from hybrid.scene.base import Finding, Kinds, Place, PlainNumber, Table, Words, dotted
+from hybrid.scene.base import Finding, Kinds, Place, PlainNumber, Table, Words, dotted, unit_of
 from hybrid.scene.suggestions import decimal_comma, did_you_mean, nearest
 
 # What pydantic calls "extra" is often a condition that another kind of end takes.
@@ -40,11 +40,14 @@ OTHER_KIND = {
     ("free", "mass"): "a free end has no mass; kind: body carries one",
     ("free", "volume"): "a free end has no volume; kind: body has one",
     ("free", "thrust"): "use force; kind: body takes a thrust",
-    ("free", "near"): "kind: body has a place near which it floats or hangs; a free end has none",
+    ("free", "initial_guess"): "kind: body has a place near which it floats or hangs; a free end has none",
     ("pinned", "mass"): "a held end carries no mass; kind: body carries one and is not held",
     ("clamped", "mass"): "a held end carries no mass; kind: body carries one and is not held",
     ("guided", "mass"): "a guided end carries no mass; kind: body carries one and is free",
-    ("body", "position"): "a body is not held; near says where the search starts, kind: pinned holds a position",
+    (
+        "body",
+        "position",
+    ): "a body is not held; initial_guess says where the search starts, kind: pinned holds a position",
     ("body", "tangent"): "a body turns freely; kind: clamped or guided holds a tangent",
     ("body", "motion"): "a body moves with the cable; kind: pinned or clamped is moved",
     ("body", "force"): "use thrust",
@@ -54,12 +57,12 @@ OTHER_KIND = {
         "buoyancy",
     ): "use volume (m^3): the fluid that the body displaces; net buoyancy is density x volume - mass",
     ("body", "weight"): "use mass (kg), in air, and volume (m^3), displaced",
-    ("float", "over"): "a float sits at one arc length; kind: modules goes over a stretch",
+    ("float", "range"): "a float sits at one arc length; kind: modules goes over a stretch",
     ("float", "weight"): "use mass (kg): the weight in air / gravity",
-    ("clump", "over"): "a clump sits at one arc length; kind: modules goes over a stretch",
+    ("clump", "range"): "a clump sits at one arc length; kind: modules goes over a stretch",
     ("clump", "weight"): "use mass (kg): the weight in air / gravity",
     ("clump", "buoyancy"): "use volume (m^3) for the fluid that a clump displaces; kind: float for what lifts",
-    ("modules", "at"): "modules go over a stretch, over: [from, to]; kind: float sits at one arc length",
+    ("modules", "at"): "modules go over a stretch, range: [from, to]; kind: float sits at one arc length",
     ("modules", "weight"): "use mass (kg/m): the weight in air / gravity",
     ("modules", "height"): "modules have the extent of the cable; leave height out",
     ("regular", "gamma"): "regular waves have one period and no spectrum; use kind: jonswap",
@@ -85,7 +88,7 @@ SHAPES = {
     "points": "[[x, y, z], [x, y, z]]",
     "sections": "[{length: ..., mass: ...}]",
     "table": "[{z: ..., velocity: [x, y, z]}, {z: ..., velocity: [x, y, z]}]",
-    "over": "[from, to]",
+    "range": "[from, to]",
 }
 
 
@@ -149,23 +152,30 @@ def follow(root: type[Table], loc: Place) -> Spot:
         else:
             tables = _tables(spot.annotation)
             owner = tables[0] if len(tables) == 1 else None
-            field = owner.model_fields.get(part) if owner is not None else None
+            field = owner.model_fields.get(owner.former.get(part, part)) if owner is not None else None
             annotation, metadata = (field.annotation, tuple(field.metadata)) if field is not None else (None, ())
             spot = Spot(annotation, metadata, owner, field, spot.kind)
     return spot
 
 
-def keys_at(root: type[Table], path: Place) -> list[str]:
-    """All keys that any branch of the schema knows in the table at `path`."""
+def tables_at(root: type[Table], path: Place) -> list[type[Table]]:
+    """The tables that any branch of the schema has at `path`."""
     annotations: list[Any] = [root]
     for part in path:
         if isinstance(part, int):
             annotations = [_item(a, part) for a in annotations]
         else:
             tables = [t for a in annotations for t in _tables(a)]
-            annotations = [t.model_fields[part].annotation for t in tables if part in t.model_fields]
+            found = [t.model_fields.get(t.former.get(part, part)) for t in tables]
+            annotations = [field.annotation for field in found if field is not None]
         annotations = [a for a in annotations if a is not None]
-    return list(dict.fromkeys(name for a in annotations for t in _tables(a) for name in t.model_fields))
+    return [table for a in annotations for table in _tables(a)]
+
+
+def keys_at(root: type[Table], path: Place) -> list[str]:
+    """All keys that any branch of the schema knows in the table at `path`, those of today first."""
+    tables = tables_at(root, path)
+    return list(dict.fromkeys([*(n for t in tables for n in t.model_fields), *(n for t in tables for n in t.former)]))
 
 
 def shorthand_keys(root: type[Table], path: Place) -> tuple[str, ...]:
@@ -178,13 +188,6 @@ def shorthand_keys(root: type[Table], path: Place) -> tuple[str, ...]:
 
 
 # --- types in words ----------------------------------------------------------------------------
-
-
-def unit_of(field: FieldInfo | None) -> str:
-    """The unit in square brackets at the end of a description; empty if none or dimensionless."""
-    text = (field.description or "") if field is not None else ""
-    unit = text[text.rindex("[") + 1 : -1] if text.endswith("]") else ""
-    return "" if unit == "-" else unit
 
 
 def expected(annotation: Any, metadata: tuple[Any, ...], field: FieldInfo | None) -> str:
@@ -269,6 +272,8 @@ def _unknown_key(path: Place, spot: Spot) -> Finding:
     key = str(path[-1])
     known = list(spot.owner.model_fields) if spot.owner is not None else []
     fix = OTHER_KIND.get((spot.kind, key)) or did_you_mean(key, known)
+    if spot.owner is not None and key in spot.owner.former:
+        fix = f"leave one of them out: {key} is the former name of {spot.owner.former[key]}"
     table = "a scene" if len(path) == 1 else f"kind: {spot.kind}" if "kind" in known else dotted(path[:-1])
     return Finding(path, f"a key of {table}", fix)
 

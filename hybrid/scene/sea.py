@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, BeforeValidator, Discriminator, Field, Tag, model_validator
+from pydantic import AfterValidator, AliasChoices, BeforeValidator, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.base import (
     Finding,
@@ -81,8 +81,9 @@ class PowerLawCurrent(Table):
     )
     bottom: Number = Field(description="height at which the current vanishes [m]")
     exponent: Positive = Field(default=1 / 7, description="the power; absent: one seventh [-]")
-    turn: Number = Field(
+    veer: Number = Field(
         default=0.0,
+        validation_alias=AliasChoices("veer", "turn"),
         description="angle by which the current turns from the top to the bottom, in proportion to the depth, "
         "counter-clockwise seen from above [deg]",
     )
@@ -139,26 +140,41 @@ class RegularWaves(Table):
     """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
 
     kind: Literal["regular"] = Field(default="regular", description="one period")
-    height: Positive = Field(description="height from trough to crest [m]")
-    period: Positive = Field(description="period [s]")
+    height: Positive = Field(description="height H from trough to crest [m]")
+    period: Positive = Field(description="period T [s]")
     direction: Number = Field(default=0.0, description=_DIRECTION)
     phase: Number = Field(default=0.0, description="phase at x = y = 0 and t = 0; 0 is a crest [deg]")
     depth: Positive | None = Field(default=None, description=_DEPTH)
     ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
+
+    @property
+    def main_period(self) -> float:
+        """The period that carries most energy [s]."""
+        return self.period
 
 
 class JonswapWaves(Table):
     """Irregular, long-crested waves: a sum of linear waves with random phases and a JONSWAP spectrum."""
 
     kind: Literal["jonswap"] = Field(default="jonswap", description="a spectrum of periods")
-    height: Positive = Field(description="significant wave height, four standard deviations of the elevation [m]")
-    period: Positive = Field(description="peak period [s]")
+    significant_height: Positive = Field(
+        validation_alias=AliasChoices("significant_height", "height"),
+        description="significant wave height Hs, four standard deviations of the elevation [m]",
+    )
+    peak_period: Positive = Field(
+        validation_alias=AliasChoices("peak_period", "period"), description="period Tp at the peak of the spectrum [s]"
+    )
     gamma: Number = Field(default=3.3, ge=1, description="peak enhancement; 1 is a Pierson-Moskowitz sea [-]")
     direction: Number = Field(default=0.0, description=_DIRECTION)
     seed: Whole = Field(default=1, ge=0, description="seed of the random phases: another seed, another sea [-]")
     components: Whole = Field(default=100, ge=1, le=1000, description="number of waves in the sum [-]")
     depth: Positive | None = Field(default=None, description=_DEPTH)
     ramp: Positive | None = Field(default=None, description=_RAMP.format(what="sea"))
+
+    @property
+    def main_period(self) -> float:
+        """The period that carries most energy [s]."""
+        return self.peak_period
 
 
 Waves = Annotated[

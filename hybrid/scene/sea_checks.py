@@ -10,7 +10,7 @@ from hybrid.scene.attachments import Clump, Float, Modules
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import Body, Ends, Triple
-from hybrid.scene.sea import wavenumber
+from hybrid.scene.sea import RegularWaves, wavenumber
 from hybrid.scene.start_checks import SAME_LENGTH
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
@@ -33,8 +33,8 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
     """Attachments beyond the end of the cable."""
     length = cable.length
     for i, item in enumerate(cable.attachments):
-        place: Place = ("over", 1) if isinstance(item, Modules) else ("at",)
-        if (item.over[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
+        place: Place = ("range", 1) if isinstance(item, Modules) else ("at",)
+        if (item.range[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
             expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
             fix = "move it onto the cable, or make the cable longer (cable.sections)"
             yield Finding(("cable", "attachments", i, *place), expected, fix)
@@ -99,16 +99,17 @@ def waves(environment: Environment) -> Iterator[Finding]:
     if sea.depth is not None and depth is not None and abs(sea.depth - depth) > SAME_DEPTH * depth:
         expected = f"{depth:.8g} m, the depth of the seabed under the surface at x = y = 0"
         yield Finding((*_WAVES, "depth"), expected, "leave depth out; it follows from the seabed")
-    k = wavenumber(2 * math.pi / sea.period, depth, environment.gravity)
+    k = wavenumber(2 * math.pi / sea.main_period, depth, environment.gravity)
     length = 2 * math.pi / k if k > 0.0 else math.inf
     highest = STEEPEST * length * (math.tanh(k * depth) if depth is not None else 1.0)
-    if sea.height >= highest:
+    key = "height" if isinstance(sea, RegularWaves) else "significant_height"
+    if getattr(sea, key) >= highest:
         water = "deep water" if depth is None else f"{depth:.6g} m of water"
         expected = (
-            f"less than {highest:.4g} m, because in {water} waves of {sea.period:g} s are {length:.4g} m long, "
+            f"less than {highest:.4g} m, because in {water} waves of {sea.main_period:g} s are {length:.4g} m long, "
             "and higher ones break"
         )
-        yield Finding((*_WAVES, "height"), expected, "lower waves, or a longer period")
+        yield Finding((*_WAVES, key), expected, "lower waves, or a longer period")
 
 
 def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
@@ -123,7 +124,7 @@ def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
             yield Finding(("ends", name, "motion", "follow"), "nothing, because there are no waves to follow", fix)
         elif sea.ramp is None:
             expected = f"a number > 0, in s, because ends.{name} follows the waves and starts from rest"
-            yield Finding((*_WAVES, "ramp"), expected, f"add `ramp: {2 * sea.period:.6g}` (s), two periods")
+            yield Finding((*_WAVES, "ramp"), expected, f"add `ramp: {2 * sea.main_period:.6g}` (s), two periods")
             return
 
 
@@ -135,7 +136,9 @@ def surface_over_seabed(environment: Environment, ends: Ends) -> Iterator[Findin
     fluid, seabed = environment.fluid, environment.seabed
     if fluid is None or fluid.surface is None or seabed is None:
         return
-    places = {f"ends.{name}": p for name, p in (ends.held() | ends.near()).items()} or {"x = y = 0": (0.0, 0.0, 0.0)}
+    places = {f"ends.{name}": p for name, p in (ends.held() | ends.initial_guesses()).items()} or {
+        "x = y = 0": (0.0, 0.0, 0.0)
+    }
     for name, (x, y, _) in places.items():
         bed = seabed.height(x, y)
         if fluid.surface <= bed:
@@ -154,7 +157,7 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
         depth = max(fluid.surface - seabed.z, 0.0)
     fix = "raise it, or lower environment.seabed.z"
     named: list[tuple[Place, Triple]] = [(("ends", n, "position"), p) for n, p in ends.held().items()]
-    named += [(("ends", n, "near"), p) for n, p in ends.near().items()]
+    named += [(("ends", n, "initial_guess"), p) for n, p in ends.initial_guesses().items()]
     if not isinstance(initial, Equilibrium | Straight):
         named += [(("initial", "points", i), p) for i, p in enumerate(initial.points)]
     for place, (x, y, z) in named:

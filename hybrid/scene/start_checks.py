@@ -59,7 +59,7 @@ def too_short(cable: Cable, distance: float) -> str | None:
 
 def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
     """Two held ends that the cable does not join, or a body placed out of its reach."""
-    held, near = ends.held(), ends.near()
+    held, near = ends.held(), ends.initial_guesses()
     fix = "a longer cable or closer ends"
     if cable.inextensible:
         fix = "a longer cable, closer ends, or give axial_stiffness (N)"
@@ -75,7 +75,7 @@ def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
             name = "end" if "end" in near else "start"
             expected = f"a place at most {allowed:.8g} m from the other end; the cable is {cable.length:.8g} m long"
             given = f"{_at(near[name])}, which is {distance:.8g} m from the other end"
-            yield Finding(("ends", name, "near"), expected, "a longer cable or a nearer place", given)
+            yield Finding(("ends", name, "initial_guess"), expected, "a longer cable or a nearer place", given)
 
 
 def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
@@ -118,16 +118,20 @@ def start_is_known(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Findi
 
 
 def _guess(cable: Cable, ends: Ends, initial: Equilibrium) -> Iterator[Finding]:
-    places = ends.held() | ends.near()
+    places = ends.held() | ends.initial_guesses()
     if initial.points is not None:
         yield from _polyline_start(cable, ends, initial, POLYLINE_STRETCH)
     elif initial.guess in ("catenary", "arc", "span") and len(places) < 2:
         expected = f"auto or straight, because a guess like {initial.guess} goes from one known place to another"
         yield Finding(("initial", "guess"), expected, "hold both ends, or say `near` where a body is")
     elif initial.guess == "straight" or initial.direction is not None:
-        for name in ends.near():
+        for name in ends.initial_guesses():
             expected = "nothing, because the search starts from a cable straight in a direction (initial)"
-            yield Finding(("ends", name, "near"), expected, "leave near out, or the direction and guess: straight")
+            yield Finding(
+                ("ends", name, "initial_guess"),
+                expected,
+                "leave initial_guess out, or the direction and guess: straight",
+            )
 
 
 def equilibrium_exists(environment: Environment, cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
@@ -137,7 +141,7 @@ def equilibrium_exists(environment: Environment, cable: Cable, ends: Ends, initi
     reason, fix = _drifts(environment, cable, ends)
     if reason:
         yield Finding(("initial", "kind"), f"at least one end with a position, because {reason}", fix)
-    elif initial.points is None and len(ends.near()) < 2:
+    elif initial.points is None and len(ends.initial_guesses()) < 2:
         expected = "a polyline [[x, y, z], ...] to start from, in m, because no end is held and it could be anywhere"
         yield Finding(("initial", "points"), expected, "add `points: [[x, y, z], [x, y, z]]` (m)")
 
@@ -150,7 +154,7 @@ def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[floa
     masses = [(s.mass * s.length, math.pi / 4 * d * d * s.length) for s, d in zip(cable.sections, widths, strict=True)]
     for item in cable.attachments:
         if density > 0.0 and gravity > 0.0:  # without, attachments that float are refused elsewhere
-            length = item.over[1] - item.over[0] if item.kind == "modules" else 1.0
+            length = item.range[1] - item.range[0] if item.kind == "modules" else 1.0
             masses.append((item.mass * length, item.volume_in(density, gravity) * length))
         elif item.kind == "clump":
             masses.append((item.mass, item.volume))
@@ -242,8 +246,8 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, all
 
 def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Iterator[Finding]:
     """Bodies that are said to be elsewhere than the initial shape has its ends."""
-    for name, position in ends.near().items():
+    for name, position in ends.initial_guesses().items():
         there = first if name == "start" else last
         if math.dist(position, there) > near:
-            here: Place = ("ends", name, "near")
-            yield Finding(here, f"{_at(there)}, where initial puts this end of the cable", "leave near out")
+            here: Place = ("ends", name, "initial_guess")
+            yield Finding(here, f"{_at(there)}, where initial puts this end of the cable", "leave initial_guess out")

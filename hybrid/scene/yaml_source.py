@@ -19,7 +19,7 @@ from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, dotted
-from hybrid.scene.schema_messages import keys_at, shorthand_keys
+from hybrid.scene.schema_messages import keys_at, shorthand_keys, tables_at
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
 
 Spot = tuple[int, int]
@@ -287,6 +287,8 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
             refusal = _no_key(here, path[:depth], part, keys_at(schema, path[:depth]))
         if refusal is not None:
             return Complaint(name, text, *refusal)
+        if isinstance(part, str):
+            part = _spelling(here.value, part, tables_at(schema, path[:depth]))
         if depth == len(path) - 1:
             here.value[part] = value
             here.key_places.pop(str(part), None)
@@ -294,6 +296,17 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
             here.value[part] = Node({}, None, note="override")
         here = here.value[part]
     return None
+
+
+def _spelling(table: dict[str, Node], key: str, tables: list[type[Table]]) -> str:
+    """How a key is spelt in a table as it is written: by the name of today, or a former one."""
+    kind = table["kind"].value if "kind" in table else None
+    for each in tables:
+        of_kind = each.model_fields["kind"].default if "kind" in each.model_fields else None
+        same = [name for name in table if each.former.get(name, name) == each.former.get(key, key)]
+        if same and kind in (None, of_kind) and key not in table:
+            return same[0]
+    return key
 
 
 def _no_entry(here: Node, path: Place, index: int) -> tuple[str, str] | None:

@@ -412,7 +412,7 @@ def _recorder(
             f"bends at the point loads at s = {which} m shift the cable by less than the tolerance: they have no moment"
         )
         recorder.event(
-            0.0, left[0], left[-1], "bending at point load neglected", f"{text}; for it, say always_rod around them"
+            0.0, left[0], left[-1], "bending at point load neglected", f"{text}; for it, say force_rod around them"
         )
     return recorder
 
@@ -436,7 +436,7 @@ def _clamps_left_out(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
         stretch = f"[0, {reach:.3g}]" if cell == 0 else f"[{far - reach:.5g}, {far:.5g}]"
         text = (
             f"the clamp at ends.{name} shifts the cable by less than the tolerance: it is left out, and has no moment, "
-            f"as long as a catenary zone ends there; for its moment, and near resonance, say always_rod: [{stretch}]"
+            f"as long as a catenary zone ends there; for its moment, and near resonance, say force_rod: [{stretch}]"
         )
         yield s, text
 

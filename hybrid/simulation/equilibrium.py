@@ -75,7 +75,7 @@ def zones_and_rest(
     assert isinstance(wanted, AdaptiveModel) and model.layout is not None
     given = given_zones(scene, model.layout)
     step = effort.step if effort.local is None else 0.0
-    manager = manager_for(model, effort.zones, wanted.dwell, given, step, criterion)
+    manager = manager_for(model, effort.zones, wanted.hold_time, given, step, criterion)
     equilibrium = None
     if at_rest or scene.initial.kind == "equilibrium":
         model, equilibrium = first_zones(model, manager, t, equilibrium_of(scene, model, t))

@@ -466,7 +466,7 @@ class Motion:
         if taken.outcome == Outcome.SLACK:
             detail = f"the step that starts at this time ends with a tension of {self.spare.T[where]:.3g} N"
             if self.zoning is not None:
-                detail += "; model.always_catenary keeps it from becoming a rod"
+                detail += "; model.force_catenary keeps it from becoming a rod"
         elif taken.outcome == Outcome.GAINS_ENERGY:
             detail = "the fastest point is at this place"
         elif taken.outcome == Outcome.TWISTED_TOO_FAR:

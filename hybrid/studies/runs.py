@@ -31,7 +31,7 @@ from hybrid.studies.machine import facts_of_machine
 ROUGH = "10%"
 WARM_PART = 0.02
 # Keys of a model that say how finely, not what: the ladder decides these.
-FINENESS = ("kind", "tolerance", "rod_cell", "dwell")
+FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")
 # Files of the package that change no answer, only how it is shown or ranked.
 SHOWS = ("cli", "view", "exports", "interop")

@@ -209,7 +209,7 @@ def _bends_left_out(result: Result) -> str:
     if not found:
         return ""
     where = ", ".join(dict.fromkeys(f"s = {x:.4g} m" for e in found for x in (e.s_a, e.s_b)))
-    return f" Not known at {where}, where the bend at a point load or clamp is left out: say always_rod there."
+    return f" Not known at {where}, where the bend at a point load or clamp is left out: say force_rod there."
 
 
 def _recorded(result: Result, name: str) -> np.ndarray | None:

@@ -46,7 +46,7 @@ def breathing(
         cable, one, two, cells=CELLS, gravity=GRAVITY, time={"duration": duration, "step": step},
         output={"every": step, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
     ).model_dump(exclude_none=True)  # fmt: skip
-    what["model"] = {"kind": "adaptive", "dwell": DWELL} | model
+    what["model"] = {"kind": "adaptive", "hold_time": DWELL} | model
     what["environment"] |= environment or {}
     if attachments:
         what["cable"]["attachments"] = attachments
@@ -89,7 +89,7 @@ def kinking(**more: Any) -> Scene:
 
 def nodding(**more: Any) -> Scene:
     """A taut cable whose clamp nods by 20 deg and back: sqrt(EI/T) 2 sin(angle/2) to 2.5 times the tolerance."""
-    model = {"kind": "adaptive", "dwell": DWELL, "tolerance": 0.0015} | more.pop("model", {})
+    model = {"kind": "adaptive", "hold_time": DWELL, "tolerance": 0.0015} | more.pop("model", {})
     cable = {
         "length": LENGTH, "mass": 0.2, "bending_stiffness": EI, "torsional_stiffness": 0.8 * EI,
         "axial_stiffness": 1e5, "damping": {"mass": 3.0},
@@ -136,7 +136,7 @@ def turning(**more: Any) -> Scene:
         output={"every": 0.02, "points": np.linspace(0, LENGTH, 2 * CELLS + 1).tolist()},
     ).model_dump(exclude_none=True)  # fmt: skip
     return Scene.model_validate(
-        what | {"model": {"kind": "adaptive", "dwell": DWELL, "tolerance": 0.01} | more["model"]}
+        what | {"model": {"kind": "adaptive", "hold_time": DWELL, "tolerance": 0.01} | more["model"]}
     )
 
 
@@ -146,7 +146,7 @@ SCENES = {"slack": slackening, "deep": sagging, "bend": bending, "point": kinkin
 @cache
 def ran(name: str, always: str = "") -> Result:
     """The result of one of SCENES, its zones free, or all of one kind."""
-    return run(SCENES[name](model={f"always_{always}": [[0, LENGTH]]} if always else {}))
+    return run(SCENES[name](model={f"force_{always}": [[0, LENGTH]]} if always else {}))
 
 
 def swapped(what: Scene) -> Scene:

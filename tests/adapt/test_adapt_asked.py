@@ -150,7 +150,7 @@ def test_a_joint_carries_the_moment_of_the_curvature(flags):
 @pytest.mark.parametrize("scene", [sagging, bending], ids=["deep", "bend"])
 def test_loaded_joints_stay_within_the_tolerance(scene):
     """Both joints are approximations of the rod; the energy of both is booked."""
-    rod = hybrid.run(scene(model={"always_rod": [[0, LENGTH]]}))
+    rod = hybrid.run(scene(model={"force_rod": [[0, LENGTH]]}))
     for kind in ("spherical", "curvature"):
         result = hybrid.run(scene(model={"joint": kind}))
         far = np.linalg.norm(result.position - rod.position, axis=2).max()
@@ -176,7 +176,7 @@ def test_a_cable_that_becomes_rod_again_has_its_twist():
          "damping": {"mass": 3.0}},
         clamped(), end, cells=20, time={"duration": 3.0, "step": 0.02}, output={"every": 0.1},
     ).model_dump(exclude_none=True)  # fmt: skip
-    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "dwell": 0.4}
+    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "hold_time": 0.4}
     result = hybrid.run(Scene.model_validate(what), criterion=lambda look: np.full(look.s.size, float(look.t >= 1.5)))
     always = hybrid.run(Scene.model_validate(what | {"model": {"kind": "rod"}}))
     assert rods(result, 0) == [] and rods(result, -1) == [(0.0, length)]
@@ -191,7 +191,7 @@ def test_a_cable_that_becomes_rod_again_has_its_twist():
 
 def test_a_step_that_goes_too_far_is_taken_back():
     """A blow that no criterion saw coming: the step is repeated with rods, and an event says so, with time and place."""
-    what = breathing(9.0, 3.0, {"tolerance": 0.1, "dwell": 0.05}, period=0.5, duration=0.5, step=0.05)
+    what = breathing(9.0, 3.0, {"tolerance": 0.1, "hold_time": 0.05}, period=0.5, duration=0.5, step=0.05)
     result = hybrid.run(what)
     again = [e for e in result.events if e.kind == "retry"]
     assert again

@@ -26,7 +26,7 @@ def compared(text: Text) -> tuple[hybrid.Result, hybrid.Result, np.ndarray]:
     """The run, that of the rod, and the largest distance at every output over the tolerance."""
     L = text["cable"]["sections"][0]["length"]
     a = hybrid.run(hybrid.validate_scene(text))
-    r = hybrid.run(hybrid.validate_scene(text | {"model": text["model"] | {"always_rod": [[0, L]]}}))
+    r = hybrid.run(hybrid.validate_scene(text | {"model": text["model"] | {"force_rod": [[0, L]]}}))
     far = np.linalg.norm(a.position - r.position, axis=2).max(axis=1)
     return a, r, far / L / text["model"].get("tolerance", 1e-3)
 
@@ -94,7 +94,7 @@ def test_dwell_is_no_blending_time(dwell):
     end = pinned(52, 0, -3, motion={"surge": {"amplitude": 5.0, "period": 6.0}, "ramp": 6.0})
     water = {
         "environment": {"fluid": {"density": 1025}},
-        "model": {"kind": "adaptive"} | ({"dwell": dwell} if dwell else {}),
+        "model": {"kind": "adaptive"} | ({"hold_time": dwell} if dwell else {}),
     }
     a, r, far = compared(scene(section, pinned(), end, **water, time={"duration": 20.0, "step": 0.02}))
     assert far.max() < 1.0
@@ -114,9 +114,9 @@ def test_an_inextensible_cable_that_snaps_creates_no_energy():
     assert np.abs(a["work/scheme"]).max() < 1.2 * np.abs(r["work/scheme"]).max()
 
 
-def test_always_catenary_is_so_from_the_beginning():
+def test_force_catenary_is_so_from_the_beginning():
     section = {"length": 60, "mass": 1, "bending_stiffness": 100, "axial_stiffness": 1e6}
-    model = {"kind": "adaptive", "tolerance": 1e-5, "always_catenary": [[20, 40]]}
+    model = {"kind": "adaptive", "tolerance": 1e-5, "force_catenary": [[20, 40]]}
     text = scene(section, pinned(), pinned(55, 0, 0), model=model, time={"duration": 1.0, "step": 0.02})
     a = hybrid.run(hybrid.validate_scene(text))
     for k in (0, -1):
@@ -134,8 +134,8 @@ def test_a_clamp_that_is_left_out_is_said():
     text = scene(section, pinned(), clamped((400, 0, -100)), time={"duration": 0.2, "step": 0.02})
     a = hybrid.run(hybrid.validate_scene(text))
     (said,) = [e for e in a.events if e.kind == "bending at clamp neglected"]
-    assert said.s_a == 500.0 and "always_rod: [[4" in said.text
-    asked = text | {"model": {"kind": "adaptive", "always_rod": [[490, 500]]}}
+    assert said.s_a == 500.0 and "force_rod: [[4" in said.text
+    asked = text | {"model": {"kind": "adaptive", "force_rod": [[490, 500]]}}
     assert not [e for e in hybrid.run(hybrid.validate_scene(asked)).events if e.kind == "bending at clamp neglected"]
 
 

@@ -24,7 +24,7 @@ NODES = {"rod_cell": 1e9}
 def ran(name: str, correct: bool = False, rod: bool = False) -> Result:
     what = {"bending": bending, "sagging": sagging}[name]()
     model = what.model.model_copy(
-        update=NODES | {"correct": correct} | ({"always_rod": ((0.0, LENGTH),)} if rod else {})
+        update=NODES | {"correct": correct} | ({"force_rod": ((0.0, LENGTH),)} if rod else {})
     )
     output = what.output.model_copy(update={"errors": None if rod else True})
     return hybrid.run(what.model_copy(update={"model": model, "output": output}))

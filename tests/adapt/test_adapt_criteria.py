@@ -398,7 +398,7 @@ def test_a_ratio_that_is_not_a_number_asks_for_rod(rod):
         assert wanted(ratios, np.full(3, rod)).tolist() == [False, True, False], CRITERIA[k].name
 
 
-def test_always_catenary_wins():
+def test_force_catenary_wins():
     """What the scene says is catenary stays so, however slack; all else becomes rod."""
     zones, what = even(12, "C" * 12), cable()
     state = state_on(on(what, zones), along(), 1e-3 * FLOORED)  # slack everywhere

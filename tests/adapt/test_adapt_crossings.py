@@ -152,7 +152,7 @@ def test_on_by_torque():
 
     A catenary has no twist, so what asks must be the turn of the ends against each other.
     """
-    rod = hybrid.run(turning(model={"always_rod": [[0, LENGTH]]}))
+    rod = hybrid.run(turning(model={"force_rod": [[0, LENGTH]]}))
     middle = CELLS
     ratio = rod.torque[:, middle] ** 2 / (4 * EI * rod.tension[:, middle]) / 0.5
     assert ratio[0] < 1e-9 and ratio[-1] > 2.0
@@ -336,14 +336,14 @@ def far_from_all() -> Scene:
 @pytest.mark.parametrize("how", ["always catenary", "tolerant"])
 def test_nothing_asks_is_a_catenary(how):
     scene: Callable[..., Scene] = bending if how == "always catenary" else far_from_all
-    what = scene(model={"always_catenary": [[0, LENGTH]]}) if how == "always catenary" else scene()
+    what = scene(model={"force_catenary": [[0, LENGTH]]}) if how == "always catenary" else scene()
     same(hybrid.run(what), fixed(what, "catenary", BASE))
 
 
 @pytest.mark.parametrize("how", ["always rod", "intolerant"])
 def test_everything_asks_is_a_rod(how):
     """Rods of two cells in each base cell here: a quarter of (EI/w)^(1/3) is 0.1 m."""
-    what = sagging(model={"always_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
+    what = sagging(model={"force_rod": [[0, LENGTH]]} if how == "always rod" else {"tolerance": 1e-9})
     result = hybrid.run(what)
     assert all(rods(result, k) == [(0.0, LENGTH)] for k in range(len(result.times)))
     same(result, fixed(what, "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
@@ -353,15 +353,15 @@ def test_rods_that_come_and_go_have_no_rotary_inertia():
     """What a section gives is refused, what a diameter implies is left out, from the beginning: all rod has none either."""
     with pytest.raises(ValueError, match="rods that come and go have no rotary inertia"):
         sagging(rotary_inertia=0.01)
-    what = sagging(model={"always_rod": [[0, LENGTH]]}, diameter=0.2)
+    what = sagging(model={"force_rod": [[0, LENGTH]]}, diameter=0.2)
     same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
     plan = {x.what: x for x in hybrid.plan(what).ledger}
     assert not plan["rotary inertia"].on and "come and go" in plan["rotary inertia"].why
 
 
 def test_what_the_scene_gives_is_so():
-    """always_rod in a cable that asks for nothing, always_catenary where it bends: at every output, to the base cell."""
-    result = hybrid.run(bending(model={"always_rod": [[1.0, 2.0]], "always_catenary": [[4.0, 4.6]]}))
+    """force_rod in a cable that asks for nothing, force_catenary where it bends: at every output, to the base cell."""
+    result = hybrid.run(bending(model={"force_rod": [[1.0, 2.0]], "force_catenary": [[4.0, 4.6]]}))
     assert comes(result)
     for k in range(len(result.times)):
         flags = flags_of(rods(result, k))

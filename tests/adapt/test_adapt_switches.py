@@ -108,9 +108,7 @@ def test_ends_do_not_ring(name):
 @pytest.mark.parametrize("stiffness", [1e6, None], ids=["stiff", "inextensible"])
 def test_no_axial_stiffness_rings(stiffness):
     """An inextensible cable, and one whose axial waves take a step or two: the pull stays within 2 % of the rod's."""
-    runs = [
-        hybrid.run(sagging(model=model, axial_stiffness=stiffness)) for model in ({}, {"always_rod": [[0, LENGTH]]})
-    ]
+    runs = [hybrid.run(sagging(model=model, axial_stiffness=stiffness)) for model in ({}, {"force_rod": [[0, LENGTH]]})]
     for pull in PULLS:
         rod = np.interp(runs[0].steps["t"], runs[1].steps["t"], runs[1].steps[pull])  # steps may have been halved
         one = runs[0].steps[pull]
@@ -135,9 +133,9 @@ def test_a_switch_while_tension_rises_is_not_felt(stiffness):
         section, pinned(), pinned(10.0 if stiffness else 9.99, 0, 0, motion=motion), cells=20, gravity=10.0,
         time={"duration": 5.0, "step": 0.01}, output={"every": 0.1},
     ).model_dump(exclude_none=True)  # fmt: skip
-    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "dwell": 0.05}
+    what["model"] = {"kind": "adaptive", "tolerance": 0.1, "hold_time": 0.05}
     asks = hybrid.run(Scene.model_validate(what), criterion=lambda look: np.full(look.s.size, look.t % 1.5 < 0.5) * 1.1)
-    what["model"] |= {"always_rod": [[0, 10]]}
+    what["model"] |= {"force_rod": [[0, 10]]}
     rod = hybrid.run(Scene.model_validate(what))
     assert len(switches(asks)) >= 6
     for pull in PULLS:

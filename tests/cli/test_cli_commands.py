@@ -202,6 +202,20 @@ def test_a_bad_scene_is_refused_with_file_line_and_column(call: Call) -> None:
     assert (mass["line"], mass["column"]) == (5, column)
 
 
+def test_a_renamed_key_is_told_with_its_place(call: Call) -> None:
+    Path("old.yaml").write_text(WIRE.replace(WIRE[WIRE.index("model:") : WIRE.index("time:")], "model: {dwell: 2.0}\n"))
+    said = call("plan", "old.yaml")
+    assert said.code == 0 and "old.yaml:10:9: model.dwell: dwell is now called hold_time" in " ".join(said.err.split())
+    note, plan = call("plan", "old.yaml", "--json").lines
+    assert (note["event"], plan["event"]) == ("note", "plan")
+    assert {k: note[k] for k in ("old", "new", "line", "column")} == {
+        "old": "dwell",
+        "new": "hold_time",
+        "line": 10,
+        "column": 9,
+    }
+
+
 def test_an_unknown_setting_suggests_the_right_one(call: Call) -> None:
     said = call("run", "wire.yaml", "--set", "time.stp=0.01")
     assert said.code == 1 and "time.stp" in said.err and "step" in said.err.split("try:")[1]

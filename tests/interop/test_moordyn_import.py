@@ -113,7 +113,7 @@ def test_free_points_at_the_end_are_bodies_or_nothing_and_the_bed_is_moordyns_ow
     deck = imported("free_fall")
     weight, loose = (deck.scenes[f"line{k}"].scene.ends.end for k in (1, 2))
     assert isinstance(weight, Body) and isinstance(loose, Free)
-    assert (weight.mass, weight.volume, weight.drag_area, weight.near) == (500.0, 0.06, 0.2, (0.0, 0.0, -60.0))
+    assert (weight.mass, weight.volume, weight.drag_area, weight.initial_guess) == (500.0, 0.06, 0.2, (0.0, 0.0, -60.0))
     assert weight.added_mass == pytest.approx(0.5 * 1025.0 * 0.06)
     scene = deck.scenes["line1"].scene
     assert scene.environment.seabed.z == -80.0
@@ -136,7 +136,7 @@ def test_rods_and_bodies_hold_what_they_can() -> None:
     assert deck.scenes["line3"].scene.cable.sections[0].axial_stiffness == 2.0e7
     assert deck.scenes["line10"].scene.ends.start.position == (-50.0, 0.0, -80.0)
     assert isinstance(deck.scenes["line9"].scene.ends.end, Body)
-    assert deck.scenes["line9"].scene.ends.end.near is None, "out of the line's reach, so left to the search"
+    assert deck.scenes["line9"].scene.ends.end.initial_guess is None, "out of the line's reach, so left to the search"
 
 
 def test_bodies_turn_as_in_moordyn() -> None:

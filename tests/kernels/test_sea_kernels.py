@@ -81,7 +81,7 @@ def test_power_law_table():
             "top": top,
             "bottom": bottom,
             "exponent": exponent,
-            "turn": turn,
+            "veer": turn,
         },
     }
     z, table = current_table(_scene(fluid))
@@ -229,7 +229,7 @@ def test_at_the_moving_surface_is_what_linear_theory_has_at_still_water(depth):
 
 
 def test_no_flow_through_the_bed():
-    waves = components(JonswapWaves(height=3.0, period=9.0, components=40), 25.0, G)
+    waves = components(JonswapWaves(significant_height=3.0, peak_period=9.0, components=40), 25.0, G)
     flow = stirred(sea_of(waves, 25.0), 12.3, [(x, 0.0, -25.0) for x in np.linspace(0, 100, 11)])
     within(np.abs(flow[:, [2, 5]]).max(), ROUND_OFF)
     assert np.abs(flow[:, 0]).max() > 0.1
@@ -262,7 +262,7 @@ def test_waves_go_their_way():
 
 def test_waves_add_up():
     """Elevations exactly; motions of low waves to a part k A of them."""
-    slight = components(JonswapWaves(height=1e-6, period=9.0, components=7), 40.0, G)
+    slight = components(JonswapWaves(significant_height=1e-6, peak_period=9.0, components=7), 40.0, G)
     around = [sea_of(slight[i : i + 1], 40.0) for i in range(7)]
     whole = stirred(sea_of(slight, 40.0), 5.0, (10.0, 0.0, -3.0))[0]
     parts = sum(stirred(x, 5.0, (10.0, 0.0, -3.0))[0] for x in around)
@@ -273,7 +273,7 @@ def test_waves_add_up():
 @pytest.mark.parametrize("ramp", [None, 20.0])
 def test_elevation_and_its_rate(ramp):
     """What an end follows is what the line feels; its rate is the derivative, growth included."""
-    waves = components(JonswapWaves(height=3.0, period=9.0, components=30, direction=120), math.inf, G)
+    waves = components(JonswapWaves(significant_height=3.0, peak_period=9.0, components=30, direction=120), math.inf, G)
     around = sea_of(waves, math.inf, ramp)
     for t in (2.0, 13.0, 30.0):
         eta, rate = around.elevation(12.0, -5.0, t)
@@ -324,7 +324,7 @@ def test_jonswap_moments(gamma, n):
     The zero-crossing period is up to 2.5 % long: 1.3 % because the spectrum ends at 6 peak frequencies (m2 falls off as
     w^-2 only), the rest because a wave stands at the median of its share, not at its root mean square.
     """
-    waves = components(JonswapWaves(height=4.0, period=10.0, gamma=gamma, components=n), math.inf, G)
+    waves = components(JonswapWaves(significant_height=4.0, peak_period=10.0, gamma=gamma, components=n), math.inf, G)
     A, w = waves[:, 0], waves[:, 1]
     energy = 0.5 * A**2
     assert energy.sum() == pytest.approx(1.0, rel=1e-14)
@@ -367,7 +367,7 @@ def test_waves_share_the_energy():
 
 def test_a_seed_is_a_sea():
     def sea(seed):
-        return components(JonswapWaves(height=2.0, period=8.0, seed=seed), math.inf, G)
+        return components(JonswapWaves(significant_height=2.0, peak_period=8.0, seed=seed), math.inf, G)
 
     assert np.array_equal(sea(5), sea(5))
     assert not np.array_equal(sea(5), sea(6))
@@ -382,7 +382,7 @@ def test_elevation_statistics():
     A record of N = 1350 waves: the deviation is known to 1/sqrt(N)/2 = 1.5 % or so, kurtosis to 0.15; 3 of these.
     """
     height, period = 4.0, 10.0
-    waves = components(JonswapWaves(height=height, period=period, components=300, seed=3), math.inf, G)
+    waves = components(JonswapWaves(significant_height=height, peak_period=period, components=300, seed=3), math.inf, G)
     t = np.arange(0.0, 3 * 3600.0, 0.5)
     eta = np.zeros_like(t)
     for A, w, _, _, phase, _ in waves:

@@ -115,16 +115,16 @@ environment:
   gravity: 9.81
   fluid:
     density: 1025.0
-    current: {kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, turn: 30.0, ramp: 5.0}
+    current: {kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, veer: 30.0, ramp: 5.0}
     surface: 0.0
-    waves: {kind: jonswap, height: 3.0, period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}
+    waves: {kind: jonswap, significant_height: 3.0, peak_period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}
   seabed: {z: -100.0, slope: [0.01, -0.02], stiffness: 5.0e+3, damping: 500.0, friction: {axial: 0.3, lateral: 0.5}}
 cable:
   sections: [{length: 150.0, mass: 5.0, diameter: 0.05, drag: {normal: 1.2}}]
   attachments:
     - {kind: float, at: 75.0, buoyancy: 60.0, mass: 4.0, drag_area: 0.02, added_mass: 3.0, height: 0.2}
     - {kind: clump, at: 100.0, mass: 30.0, volume: 0.004, drag_area: 0.05, added_mass: 2.0, height: 0.3}
-    - {kind: modules, over: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}
+    - {kind: modules, range: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}
 ends:
   start:
     kind: pinned
@@ -135,7 +135,7 @@ ends:
       travel: {by: [10.0, 0.0, -2.0], over: 30.0, begin: 5.0}
       follow: waves
       ramp: 16.0
-  end: {kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}
+  end: {kind: body, initial_guess: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}
 initial: {kind: equilibrium, guess: catenary, friction: settled}
 model: {kind: catenary}
 time: {duration: 60.0, step: 0.05}
@@ -152,7 +152,7 @@ cable:
   sections: [{length: 40.0, mass: 2.0, diameter: 0.03}]
   attachments:
     - {kind: float, at: 15.0, volume: 0.2, mass: 20.0}
-    - {kind: modules, over: [20.0, 30.0], buoyancy: -5.0, mass: 8.0}
+    - {kind: modules, range: [20.0, 30.0], buoyancy: -5.0, mass: 8.0}
 ends:
   start: {kind: body, mass: 300.0, volume: 1.0, thrust: {value: [0.0, 5.0, 0.0], until: 20.0, ramp: 2.0}}
   end: {kind: pinned, position: [0.0, 0.0, -35.0]}

@@ -23,8 +23,8 @@ from hybrid.scene.schema import Scene
 ADAPTIVE = (
     OCEAN.replace(
         "model: {kind: catenary}",
-        "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, dwell: 2.0, always_rod: [[0.0, 10.0]], "
-        "always_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
+        "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
+        "force_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
     )
     + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%}\n"
 )
@@ -83,7 +83,7 @@ LISTABLE = {"surge", "sway", "heave", "roll", "pitch", "yaw"}
 
 REQUIRED = {
     "length", "mass", "kind", "amplitude", "period", "density", "duration", "rod", "catenary", "z",
-    "at", "over", "stiffness",
+    "at", "over", "range", "significant_height", "peak_period", "stiffness",
 }  # fmt: skip
 WORDS = {"title", "kind", "slack", "guess", "solver", "follow", "dimension"}
 
@@ -156,7 +156,7 @@ def _loaded(name: str) -> Any:
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
 SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "correct", "errors"}
-SIGNED |= {"z", "slope", "surface", "top", "bottom", "turn", "near", "thrust", "by", "shape"}
+SIGNED |= {"z", "slope", "surface", "top", "bottom", "veer", "initial_guess", "thrust", "by", "shape"}
 
 
 @pytest.mark.parametrize("case", LEAVES, ids=_id)

@@ -50,7 +50,7 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
             fluid=Fluid(
                 density=1025.0,
                 current=PowerLawCurrent(
-                    velocity=(0.5, 0.1, 0.0), top=-1.0, bottom=-80.0, exponent=0.2, turn=30.0, ramp=5.0
+                    velocity=(0.5, 0.1, 0.0), top=-1.0, bottom=-80.0, exponent=0.2, veer=30.0, ramp=5.0
                 ),
                 surface=0.0,
                 waves=JonswapWaves(
@@ -70,7 +70,7 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
             attachments=(
                 Float(at=75.0, buoyancy=60.0, mass=4.0, drag_area=0.02, added_mass=3.0, height=0.2),
                 Clump(at=100.0, mass=30.0, volume=0.004, drag_area=0.05, added_mass=2.0, height=0.3),
-                Modules(over=(20.0, 40.0), volume=0.02, mass=8.0, drag_area=0.3, added_mass=12.0),
+                Modules(range=(20.0, 40.0), volume=0.02, mass=8.0, drag_area=0.3, added_mass=12.0),
             ),
         ),
         ends=Ends(
@@ -85,7 +85,7 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
                 ),
             ),
             end=Body(
-                near=(60.0, 0.0, -80.0),
+                initial_guess=(60.0, 0.0, -80.0),
                 mass=100.0,
                 volume=0.09,
                 height=0.5,
@@ -102,7 +102,7 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
     assert parse_scene(SEA) == built
     assert parse_scene(scene_text(built)) == built
     assert built.ends.held() == {"start": (0.0, 0.0, 0.0)}
-    assert built.ends.near() == {"end": (60.0, 0.0, -80.0)} and list(built.ends.bodies()) == ["end"]
+    assert built.ends.initial_guesses() == {"end": (60.0, 0.0, -80.0)} and list(built.ends.bodies()) == ["end"]
 
 
 def test_currents_of_every_form() -> None:
@@ -117,7 +117,7 @@ def test_currents_of_every_form() -> None:
     assert parse_scene(SEA_UNIFORM).environment.fluid.current == UniformCurrent(velocity=(0, 8, 0), ramp=4.0)
     assert isinstance(parse_scene(SEA_TOO).environment.fluid.current, CurrentProfile)
     law = PowerLawCurrent(velocity=(1, 0, 0), bottom=-40)
-    assert (law.exponent, law.turn, law.top_under(None), law.top_under(3.0)) == (1 / 7, 0.0, 0.0, 3.0)
+    assert (law.exponent, law.veer, law.top_under(None), law.top_under(3.0)) == (1 / 7, 0.0, 0.0, 3.0)
     assert PowerLawCurrent(velocity=(1, 0, 0), top=-2, bottom=-40).top_under(3.0) == -2.0
 
 
@@ -164,7 +164,7 @@ def test_volumes_follow_from_net_buoyancy() -> None:
     volume = float_.volume_in(1025.0, 9.81)
     assert (1025.0 * volume - 4.0) * 9.81 == pytest.approx(60.0, rel=1e-14)
     assert clump.volume_in(1025.0, 9.81) == 0.004 and modules.volume_in(1025.0, 9.81) == 0.02
-    lift = Modules(over=(0, 1), buoyancy=100, mass=5).volume_in(1000.0, 10.0)
+    lift = Modules(range=(0, 1), buoyancy=100, mass=5).volume_in(1000.0, 10.0)
     assert lift == pytest.approx((10.0 + 5.0) / 1000.0, rel=1e-14)
     assert float_.height_in(1025.0, 9.81) == 0.2
     ball = Float(at=0, volume=math.pi / 6).height_in(1025.0, 9.81)
@@ -215,16 +215,16 @@ def test_wavenumber_at_its_limits() -> None:
 
 # --- refusals ----------------------------------------------------------------------------------
 
-BODY = "{kind: body, near: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}"
-POWER = "{kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, turn: 30.0, ramp: 5.0}"
-JONSWAP = "{kind: jonswap, height: 3.0, period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}"
+BODY = "{kind: body, initial_guess: [60.0, 0.0, -80.0], mass: 100.0, volume: 0.09, height: 0.5, shape: cylinder, drag_area: 0.4, added_mass: 40.0, thrust: [20.0, 0.0, 0.0]}"
+POWER = "{kind: power_law, velocity: [0.5, 0.1, 0.0], top: -1.0, bottom: -80.0, exponent: 0.2, veer: 30.0, ramp: 5.0}"
+JONSWAP = "{kind: jonswap, significant_height: 3.0, peak_period: 9.0, gamma: 2.0, direction: 180.0, seed: 7, components: 50, depth: 100.0, ramp: 18.0}"
 REGULAR = "{kind: regular, height: 2.0, period: 7.0, direction: 30.0, phase: 90.0, depth: 60.0}"
 PROFILE = (
     "{kind: profile, table: [{z: 0.0, velocity: [0.4, 0.0, 0.0]}, {z: -50.0, velocity: [0.1, 0.2, 0.0]}], ramp: 8.0}"
 )
 FLOAT = "{kind: float, at: 75.0, buoyancy: 60.0, mass: 4.0, drag_area: 0.02, added_mass: 3.0, height: 0.2}"
 CLUMP = "{kind: clump, at: 100.0, mass: 30.0, volume: 0.004, drag_area: 0.05, added_mass: 2.0, height: 0.3}"
-MODULES = "{kind: modules, over: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}"
+MODULES = "{kind: modules, range: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}"
 SEABED = (
     "seabed: {z: -100.0, slope: [0.01, -0.02], stiffness: 5.0e+3, damping: 500.0, friction: {axial: 0.3, lateral: 0.5}}"
 )
@@ -261,7 +261,7 @@ CASES = {
     "bottom over top": (SEA, "bottom: -80.0", "bottom: §80.0", "environment.fluid.current.bottom", "negative"),
     "bottom over surface": (SEA, "top: -1.0, bottom: -80.0", "bottom: §80.0", "environment.fluid.current.bottom", "0 m, the surface"),
     "exponent": (SEA, "exponent: 0.2", "exponent: §0", "environment.fluid.current.exponent", "> 0"),
-    "ramp of the current": (SEA, "turn: 30.0, ramp: 5.0", "turn: 30.0, ramp: §-5.0", "environment.fluid.current.ramp", "sign"),
+    "ramp of the current": (SEA, "veer: 30.0, ramp: 5.0", "veer: 30.0, ramp: §-5.0", "environment.fluid.current.ramp", "sign"),
     # --- waves
     "waves without surface": (SEA_TOO, f"surface: 0.0\n    waves: {REGULAR}", f"waves: {REGULAR}", "environment.fluid.surface", "add `surface: 0` (m)"),
     "waves of no kind": (SEA_TOO, REGULAR, "§{height: 2, period: 7}", "environment.fluid.waves.kind", "add `kind: regular`"),
@@ -271,12 +271,12 @@ CASES = {
     "gamma below one": (SEA, "gamma: 2.0", "gamma: §0.5", "environment.fluid.waves.gamma", ">= 1"),
     "too many components": (SEA, "components: 50", "components: §1001", "environment.fluid.waves.components", "<= 1000"),
     "half a seed": (SEA, "seed: 7", "seed: §7.5", "environment.fluid.waves.seed", "round"),
-    "Hs": (SEA, "height: 3.0, period", "height: 3.0, §Hs: 3, period", "environment.fluid.waves.Hs", "did you mean height (significant)?"),
+    "Hs": (SEA, "significant_height: 3.0", "significant_height: 3.0, §Hs: 3", "environment.fluid.waves.Hs", "did you mean significant_height?"),
     "waves one table up": (SEA_TOO, f"    surface: 0.0\n    waves: {REGULAR}", f"  §waves: {REGULAR}", "environment.waves", "surface: 0, waves: {kind: regular"),
     "waves without gravity": (SEA_TOO, f"environment:\n  fluid:\n    density: 1025.0\n    current: {PROFILE}\n    surface: 0.0\n    waves: {REGULAR}", f"environment:\n  gravity: 0\n  fluid: {{density: 1025, surface: 0, waves: §{REGULAR}}}", "environment.fluid.waves", "without gravity"),
     "breaking in deep water": (SEA_TOO, REGULAR, "{kind: regular, height: §11, period: 7}", "environment.fluid.waves.height", "less than 10.86 m, because in deep water waves of 7 s are 76.5 m long"),
     "breaking in shallow water": (SEA_TOO, REGULAR, "{kind: regular, height: §2, period: 7, depth: 2}", "environment.fluid.waves.height", "in 2 m of water"),
-    "breaking over the seabed": (SEA, "height: 3.0, period: 9.0", "height: §30.0, period: 9.0", "environment.fluid.waves.height", "in 100 m of water"),
+    "breaking over the seabed": (SEA, "significant_height: 3.0", "significant_height: §30.0", "environment.fluid.waves.significant_height", "in 100 m of water"),
     "two depths": (SEA, "depth: 100.0", "depth: §99.0", "environment.fluid.waves.depth", "follows from the seabed"),
     "waves too fast for the step": (change(SEA_TOO, "model: {kind: catenary}", "model: {kind: catenary}\ntime: {duration: 30, step: §2}"), None, None, "time.step", "a sixth of the shortest period, 1.16 s, of environment.fluid.waves"),
     # --- the seabed
@@ -291,7 +291,7 @@ CASES = {
     "depth of the environment": (SEA, SEABED, f"{SEABED}\n  §depth: 100", "environment.depth", "z: -depth"),
     "surface under the seabed": (SEA, "surface: 0.0", "surface: §-101.0", "environment.fluid.surface", "seabed at ends.start"),
     "an end in the ground": (OCEAN, "  fluid", "  seabed: {z: -95, stiffness: 1.0e4}\n  fluid", "ends.start.position", "raise it"),
-    "a body in the ground": (SEA, "near: [60.0, 0.0, -80.0]", "near: §[60.0, 0.0, -110.0]", "ends.end.near", "raise it"),
+    "a body in the ground": (SEA, "initial_guess: [60.0, 0.0, -80.0]", "initial_guess: §[60.0, 0.0, -110.0]", "ends.end.initial_guess", "raise it"),
     "a way into the ground": (SEA, "by: [10.0, 0.0, -2.0]", "by: §[0.0, 0.0, -120.0]", "ends.start.motion.travel.by", "raise it"),
     "a polyline in the ground": (change(CALM, "{kind: equilibrium, points", "{kind: points, points"), "[10.0, 0.0, -20.0]]", "§[6.0, 0.0, -28.0]]", "initial.points[1]", "raise it"),
     "a straight cable in the ground": (change(CALM, "ends: {start: {kind: free}", "ends: {start: {kind: pinned, position: [0, 0, -20]}"), "{kind: equilibrium, points: [[0.0, 0.0, -20.0], [10.0, 0.0, -20.0]]}", "{kind: straight, direction: §[1, 0, -1]}", "initial.direction", "another direction"),
@@ -304,17 +304,17 @@ CASES = {
     "ballast without mass": (SEA_TOO, "buoyancy: -5.0, mass: 8.0", "buoyancy: §-5.0", "cable.attachments[1].buoyancy", "at least 0 N/m"),
     "beyond the end": (SEA, "at: 75.0", "at: §151.0", "cable.attachments[0].at", "150 m"),
     "before the start": (SEA, "at: 75.0", "at: §-1", "cable.attachments[0].at", "sign"),
-    "over the end": (SEA, "over: [20.0, 40.0]", "over: [20.0, §151.0]", "cable.attachments[2].over[1]", "150 m"),
-    "backwards": (SEA, "over: [20.0, 40.0]", "over: §[40.0, 20.0]", "cable.attachments[2].over", "[from, to]"),
-    "over a point": (SEA, "over: [20.0, 40.0]", "over: §30", "cable.attachments[2].over", "two numbers"),
+    "over the end": (SEA, "range: [20.0, 40.0]", "range: [20.0, §151.0]", "cable.attachments[2].range[1]", "150 m"),
+    "backwards": (SEA, "range: [20.0, 40.0]", "range: §[40.0, 20.0]", "cable.attachments[2].range", "[from, to]"),
+    "over a point": (SEA, "range: [20.0, 40.0]", "range: §30", "cable.attachments[2].range", "two numbers"),
     "a float in vacuum": (AT_REST, "mass: 1.0}]", "mass: 1.0}], attachments: [{kind: §float, at: 3, volume: 1}]", "cable.attachments[0].kind", "only weighs is kind: clump"),
     "a clump that drags in vacuum": (AT_REST, "mass: 1.0}]", "mass: 1.0}], attachments: [{kind: clump, at: 3, mass: 1, drag_area: §1}]", "cable.attachments[0].drag_area", "leave drag_area out"),
     "buoyancy without gravity": (SEA_TOO, f"environment:\n  fluid:\n    density: 1025.0\n    current: {PROFILE}\n    surface: 0.0\n    waves: {REGULAR}", "environment: {gravity: 0, fluid: {density: 1025}}", "cable.attachments[1].buoyancy", "give volume"),
     "weight of a clump": (SEA, "at: 100.0, mass: 30.0", "at: 100.0, mass: 30.0, §weight: 300", "cable.attachments[1].weight", "use mass (kg)"),
     "buoyancy of a clump": (SEA, "at: 100.0, mass: 30.0", "at: 100.0, mass: 30.0, §buoyancy: 300", "cable.attachments[1].buoyancy", "use volume"),
     "drag of a float": (SEA, "drag_area: 0.02", "drag_area: 0.02, §drag: 1", "cable.attachments[0].drag", "did you mean drag_area (m^2)?"),
-    "stretch of a float": (SEA, "at: 75.0", "at: 75.0, §over: [1, 2]", "cable.attachments[0].over", "kind: modules"),
-    "point of modules": (SEA, "over: [20.0, 40.0]", "over: [20.0, 40.0], §at: 3", "cable.attachments[2].at", "over: [from, to]"),
+    "stretch of a float": (SEA, "at: 75.0", "at: 75.0, §range: [1, 2]", "cable.attachments[0].range", "kind: modules"),
+    "point of modules": (SEA, "range: [20.0, 40.0]", "range: [20.0, 40.0], §at: 3", "cable.attachments[2].at", "range: [from, to]"),
     "sinker": (SEA, CLUMP, "{kind: §sinker, at: 3, mass: 3}", "cable.attachments[1].kind", "did you mean clump?"),
     "attachments as a table": (AT_REST, "mass: 1.0}]", "mass: 1.0}], attachments: §{kind: clump, at: 3, mass: 1}", "cable.attachments", "dash"),
     # --- bodies
@@ -322,15 +322,15 @@ CASES = {
     "body, a word": (SEA, BODY, "§body", "ends.end.mass", "{kind: body, mass: ...}"),
     "rov": (SEA, BODY, "{kind: §rov, mass: 1}", "ends.end.kind", "did you mean body?"),
     "buoyancy of a body": (SEA, "volume: 0.09", "volume: 0.09, §buoyancy: 3", "ends.end.buoyancy", "use volume"),
-    "position of a body": (SEA, "near: [60.0", "§position: [0, 0, 0], near: [60.0", "ends.end.position", "near says where"),
+    "position of a body": (SEA, "initial_guess: [60.0", "§position: [0, 0, 0], initial_guess: [60.0", "ends.end.position", "initial_guess says where"),
     "force on a body": (SEA, "volume: 0.09", "volume: 0.09, §force: [1, 0, 0]", "ends.end.force", "use thrust"),
     "motion of a body": (SEA, "volume: 0.09", "volume: 0.09, §motion: {ramp: 1}", "ends.end.motion", "moves with the cable"),
     "a massive free end": (AT_REST, FREE, "{kind: free, §mass: 3}", "ends.end.mass", "kind: body"),
     "a body that floats in vacuum": (AT_REST, FREE, "{kind: body, mass: 3, volume: §1}", "ends.end.volume", "leave volume out"),
-    "a body elsewhere": (AT_REST.replace(GUESS, "guess: auto"), FREE, "{kind: body, mass: 3, near: §[20, 0, 0]}", "ends.end.near", "a longer cable"),
-    "a body beside a direction": (AT_REST, FREE, "{kind: body, mass: 3, near: §[5, 0, 0]}", "ends.end.near", "leave near out"),
-    "a body beside the polyline": (SEA_TOO, "{kind: body, mass", "{kind: body, near: §[10, 0, 1], mass", "ends.start.near", "leave near out"),
-    "a body beside the straight cable": (AT_REST.replace(f"equilibrium, {GUESS}", "straight, direction: [0, 0, -1]"), FREE, "{kind: body, mass: 3, near: §[0, 0, -9]}", "ends.end.near", "leave near out"),
+    "a body elsewhere": (AT_REST.replace(GUESS, "guess: auto"), FREE, "{kind: body, mass: 3, initial_guess: §[20, 0, 0]}", "ends.end.initial_guess", "a longer cable"),
+    "a body beside a direction": (AT_REST, FREE, "{kind: body, mass: 3, initial_guess: §[5, 0, 0]}", "ends.end.initial_guess", "leave initial_guess out"),
+    "a body beside the polyline": (SEA_TOO, "{kind: body, mass", "{kind: body, initial_guess: §[10, 0, 1], mass", "ends.start.initial_guess", "leave initial_guess out"),
+    "a body beside the straight cable": (AT_REST.replace(f"equilibrium, {GUESS}", "straight, direction: [0, 0, -1]"), FREE, "{kind: body, mass: 3, initial_guess: §[0, 0, -9]}", "ends.end.initial_guess", "leave initial_guess out"),
     "a number for thrust": (SEA, "thrust: [20.0, 0.0, 0.0]", "thrust: §20", "ends.end.thrust", "`thrust: [20, 0, 0]`"),
     # --- motion
     "velocity without ramp": (OCEAN, HEAVE, "§{velocity: [1, 0, 0]}", "ends.end.motion.ramp", "add `ramp: ...` (s)"),
@@ -407,14 +407,14 @@ ACCEPTED = {
     "current, rising or falling": (SEA_LIST, LIST, "[{z: 0, velocity: [1, 0, 0]}, {z: -1, velocity: [0, 0, 0]}]"),
     "an end a little in the ground": (OCEAN, "  fluid", "  seabed: {z: -99.9, stiffness: 1.0e4}\n  fluid"),
     "the depth again": (SEA, "depth: 100.0", "depth: 100.00001"),
-    "modules that overlap": (SEA, MODULES, f"{MODULES}\n    - {{kind: modules, over: [30, 150], buoyancy: 1}}"),
+    "modules that overlap": (SEA, MODULES, f"{MODULES}\n    - {{kind: modules, range: [30, 150], buoyancy: 1}}"),
     "an attachment at either end": (SEA, CLUMP, "{kind: clump, at: 0, mass: 1}\n    - {kind: clump, at: 150, mass: 1}"),
     "a clump in vacuum": (AT_REST, "mass: 1.0}]", "mass: 1.0}], attachments: [{kind: clump, at: 3, mass: 1}]"),
     "a body in vacuum": (AT_REST, FREE, "{kind: body, mass: 3, thrust: [1, 0, 0]}"),
-    "a body where the straight cable ends": (AT_REST.replace(f"equilibrium, {GUESS}", "straight, direction: [0, 0, -1]"), FREE, "{kind: body, mass: 3, near: [0, 0, -10]}"),
-    "two bodies afloat": (RISING, "free, end: free}\ninitial: {kind: equilibrium, " + GUESS, "{kind: body, mass: 1, volume: 0.1, near: [0, 0, 0]}, end: {kind: body, mass: 1, volume: 0.1, near: [8, 0, 0]}}\ninitial: {kind: equilibrium"),
+    "a body where the straight cable ends": (AT_REST.replace(f"equilibrium, {GUESS}", "straight, direction: [0, 0, -1]"), FREE, "{kind: body, mass: 3, initial_guess: [0, 0, -10]}"),
+    "two bodies afloat": (RISING, "free, end: free}\ninitial: {kind: equilibrium, " + GUESS, "{kind: body, mass: 1, volume: 0.1, initial_guess: [0, 0, 0]}, end: {kind: body, mass: 1, volume: 0.1, initial_guess: [8, 0, 0]}}\ninitial: {kind: equilibrium"),
     "held against each other": (change(CALM, ", friction: 0.4", ""), "{start: {kind: free}, end: {kind: body, mass: 10.0}}", "{start: {kind: free, force: [-1, 0, 0]}, end: {kind: body, mass: 10.0, thrust: [1, 0, 0]}}"),
-    "a catenary to a body": (AT_REST.replace(GUESS, "guess: catenary"), FREE, "{kind: body, mass: 3, near: [5, 0, 0]}"),
+    "a catenary to a body": (AT_REST.replace(GUESS, "guess: catenary"), FREE, "{kind: body, mass: 3, initial_guess: [5, 0, 0]}"),
     "an arc": (OCEAN, "{kind: equilibrium}", "{kind: equilibrium, guess: arc}"),
     "both ends towed": (change(OCEAN, "position: [0, 0, -100]}", "position: [0, 0, -100], motion: {velocity: [5, 0, 0], ramp: 10}}"), HEAVE, "{velocity: [5, 0, 0], ramp: 10}"),
     "to and fro by lists": (OCEAN, HEAVE, "{heave: [{amplitude: 1, period: 8}], sway: {amplitude: 1, period: 9}, ramp: 16}"),
@@ -450,7 +450,7 @@ def test_the_sea_is_refused_in_python_too() -> None:
     with pytest.raises(ValueError, match="either buoyancy"):
         Float(at=0, buoyancy=1, volume=1)
     with pytest.raises(ValueError, match="smaller first"):
-        Modules(over=(2, 1), volume=1)
+        Modules(range=(2, 1), volume=1)
     with pytest.raises(ValueError, match="waves need a surface"):
         Fluid(density=1, waves=RegularWaves(height=1, period=8))
     with pytest.raises(ValueError, match="only rise or only fall"):

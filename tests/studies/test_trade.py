@@ -41,7 +41,7 @@ SAG: dict[str, Any] = {
         },
     },
     "initial": "equilibrium",
-    "model": {"kind": "adaptive", "tolerance": 1e-4, "always_rod": [[0.0, 1.0]]},
+    "model": {"kind": "adaptive", "tolerance": 1e-4, "force_rod": [[0.0, 1.0]]},
     "mesh": {"cells": 20},
     "time": {"duration": 1.0, "step": 0.05},
     "output": {"every": 0.1, "points": 25},
@@ -164,7 +164,7 @@ def test_a_rung_keeps_the_scene_and_drops_how_finely_it_was_to_be_computed() -> 
     asked = hybrid.validate_scene(rungs.rung_data(scene(), "adaptive", "0.3%"))
     assert asked.mesh is None and asked.time is not None and asked.time.step is None
     assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
-    assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.always_rod == ((0.0, 1.0),)
+    assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.force_rod == ((0.0, 1.0),)
     assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
     assert rungs.rung_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
 
@@ -275,7 +275,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
     for said in (
         "# a line that sags", found.recommendation, "(trade.png)", "| machine | ", "cores", "| versions | hybrid-cable ",
         "`hybrid trade sag.yaml`", "Reference: rod 1%", "rod 3% differs from it by", "time.step, mesh, model.tolerance",
-        "it keeps always_rod",
+        "it keeps force_rod",
     ):  # fmt: skip
         assert said in page, said
     assert page.count("**take this**") == 1

@@ -221,12 +221,12 @@ class _Maker:
             return {"kind": "pinned", "position": end.place}, line
         if end.point.mass == 0.0:
             return {"kind": "free"}, line
-        body: dict[str, Any] = {"kind": "body", "near": end.place, "mass": end.point.mass}
+        body: dict[str, Any] = {"kind": "body", "initial_guess": end.place, "mass": end.point.mass}
         other = self.cable.end if end is self.cable.start else self.cable.start
         if math.dist(end.place, other.place) > sum(self.lengths) and other.point is None:
             why = "the deck's first place of this point is out of the line's reach; the scene leaves it to the search"
             self.notes.append(note(TAKEN, end.point.row, why))
-            del body["near"]
+            del body["initial_guess"]
         return body | self._water(end.point), line
 
     def _model(self, bends: Sequence[bool]) -> list[str]:
