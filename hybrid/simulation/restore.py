@@ -154,7 +154,7 @@ def restored_parts(
         start = first if not changes else build(scenes[0], effort, first.layout)
         step = effort.step if effort.local is None else 0.0
         given = given_zones(scene, first.layout)
-        manager = manager_for(start, effort.zones, wanted.dwell, given, step, criterion)
+        manager = manager_for(start, effort.zones, wanted.hold_time, given, step, criterion)
         manager.moments = model.ends.moments
         manager.loaded = bool(manager.moments.any())
         manager.follow(model.layout)
