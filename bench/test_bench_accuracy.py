@@ -19,7 +19,7 @@ import pytest
 
 import hybrid
 from hybrid.model.resolution import Effort
-from hybrid.simulation.case import Job
+from hybrid.simulation.case import Case
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
 from problems import whip
@@ -110,11 +110,11 @@ def test_accuracy_asked_and_achieved():
 
 def runs(scene, efforts):
     """Errors of position against the last of the efforts, and CPU seconds, median of five."""
-    job = Job(scene, None)
-    exact = job.sketch(efforts[-1])
+    case = Case(scene, None)
+    exact = case.sample(efforts[-1])
     out = []
     for effort in efforts[:-1]:
-        tries = [job.sketch(effort) for _ in range(5)]
+        tries = [case.sample(effort) for _ in range(5)]
         error = np.linalg.norm(tries[0].values["position"] - exact.values["position"], axis=2).max()
         out.append((float(error), median(t.cpu for t in tries), tries[0].steps))
     return out

@@ -24,9 +24,12 @@ from hybrid.model.resolution import Effort, asked, first_effort, mesh_is_free, w
 from hybrid.scene.motion import check_motions
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
-from hybrid.simulation.case import Job
-from hybrid.simulation.error_control import Climb, Errors, Sketch, comparison_efforts, summary, survey_effort
+from hybrid.simulation.case import Case
+from hybrid.simulation.error_control import ErrorController, comparison_efforts
+from hybrid.simulation.error_estimate import Errors, RunSample, summary
+from hybrid.simulation.mesh_survey import survey_effort
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
+from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import Remainder, remainder
 from hybrid.simulation.restore import refused
 from hybrid.simulation.undersampling import undersampled_end_forces
@@ -36,7 +39,7 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import amend, check_target
 
-Record = Callable[[Effort, Path | io.BytesIO], Sketch]
+Record = Callable[[Effort, Path | io.BytesIO], RunSample]
 
 
 def run(
@@ -69,11 +72,11 @@ def run(
             return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    job, target = Job(scene, criterion), _target(output, overwrite)
-    with locked(_path(output)), _working(job, progress):
+    case, target = Case(scene, criterion), _target(output, overwrite)
+    with locked(_path(output)), _working(case, progress):
         if isinstance(target, Path):
             _beside(target).unlink(missing_ok=True)  # of a run that was cut off
-        _run(job, target)
+        _run(case, target)
     return open_result(target)
 
 
@@ -107,31 +110,31 @@ def resume(
         if left.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        job = Job(left.scene, criterion, left.changes)
-        with _working(job, progress):
-            _run(job, target, path, left)
+        case = Case(left.scene, criterion, left.changes)
+        with _working(case, progress):
+            _run(case, target, path, left)
     return open_result(target)
 
 
-def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: Remainder | None = None) -> None:
+def _run(case: Case, target: Path | io.BytesIO, source: Path | None = None, left: Remainder | None = None) -> None:
     """Compute a result, and its errors if they are wanted; source, left: what to go on with."""
-    scene, begin = job.scene, clock.process_time()
+    scene, begin = case.scene, clock.process_time()
     assert scene.time is not None
     anew = left is None or left.anew
-    climb: Climb | None = None
+    control: ErrorController | None = None
 
-    def first(effort: Effort, to: Path | io.BytesIO) -> Sketch:
+    def first(effort: Effort, to: Path | io.BytesIO) -> RunSample:
         if anew or source is None or isinstance(to, io.BytesIO):
-            return job.record(effort, to, kept())
-        return job.go_on(source, to, kept())
+            return case.record(effort, to, kept())
+        return case.go_on(source, to, kept())
 
-    def later(effort: Effort, to: Path | io.BytesIO) -> Sketch:
-        if isinstance(to, Path) and job.goes_on(to, effort):  # one that was cut off
-            return job.go_on(to, to, kept())
-        return job.record(effort, to, kept())
+    def later(effort: Effort, to: Path | io.BytesIO) -> RunSample:
+        if isinstance(to, Path) and case.goes_on(to, effort):  # one that was cut off
+            return case.go_on(to, to, kept())
+        return case.record(effort, to, kept())
 
     def kept() -> Tree:
-        return climb.checkpoint() if climb is not None else {}
+        return control.checkpoint() if control is not None else {}
 
     effort = first_effort(scene) if left is None else left.effort
     if not wants_errors(scene):
@@ -139,43 +142,47 @@ def _run(job: Job, target: Path | io.BytesIO, source: Path | None = None, left: 
         return
     compute = _kept(target, first, later)
     try:
-        steps_are_free = scene.time.controlled and scene.time.tolerance is None
-        climb = Climb(
-            asked(scene), mesh_is_free(scene), steps_are_free, zones_are_free(scene), True, job.sketch, compute
-        )
+        control = ErrorController(asked(scene), _free(scene), True, case.sample, compute)
         if left is not None and left.before:
             with refused(source or Path()):
-                climb.restore(left.before, scene)
-            final, errors = climb.go_on()
+                control.restore(left.before, scene)
+            final, errors = control.proceed()
         else:
             surveys = left is None and asked(scene) is not None
-            _expect(job, effort, surveys and mesh_is_free(scene))
+            _expect(case, effort, surveys and mesh_is_free(scene))
             if surveys:
-                effort = replace(effort, grading=job.survey(effort))
-            final, errors = climb.reach(effort)
+                effort = replace(effort, grading=case.survey(effort))
+            final, errors = control.start(effort)
     except KeyboardInterrupt:
-        if climb is not None and climb.estimate is not None:
+        if control is not None and control.estimate is not None:
             # stopped in a finer run: the result before it stands, with its figure
-            final, errors = climb.stopped()
-            _amend(target, scene, final, errors, climb, clock.process_time() - begin, done=False)
+            final, errors = control.without_refinement("a finer run was stopped from outside")
+            _amend(target, scene, final, errors, control, clock.process_time() - begin, done=False)
         raise
-    _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+    _amend(target, scene, final, errors, control, clock.process_time() - begin)
 
 
-def _expect(job: Job, effort: Effort, surveys: bool) -> None:
+def _free(scene: Scene) -> Free:
+    """What the scene leaves to the program."""
+    time = scene.time
+    steps = time is not None and time.controlled and time.tolerance is None
+    return Free(mesh_is_free(scene), steps, zones_are_free(scene))
+
+
+def _expect(case: Case, effort: Effort, surveys: bool) -> None:
     """Tell the progress which passes are to come: surveys, whether the first looks how the cable bends."""
     passes = [(PRE_RUN, survey_effort(effort))] if surveys else []
     passes += [(ESTIMATION, x) for x in comparison_efforts(effort, moves=True)]
-    job.progress.expect([*passes, (RESULT, effort)], effort)
+    case.progress.expect([*passes, (RESULT, effort)], effort)
 
 
 @contextmanager
-def _working(job: Job, progress: bool | Listener) -> Iterator[None]:
+def _working(case: Case, progress: bool | Listener) -> Iterator[None]:
     """Hear of interrupts, and tell of the progress, until a run is done."""
-    assert job.scene.time is not None
+    assert case.scene.time is not None
     listener = listener_of(progress)
-    with _interrupts() as interrupted, ProgressReporter(listener, job.scene.time.duration) as reporter:
-        job.progress, job.interrupted = reporter, interrupted
+    with _interrupts() as interrupted, ProgressReporter(listener, case.scene.time.duration) as reporter:
+        case.progress, case.interrupted = reporter, interrupted
         yield
 
 
@@ -191,24 +198,25 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
 
         with locked(_path(output)):
             return static_shooting(scene, output, overwrite)
-    job, begin = Job(scene, None), clock.process_time()
+    case, begin = Case(scene, None), clock.process_time()
     target, effort = _target(output, overwrite), first_effort(scene)
     with locked(_path(output)):
         if not wants_errors(scene):
-            job.record_rest(effort, target)
+            case.record_equilibrium(effort, target)
             return open_result(target)
-        compute = _kept(target, job.record_rest, job.record_rest)
-        climb = Climb(asked(scene), mesh_is_free(scene), False, zones_are_free(scene), False, job.sketch_rest, compute)
-        final, errors = climb.reach(effort)
-        _amend(target, scene, final, errors, climb, clock.process_time() - begin)
+        compute = _kept(target, case.record_equilibrium, case.record_equilibrium)
+        free = _free(scene)._replace(steps=False)
+        control = ErrorController(asked(scene), free, False, case.sample_equilibrium, compute)
+        final, errors = control.start(effort)
+        _amend(target, scene, final, errors, control, clock.process_time() - begin)
     return open_result(target)
 
 
-def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], Sketch]:
+def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], RunSample]:
     """Record results one after the other: a finer one takes the place of that before it when it is complete."""
     done = False
 
-    def compute(effort: Effort) -> Sketch:
+    def compute(effort: Effort) -> RunSample:
         nonlocal done
         if not done:
             found, done = first(effort, target), True
@@ -233,8 +241,8 @@ def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[
 
 
 def _amend(
-    target: Path | io.BytesIO, scene: Scene, final: Sketch, errors: Errors | None, climb: Climb, cpu: float,
-    done: bool = True,
+    target: Path | io.BytesIO, scene: Scene, final: RunSample, errors: Errors | None, control: ErrorController,
+    cpu: float, done: bool = True,
 ) -> None:  # fmt: skip
     """Write how wrong a result may be, how finely it was computed, and what went into that, into its file.
 
@@ -242,15 +250,15 @@ def _amend(
     """
     effort = final.effort
     attributes: dict[str, str | float | int] = {
-        "effort_fineness": effort.fineness, "effort_runs": len(climb.runs),
+        "effort_fineness": effort.fineness, "effort_runs": len(control.runs),
         "effort_cpu": cpu, "effort_step": effort.step,
     }  # fmt: skip
     if effort.local is not None:
         attributes["effort_step_error"] = effort.local
     if isinstance(scene.model, AdaptiveModel):
         attributes["effort_zones"] = effort.zones
-    if climb.asked is not None:
-        attributes["accuracy_asked"] = climb.asked.text
+    if control.asked is not None:
+        attributes["accuracy_asked"] = control.asked.text
     fields: list[tuple[Field, np.ndarray]] = []
     if errors is not None:
         attributes |= summary(errors)
@@ -262,9 +270,9 @@ def _amend(
                     continue  # the run has written it itself
                 fields.append((Field(f"errors/{kind}/{name}", unit, text, values.shape[1:], dims), values))
     with open_result(target) as result:
-        total = errors.fields.get("total", {}) if errors is not None and climb.moves else {}
+        total = errors.fields.get("total", {}) if errors is not None and control.moves else {}
         undersampled = undersampled_end_forces(result, total)
-    amend(target, fields, attributes, [*dict(reversed(climb.notes)).items(), *undersampled], done)
+    amend(target, fields, attributes, [*dict(reversed(control.notes)).items(), *undersampled], done)
 
 
 UNITS_OF_ERRORS = {

@@ -26,13 +26,8 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Watch
 from hybrid.simulation.equilibrium import equilibrium_of, zones_and_rest
-from hybrid.simulation.error_control import (
-    COMPARED,
-    SURVEY_POINTS,
-    Sketch,
-    survey_effort,
-    survey_grading,
-)
+from hybrid.simulation.error_estimate import COMPARED, RunSample
+from hybrid.simulation.mesh_survey import POINTS, survey_effort, survey_grading
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import Phase, changes_text
 from hybrid.simulation.restore import effort_from, effort_tree, program, refused, restored_parts
@@ -67,7 +62,7 @@ STEP_FIELDS = (
 )
 
 
-class Job:
+class Case:
     """One scene, computed as often and as finely as it takes."""
 
     def __init__(self, scene: Scene, criterion: UserCriterion | None, changes: Sequence[Phase] = ()) -> None:
@@ -77,7 +72,7 @@ class Job:
         self.results = 0  # that were begun
         self.interrupted: Callable[[], bool] = lambda: False
 
-    def record(self, effort: Effort, target: Path | io.BytesIO, before: Tree | None = None) -> Sketch:
+    def record(self, effort: Effort, target: Path | io.BytesIO, before: Tree | None = None) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
         begin = self._begin_result(effort)
         model, equilibrium, zoning = self._model(effort)
@@ -97,7 +92,7 @@ class Job:
             self._finish(motion, outputs)
         return self._seen(motion, target, clock.process_time() - begin)
 
-    def go_on(self, source: Path, target: Path, before: Tree | None = None) -> Sketch:
+    def go_on(self, source: Path, target: Path, before: Tree | None = None) -> RunSample:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""
         with opened(source) as file:
             point = read_checkpoint(file)
@@ -178,11 +173,11 @@ class Job:
         self._report(motion, finished=True)
         motion.recorder.close("complete", f"{motion.steps} steps")
 
-    def _seen(self, motion: Motion, target: Path | io.BytesIO, cpu: float) -> Sketch:
+    def _seen(self, motion: Motion, target: Path | io.BytesIO, cpu: float) -> RunSample:
         """What is to be compared of a complete result."""
         effort, cells, steps = motion.effort, cells_of(motion.model), motion.steps
         if not wants_errors(self.scene):
-            return Sketch(effort, {}, cells, steps, 0.0)
+            return RunSample(effort, {}, cells, steps, 0.0)
         with open_result(target) as result:
             values = {name: np.array(result[name]) for name in COMPARED if name in result}
             model_error = (
@@ -190,9 +185,9 @@ class Job:
             )
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
             notes = _damped(result) if effort.local is not None else ()
-        return Sketch(effort, values, cells, steps, cpu, 1, unresolved, model_error, 0.0, notes)
+        return RunSample(effort, values, cells, steps, cpu, 1, unresolved, model_error, 0.0, notes)
 
-    def sketch(self, effort: Effort, points: Floats | None = None) -> Sketch:
+    def sample(self, effort: Effort, points: Floats | None = None) -> RunSample:
         """Compute for comparison only; points: places, m, instead of those of the result.
 
         An effort with longer steps has as many times fewer outputs, so that these do not shorten its steps.
@@ -217,7 +212,7 @@ class Job:
         spent = clock.process_time() - begin
         bound = effort.zones * model.length if zoning is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(notebook.events) if kind == BEYOND}.values())
-        return Sketch(
+        return RunSample(
             effort, values, cells_of(model), motion.steps, spent, effort.every, False, model_error, bound, notes
         )
 
@@ -227,15 +222,15 @@ class Job:
             return None
         coarse = survey_effort(effort)
         model = build(self.scene, coarse)
-        s = np.linspace(0.0, model.length, SURVEY_POINTS)
+        s = np.linspace(0.0, model.length, POINTS)
         try:
-            seen = self.sketch(coarse, s)
+            seen = self.sample(coarse, s)
         except ComputationError:
             return None
         bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
         return survey_grading(model, s, seen.values, bend)
 
-    def record_rest(self, effort: Effort, target: Path | io.BytesIO) -> Sketch:
+    def record_equilibrium(self, effort: Effort, target: Path | io.BytesIO) -> RunSample:
         """The same of the equilibrium."""
         begin = clock.process_time()
         model, found = self._rest(effort)
@@ -253,14 +248,14 @@ class Job:
             values = _values_at_rest(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
-        return _sketch_at_rest(effort, model, values, clock.process_time() - begin)
+        return _sample_at_rest(effort, model, values, clock.process_time() - begin)
 
-    def sketch_rest(self, effort: Effort) -> Sketch:
+    def sample_equilibrium(self, effort: Effort) -> RunSample:
         """The equilibrium for comparison only."""
         begin = clock.process_time()
         model, found = self._rest(effort)
         values = _values_at_rest(model, found, self._at_rest(model, COMPARED))
-        return _sketch_at_rest(effort, model, values, clock.process_time() - begin)
+        return _sample_at_rest(effort, model, values, clock.process_time() - begin)
 
     def _at_rest(self, model: Model, only: Sequence[str] | None = None) -> Observer:
         s = output_points(self.scene.output.points, model.length)
@@ -365,10 +360,10 @@ def _values_at_rest(model: Model, found: Equilibrium, observer: Observer) -> dic
     return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
 
 
-def _sketch_at_rest(effort: Effort, model: Model, values: Mapping[str, object], cpu: float) -> Sketch:
+def _sample_at_rest(effort: Effort, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
     kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
     left = {k.removeprefix(MODEL): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL)}
-    return Sketch(effort, kept, cells_of(model), 1, cpu, 1, False, left)
+    return RunSample(effort, kept, cells_of(model), 1, cpu, 1, False, left)
 
 
 def cells_of(model: Model) -> int:

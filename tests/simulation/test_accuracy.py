@@ -10,7 +10,9 @@ from hybrid.errors import SceneError
 from hybrid.model.mesh_grading import GROWTH, grading
 from hybrid.model.resolution import Asked, Effort, first_effort, wants_errors
 from hybrid.scene.accuracy import amount
-from hybrid.simulation.error_control import ORDERS, Climb, Errors, Estimate, Sketch, Verdict, finer, judge
+from hybrid.simulation.error_control import ErrorController
+from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate, RunSample
+from hybrid.simulation.refinement import Free, Verdict, judge, refined
 
 # --- what is written -----------------------------------------------------------------------------
 
@@ -97,7 +99,7 @@ def test_coarser_efforts():
 # --- estimates, by pure functions ----------------------------------------------------------------
 
 
-def sketch(effort: Effort, steps: int, order: float, every: int = 1, noise: float = 0.0) -> Sketch:
+def sample(effort: Effort, steps: int, order: float, every: int = 1, noise: float = 0.0) -> RunSample:
     """A run whose error is h^order + 0.5 dt^order in position and pull, of known sign, at 9 outputs."""
     t = np.linspace(0.0, 1.0, 9)
     keep = np.unique(np.append(np.arange(0, 9, every), 8))
@@ -106,16 +108,16 @@ def sketch(effort: Effort, steps: int, order: float, every: int = 1, noise: floa
     position = np.zeros((9, 4, 3))
     position[..., 2] = (np.sin(t) + wrong)[:, None]
     values = {"position": position[keep], "reaction_end": (np.cos(t) + wrong)[keep, None] * [0.0, 0.0, 1.0]}
-    return Sketch(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
+    return RunSample(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
 
 
 @pytest.mark.parametrize("order", [1.25, 1.4, 2.0])
 def test_an_error_of_one_order_is_found_exactly(order):
     effort = Effort(1.0, 0.1, None, 1e-3)
-    final = sketch(effort, 100, order)
-    coarse = sketch(effort.coarser(2, 2), 50, order, 2)
-    rough = sketch(effort.coarser(2, 4), 25, order, 4)
-    coarsest = sketch(effort.coarser(4, 4), 25, order, 4)
+    final = sample(effort, 100, order)
+    coarse = sample(effort.coarser(2, 2), 50, order, 2)
+    rough = sample(effort.coarser(2, 4), 25, order, 4)
+    coarsest = sample(effort.coarser(4, 4), 25, order, 4)
     estimate = Estimate(final, coarse, rough, coarsest)
     assert estimate.order["position"] == pytest.approx(order, abs=1e-6)
     found = estimate.errors
@@ -123,8 +125,8 @@ def test_an_error_of_one_order_is_found_exactly(order):
     assert found.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
     assert found.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
     assert found.largest("total", "end_force_end") == pytest.approx(0.03, rel=1e-6)
-    better = sketch(Effort(2.5, 0.03, None, 1e-3), 300, order)
-    estimate.follow(better)
+    better = sample(Effort(2.5, 0.03, None, 1e-3), 300, order)
+    estimate.update(better)
     assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02 / 2.5**order, rel=1e-6)
     assert estimate.errors.largest("time", "position") == pytest.approx(0.01 / 3.0**order, rel=1e-6)
 
@@ -132,8 +134,8 @@ def test_an_error_of_one_order_is_found_exactly(order):
 def test_orders_are_bounded():
     """Runs that do not converge count as of the least order: the figure is most of what the last refinement has changed."""
     effort = Effort(1.0, 0.1, None, 1e-3)
-    runs = [sketch(effort, 100, 2.0, 1, 0.0), sketch(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
-    runs += [sketch(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sketch(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
+    runs = [sample(effort, 100, 2.0, 1, 0.0), sample(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
+    runs += [sample(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sample(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
     estimate = Estimate(*runs)
     assert estimate.order["position"] == ORDERS[0]
     assert estimate.errors.largest("total", "position") > 0.3
@@ -141,7 +143,7 @@ def test_orders_are_bounded():
 
 def test_without_the_rougher_runs_an_order_in_between_is_taken():
     effort = Effort(1.0, 0.1, None, 1e-3)
-    estimate = Estimate(sketch(effort, 100, 2.0), sketch(effort.coarser(2, 2), 50, 2.0, 2), None, None)
+    estimate = Estimate(sample(effort, 100, 2.0), sample(effort.coarser(2, 2), 50, 2.0, 2), None, None)
     assert ORDERS[0] < estimate.order["position"] < ORDERS[1]
     assert 1.0 < estimate.errors.largest("total", "position") / 0.03 < 2.0
     assert "time" not in estimate.errors.fields
@@ -151,23 +153,23 @@ def test_judging_and_refining():
     errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
                      "total": {"position": np.full((2, 3), 0.4), "end_force_end": np.full(2, 1.0)}})  # fmt: skip
     effort = Effort(1.0, 0.1, 1e-3, 1e-3)
-    run = Sketch(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
+    run = RunSample(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
     verdict = judge(Asked(0.1, None, None), errors, run)
     assert (verdict.ratio, verdict.mesh, verdict.time) == pytest.approx((4.0, 3.0, 1.0))
-    better = finer(effort, verdict, True, True)
+    better = refined(effort, verdict, Free(True, True, False))
     assert better is not None and better.fineness > 1.5 and better.local < 1e-3
-    assert finer(effort, verdict, False, False) is None
-    assert finer(effort, verdict, False, True) is None  # the mesh alone is wrong by more than is asked
-    only_steps = finer(effort, Verdict(1.5, 0.4, 1.1, 0.0, ""), False, True)
+    assert refined(effort, verdict, Free(False, False, False)) is None
+    assert refined(effort, verdict, Free(False, True, False)) is None  # the mesh alone is wrong by more than is asked
+    only_steps = refined(effort, Verdict(1.5, 0.4, 1.1, 0.0, ""), Free(False, True, False))
     assert only_steps is not None and only_steps.fineness == 1.0 and only_steps.local < 1e-3
     assert judge(Asked(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
 
 
 def test_the_model_is_made_better_when_it_is_what_is_wrong():
-    better = finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, True)
+    better = refined(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, True))
     assert better is not None and better.zones < 0.5e-3
     assert better.fineness < 1.5  # cells and steps are not to blame
-    assert finer(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), True, True, False) is None
+    assert refined(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, False)) is None
 
 
 # --- cells ---------------------------------------------------------------------------------------
@@ -328,18 +330,18 @@ def test_a_finer_run_is_no_other_result(tmp_path):
 def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
     """The result before it stands, with its figure, and says what became of the other."""
     from hybrid.errors import ComputationError, Outcome
-    from hybrid.simulation.case import Job
+    from hybrid.simulation.case import Case
 
-    record, count = Job.record, []
+    record, count = Case.record, []
 
-    def failing(self, effort, target, climb):
+    def failing(self, effort, target, control):
         count.append(effort)
         if len(count) > 1:
             target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
             raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
-        return record(self, effort, target, climb)
+        return record(self, effort, target, control)
 
-    monkeypatch.setattr(Job, "record", failing)
+    monkeypatch.setattr(Case, "record", failing)
     result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
     assert len(count) == 2 and len(result.times) == 61 and "errors" in result
     (missed,) = [e for e in result.events if e.kind == "accuracy missed"]
@@ -390,17 +392,17 @@ def test_a_given_model_is_not_computed_more_finely_for_its_own_error():
 
 def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
     """Ctrl-C in the second run: the first stays, with its figure, and says that it is not what was asked."""
-    from hybrid.simulation.case import Job
+    from hybrid.simulation.case import Case
 
-    record, count = Job.record, []
+    record, count = Case.record, []
 
-    def stopping(self, effort, target, climb):
+    def stopping(self, effort, target, control):
         count.append(effort)
         if len(count) > 1:
             raise KeyboardInterrupt
-        return record(self, effort, target, climb)
+        return record(self, effort, target, control)
 
-    monkeypatch.setattr(Job, "record", stopping)
+    monkeypatch.setattr(Case, "record", stopping)
     with pytest.raises(KeyboardInterrupt):
         hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
     assert [x.name for x in tmp_path.iterdir()] == ["run.h5"]
@@ -425,7 +427,7 @@ def made_up(notes=(), model=(), bound=0.0, fineness=1.0, steps=100):
     position = np.full((9, 4, 3), 0.01 / fineness**2)
     model_error = {"position": np.full((9, 4), model)} if model else {}
     effort = Effort(fineness, 0.1, 1e-6, 1e-3)
-    return Sketch(
+    return RunSample(
         effort, {"position": position}, round(100 * fineness), steps, 0.0, 1, False, model_error, bound, tuple(notes)
     )
 
@@ -436,17 +438,19 @@ def test_notes_and_model_error_are_of_the_runs_that_count():
     before = made_up([("model error not estimated", "before")], 0.004, 0.1, 0.5, 50)
     after = made_up((), 0.0005, 0.1, 4.5, 450)
     comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
-    climb = Climb(Asked(0.005, None, None), True, True, True, True, lambda _: next(comparisons), lambda _: next(said))
-    final, errors = climb.reach(Effort(1.0, 0.1, 1e-6, 1e-3))
-    assert final.cells == 900 and len(climb.runs) == 6
+    control = ErrorController(
+        Asked(0.005, None, None), Free(True, True, True), True, lambda _: next(comparisons), lambda _: next(said)
+    )
+    final, errors = control.start(Effort(1.0, 0.1, 1e-6, 1e-3))
+    assert final.cells == 900 and len(control.runs) == 6
     assert errors.largest("model", "position") == 0.0005
-    assert climb.notes == ()
+    assert control.notes == ()
 
 
 def test_a_model_error_that_cannot_be_true_is_not_counted():
     estimate = Estimate(made_up(), made_up((), 0.4, 0.1, 0.5, 50), None, None)
     assert estimate.errors.largest("model", "position") == 0.4
-    estimate.take_model(made_up((), 40.0, 0.1, 0.5, 50))
+    estimate.set_model_errors(made_up((), 40.0, 0.1, 0.5, 50))
     assert estimate.errors.largest("model", "position") == 0.0
     assert [kind for kind, _ in estimate.notes] == ["model error not estimated"]
 

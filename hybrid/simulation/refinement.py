@@ -1,0 +1,90 @@
+"""Whether a result is as accurate as asked, and the mesh, step and zones with which the next one should be."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import sqrt
+from typing import NamedTuple
+
+from hybrid.model.resolution import Asked, Effort
+from hybrid.simulation.error_estimate import END_FORCES, Errors, RunSample
+
+# Part of what is asked that the next run aims at.
+AIM = 0.7
+# Zones become stricter when the model makes more than the first of what is asked, so that it makes the second.
+MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
+# A run is at most this much finer than the one before.
+MOST_FINER = 3.0
+# Factor on cells or steps where the error is met in parts and missed in total.
+A_LITTLE = 0.8
+
+
+class Free(NamedTuple):
+    """What the program may choose: the mesh, the time step, how much bending zones may neglect."""
+
+    mesh: bool
+    steps: bool
+    zones: bool
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Estimated error over what is asked, of the quantity where that is largest; and its parts by cause."""
+
+    ratio: float
+    mesh: float
+    time: float
+    model: float
+    text: str
+
+
+def judge(asked: Asked, errors: Errors, run: RunSample) -> Verdict:
+    """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met."""
+    bounds: list[tuple[str, str, float]] = []
+    if asked.position is not None:
+        bounds.append(("position", "m", asked.position))
+    for name in END_FORCES.values():
+        if asked.tension is not None:
+            bounds.append((name, "N", asked.tension))
+        if asked.of_pull is not None:
+            bounds.append((name, "N", asked.of_pull * run.largest_end_force))
+    if asked.of_curvature is not None and "curvature" in run.values:
+        bounds.append(("curvature", "1/m", asked.of_curvature * float(run.values["curvature"].max())))
+    worst = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked")
+    for name, unit, bound in bounds:
+        if bound <= 0.0:
+            continue
+        total = errors.largest("total", name)
+        if total / bound >= worst.ratio:
+            model = errors.largest("model", name)
+            mesh, time = (errors.largest(cause, name) / bound for cause in ("mesh", "time"))
+            quantity = name.replace("end_force_", "force at the ")
+            text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
+            worst = Verdict(total / bound, mesh, time, model / bound, text)
+    return worst
+
+
+def refined(effort: Effort, verdict: Verdict, free: Free) -> Effort | None:
+    """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
+
+    Errors of mesh and step add, and cost grows with fineness over step: half of what is asked is for each.
+    """
+    zones, model = effort.zones, verdict.model
+    if free.zones and model > MOST_OF_MODEL:
+        zones *= max(OF_MODEL / model, 1.0 / MOST_FINER)
+        model = OF_MODEL
+    if model >= AIM or (verdict.mesh > 1.0 and not free.mesh) or (verdict.time > 1.0 and not free.steps):
+        return None  # what is fixed is wrong by more than is asked
+    goal = AIM - model
+    mesh = verdict.mesh if free.mesh else 0.0
+    time = verdict.time if free.steps else 0.0
+    goal_mesh = goal - (verdict.time if not free.steps else min(time, 0.5 * goal))
+    goal_time = goal - (verdict.mesh if not free.mesh else min(mesh, 0.5 * goal))
+    least = 1.0 / MOST_FINER
+    cells = min(max(sqrt(max(goal_mesh, 0.0) / mesh), least), 1.0) if mesh > 0.0 else 1.0
+    steps = min(max(sqrt(max(goal_time, 0.0) / time), least), 1.0) if time > 0.0 else 1.0
+    if min(cells, steps) > 0.95 and zones == effort.zones:
+        if mesh == time == 0.0:
+            return None
+        cells, steps = (A_LITTLE, steps) if mesh >= time else (cells, A_LITTLE)
+    return replace(effort.coarser(cells, steps), zones=zones)
