@@ -1,9 +1,4 @@
-"""What is said while something is computed and when it is done: the live line, notes, errors.
-
-`live_line()` gives a function to call with each `Progress`: it draws one line over itself,
-on the error stream, so that the output stays free for results.  `Voice` is how the command
-line speaks: to people, or to programs in JSON, one object per line.
-"""
+"""What commands print: results, notes, errors and progress, for people or as JSON, one object per line."""
 
 from __future__ import annotations
 
@@ -11,175 +6,48 @@ import json
 import os
 import sys
 import time as clock
-from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
-from math import ceil, floor, log10
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from rich.console import Console
-from rich.control import Control
-from rich.segment import ControlType
-from rich.text import Text
+from rich.console import Console as RichConsole
 
 import hybrid
+from hybrid.cli.progress_line import ProgressLine
 from hybrid.errors import EXPECTED, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
-    from hybrid.model.mesh import Zone
     from hybrid.simulation.progress import Progress
     from hybrid.store.reader import Event
     from hybrid.studies.runs import Doing
 
-# The speed shown is that of the last so many reports (about 5 s): the compilation of the
-# first step, or a slow stretch long past, says nothing about the time that is left.
-REMEMBERED = 50
-BAR = (4, 36)  # columns, least and most: less shows nothing, more pushes the numbers apart
-MARGIN = 3  # columns left free: the terminal writes ^C there, and wraps what does not fit
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
-BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a ladder: below 1 % of what its runs cost
-KINDS_SHOWN = 3  # kinds of events named at the end of a run; more is a matter for a report
+BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
+KINDS_SHOWN = 3  # kinds of events named at the end of a run; the report has them all
 
 
-def span(seconds: float) -> str:
-    """A time as people say it: "0.52 s", "12 s", "4 min 05 s", "3 h 20 min"."""
-    if seconds < 99.5:
-        return f"{seconds:.2g} s"
-    minutes, rest = divmod(round(seconds), 60)
-    return f"{minutes} min {rest:02d} s" if minutes < 60 else f"{minutes // 60} h {minutes % 60:02d} min"
-
-
-def speed(factor: float) -> str:
-    """How many times faster than real time: "40", "3.2", "0.041"."""
-    return f"{factor:.0f}" if factor >= 10 else f"{factor:.2g}"
-
-
-def zones_in_short(zones: tuple[Zone, ...], width: int) -> str:
-    """ "catenary 1.5 m | rod 0.5 m", or "7 zones, 23 % rod" when that is longer than `width`."""
-    if len(zones) == 1:
-        return zones[0].kind
-    text = " | ".join(f"{z.kind} {z.s_b - z.s_a:.4g} m" for z in zones)
-    rod = sum(z.s_b - z.s_a for z in zones if z.kind == "rod") / (zones[-1].s_b - zones[0].s_a)
-    return text if len(text) <= width else f"{len(zones)} zones, {100 * rod:.0f} % rod"
-
-
-def live_line() -> LiveLine:
-    """A line for a run; call it with each `hybrid.simulation.progress.Progress`."""
-    return LiveLine()
-
-
-class LiveLine:
-    """Draws the line on a terminal or in a notebook, nowhere else; gone when t reaches the duration."""
-
-    def __init__(self, console: Console | None = None) -> None:
-        self._console = console or Console(stderr=True, highlight=False)
-        self._past: deque[tuple[float, float]] = deque(maxlen=REMEMBERED)
-        self._drawn = False
-        self._display: Any = None
-
-    def __call__(self, progress: Progress) -> None:
-        if self._past and progress.t < self._past[-1][1]:
-            self._past.clear()  # another run has begun
-        self._past.append((progress.wall, progress.t))
-        if progress.t >= progress.duration:
-            self.close()
-        elif self._console.is_jupyter:
-            self._show(self.text(progress, 100).plain)
-        elif self._console.is_terminal and not self._console.is_dumb_terminal:
-            self._draw(self.text(progress, self._console.width - MARGIN))
-
-    def close(self) -> None:
-        """Take the line away; a second call does nothing."""
-        if self._display is not None:
-            self._show("")
-        elif self._drawn:
-            self._console.control(Control(ControlType.CARRIAGE_RETURN, (ControlType.ERASE_IN_LINE, 2)))
-        self._drawn = False
-
-    def text(self, progress: Progress, width: int) -> Text:
-        """The line for a screen of `width` columns: as many facts as fit, and a bar in what is left."""
-        for facts in self._choices(progress):
-            room = width - sum(2 + len(fact) for fact in facts)
-            if room >= BAR[0]:
-                break
-        size = max(0, min(room, BAR[1]))
-        done = int(progress.t / progress.duration * size + 0.5)
-        line = Text(no_wrap=True, end="")
-        full, empty = ("#", "-") if self._console.options.ascii_only else ("━", "─")
-        line.append(full * done, style="cyan").append(empty * (size - done), style="bright_black")
-        line.append("  " if size else "").append(facts[0], style="bold")
-        for fact in facts[1:]:
-            line.append(f"  {fact}")
-        line.truncate(width)
-        return line
-
-    def _choices(self, p: Progress) -> Iterator[list[str]]:
-        """What to say, from much to little.  Numbers keep their width, so that the line does not dance."""
-        places = min(6, max(0, 3 - floor(log10(p.duration))))
-        widest = len(f"{p.duration:.{places}f}")
-        time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
-        step, rate, left = f"step {p.step:<5d}", *self._pace(p)
-        if p.runs > 1:
-            step = f"run {p.run} of {p.runs}: {p.name:<16s}  {step}"
-        for zones, newton, real in (
-            (40, " Newton", " x real time"),
-            (18, " Newton", " x real time"),
-            (18, " it", " x"),
-        ):
-            yield [time, step, f"{p.iterations:2d}{newton}", zones_in_short(p.zones, zones), rate + real, left]
-        yield [time, step, rate + " x", left]
-        yield [time, left]
-        yield [time]
-
-    def _pace(self, p: Progress) -> tuple[str, str]:
-        """Speed (times real time) and wall time left (h:mm:ss); "..." until something can be said."""
-        wall, t = self._past[0]
-        if p.wall <= wall or p.t <= t:
-            return " ...", "  ... left"
-        factor = (p.t - t) / (p.wall - wall)
-        minutes, seconds = divmod(ceil((p.duration - p.t) / factor), 60)
-        left = f"{minutes}:{seconds:02d}" if minutes < 60 else f"{minutes // 60}:{minutes % 60:02d}:{seconds:02d}"
-        return f"{speed(factor):>4}", f"{left:>5} left"
-
-    def _draw(self, text: Text) -> None:
-        """The new line over the old one in a single write: what does not change does not flicker."""
-        with self._console:
-            self._console.control(Control(ControlType.CARRIAGE_RETURN))
-            self._console.print(text, end="", overflow="crop", no_wrap=True)
-            self._console.control(Control((ControlType.ERASE_IN_LINE, 0)))
-        self._drawn = True
-
-    def _show(self, text: str) -> None:
-        from IPython.display import display  # a notebook has it
-
-        if self._display is None:
-            self._display = display({"text/plain": text}, raw=True, display_id=True)
-        else:
-            self._display.update({"text/plain": text}, raw=True)
-
-
-class Voice:
-    """How the command line speaks: to people, to programs (JSON), or only when it must (quiet)."""
+class Console:
+    """What a command prints: for people, for programs (JSON), or errors only (quiet)."""
 
     def __init__(self, as_json: bool, quiet: bool) -> None:
         self.as_json, self.quiet = as_json, quiet
         self.source = ""  # the scene file, for complaints that do not know it
         self.settings: list[str] = []  # what the command changes in it
-        self.left = ""  # what Ctrl-C leaves, of commands that write more than a file
+        self.left = ""  # what Ctrl-C leaves behind, of commands that write more than a file
         self._file: Path | None = None
         self._before: tuple[int, int] | None = None
 
     @cached_property
-    def _out(self) -> Console:
-        return Console(highlight=False, markup=False, emoji=False, width=_width(sys.stdout))
+    def _out(self) -> RichConsole:
+        return RichConsole(highlight=False, markup=False, emoji=False, width=_width(sys.stdout))
 
     @cached_property
-    def _err(self) -> Console:
-        return Console(stderr=True, highlight=False, markup=False, emoji=False, width=_width(sys.stderr))
+    def _err(self) -> RichConsole:
+        return RichConsole(stderr=True, highlight=False, markup=False, emoji=False, width=_width(sys.stderr))
 
     def json(self, event: str, **facts: Any) -> None:
         """A line for programs; nothing for people."""
@@ -188,7 +56,7 @@ class Voice:
         try:
             sys.stdout.write(json.dumps({"event": event} | facts, default=str) + "\n")
             sys.stdout.flush()
-        except BrokenPipeError:  # nobody listens any more: end as if by Ctrl-C, and speak to the wall
+        except BrokenPipeError:  # nobody listens any more: end as if by Ctrl-C, and print nowhere
             os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
             raise KeyboardInterrupt from None
 
@@ -224,20 +92,20 @@ class Voice:
 
     @contextmanager
     def progress(self) -> Iterator[Callable[[Progress], None] | bool]:
-        """What `hybrid.run` is to call while it runs: a live line, JSON lines, or nothing."""
-        line = LiveLine(self._err)
+        """What `hybrid.run` calls while it runs: a progress line, JSON lines, or nothing."""
+        line = ProgressLine(self._err)
         try:
             yield False if self.quiet else self._json_progress() if self.as_json else line
         finally:
             line.close()
 
     @contextmanager
-    def ladder(self) -> Iterator[Callable[[Doing], None] | None]:
-        """What `hybrid.trade` is to call: a bar over all runs, JSON lines, or nothing."""
+    def study(self) -> Iterator[Callable[[Doing], None] | None]:
+        """What `hybrid.trade` calls: a bar over all runs, JSON lines, or nothing."""
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
         if self.quiet or self.as_json:
-            yield None if self.quiet else self._json_ladder()
+            yield None if self.quiet else self._json_study()
             return
         columns = (
             BarColumn(24),
@@ -260,7 +128,7 @@ class Voice:
 
             yield tell
 
-    def _json_ladder(self) -> Callable[[Doing], None]:
+    def _json_study(self) -> Callable[[Doing], None]:
         last = ""
 
         def tell(doing: Doing) -> None:

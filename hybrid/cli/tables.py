@@ -1,4 +1,4 @@
-"""What the command line says of plans, results and ladders: facts for programs, tables for people.
+"""Plans, equilibria, errors and studies as facts for programs and as tables for people.
 
 rich is imported when a table is made: a command that prints JSON does without.
 """
@@ -13,8 +13,6 @@ from hybrid.errors import OMITTED, ZONE_EVENTS
 
 if TYPE_CHECKING:
     from hybrid.interop.moordyn import ImportedDeck
-    from hybrid.model.plan import Plan
-    from hybrid.scene.schema import Scene
     from hybrid.store.reader import Result
     from hybrid.store.tradeoff_table import Row, TradeTable
 
@@ -54,7 +52,7 @@ def equilibrium_table(facts: dict[str, Any]) -> Any:
     table = Table.grid(padding=(0, 2))
     table.add_row("found by", facts["path"].replace("; ", "\n"))
     if facts["residual"] is not None:
-        table.add_row("out of balance", f"{facts['residual']:.2g} N at most")
+        table.add_row("residual force", f"{facts['residual']:.2g} N at most")
     for name, key in (("largest tension", "tension_max"), ("smallest tension", "tension_min")):
         table.add_row(name, f"{facts[key]['value']:.5g} N at s = {facts[key]['s']:.5g} m")
     for end, force in facts["force"].items():
@@ -123,7 +121,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
         return table
     from rich.console import Group
 
-    verdict = {True: "met", False: "MISSED", None: "perhaps met, see the note"}[errors["met"]]
+    verdict = {True: "met", False: "MISSED", None: "not verified, see the note"}[errors["met"]]
     return Group(table, f"asked {asked}: {verdict}")
 
 
@@ -133,13 +131,13 @@ def _short(x: float, beside: float = 0.0) -> str:
     return f"{float(f'{x:.2g}'):.6g}" if 1e-4 <= abs(x) < 1e6 or x == 0.0 else f"{x:.1e}"
 
 
-def zones_said(facts: dict[str, Any], file: Path) -> str:
+def zones_line(facts: dict[str, Any], file: Path) -> str:
     """The same in a line."""
     rod, changes = facts["rod"], facts["zone_changes"]
     if not changes:
         return f"rod: {rod['mean']:.0%} of the line, all the time"
     times = f"{changes} change{'s' * (changes > 1)} of zones"
-    part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on the mean"
+    part = f"rod: {rod['least']:.0%} to {rod['most']:.0%} of the line, {rod['mean']:.0%} on average"
     return f"{part}; {times}: hybrid plot --zones {file}"
 
 
@@ -163,7 +161,7 @@ def trade_table(table: TradeTable) -> Any:
     out.add_column("", overflow="fold")
     front, best = table.front(), table.recommended
     for row in table.rows:
-        said = "take this" if row == best else "front" if row in front else ""
+        said = "recommended" if row == best else "Pareto front" if row in front else ""
         said = ", ".join(x for x in (said, "" if row.status == "done" else row.status, row.cause) if x)
         style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
         figures = [part(row.position_part), part(row.pull_part), str(row.cells or ""), str(row.steps or "")]
@@ -171,43 +169,7 @@ def trade_table(table: TradeTable) -> Any:
     return out
 
 
-def plan_table(scene: Scene, plan: Plan) -> Any:
-    from rich.console import Group
-    from rich.table import Table
-
-    from hybrid.cli.console import span
-
-    ledger = Table.grid(padding=(0, 3, 0, 0))
-    ledger.add_column(no_wrap=True)
-    ledger.add_column(overflow="fold")
-    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would ask for it")):
-        ledger.add_row(what, why, style="bold")
-        for entry in (e for e in plan.ledger if e.on == on):
-            ledger.add_row(entry.what, entry.why, style="" if on else "dim")
-        ledger.add_row()
-    zones = Table.grid(padding=(0, 3, 0, 0))
-    zones.add_row("zone", "from", "to", "cells", style="bold")
-    moving = plan.base_cells is not None
-    for zone, cells in zip(plan.zones, plan.cells, strict=True):
-        kind, count = ("as it comes", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
-        zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
-    work = "no time in the scene, so statics only"
-    follows = scene.time is not None and scene.time.controlled
-    most = "about" if plan.base_cells is None else "at most about"
-    if scene.time is not None:
-        asked = scene.time.step or plan.step
-        shortened = f" ({asked:.6g} s asked, shortened to fit between outputs)" if plan.step < 0.999 * asked else ""
-        work = f"{plan.steps} steps of {plan.step:.6g} s{shortened}, {most} {span(plan.seconds)} of computing"
-        if follows:
-            work = f"{plan.steps} steps or more, as the motion asks, in several runs: {span(plan.seconds)} or more"
-    head = [scene.title, ""] if scene.title else []
-    size = f"{sum(plan.cells)} cells, {plan.unknowns} unknowns"
-    if moving:
-        size = f"{plan.base_cells} cells where it is catenary, {size} if all of it is rod"
-    return Group(*head, ledger, zones, "", f"{size}; {work}")
-
-
-def import_said(made: ImportedDeck) -> list[str]:
+def import_notes(made: ImportedDeck) -> list[str]:
     """What could not be carried over from a deck: of the deck, then of each scene what the others do not share."""
     parts = [note.told(made.file) for note in made.notes if note.kind != "not needed"]
     shared = set.intersection(*(set(scene.notes) for scene in made.scenes.values()))

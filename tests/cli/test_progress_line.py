@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import io
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
-from hybrid.cli.console import LiveLine, Voice, live_line, span, speed, zones_in_short
+from hybrid.cli import console as commands_console
+from hybrid.cli.progress_line import ProgressLine, span, speed, zones_in_short
 from hybrid.model.mesh import Zone
 from hybrid.simulation.progress import Progress
 
@@ -21,9 +23,9 @@ def progress(t: float, wall: float, zones: tuple[Zone, ...] = TWO, duration: flo
     return Progress(t, duration, round(100 * t), 3, zones, wall)
 
 
-def screen(width: int = 80) -> tuple[LiveLine, io.StringIO]:
+def screen(width: int = 80) -> tuple[ProgressLine, io.StringIO]:
     stream = io.StringIO()
-    return LiveLine(Console(file=stream, force_terminal=True, width=width, color_system=None, _environ={})), stream
+    return ProgressLine(Console(file=stream, force_terminal=True, width=width, color_system=None, _environ={})), stream
 
 
 def test_zones_in_short() -> None:
@@ -64,10 +66,10 @@ def test_a_wide_screen_shows_everything_and_a_narrow_one_the_essence() -> None:
     line, _ = screen()
     line(progress(2.0, 1.0))
     line(progress(4.0, 1.5))
-    wide = line.text(progress(4.0, 1.5), 119).plain
+    wide = line.text(replace(progress(4.0, 1.5), fraction=0.2, seconds_left=3.9), 119).plain
     for words in (" 4.00 / 20 s", "step 400", "3 Newton", "catenary 1.5 m | rod 0.5 m", "4 x real time", "0:04 left"):
         assert words in wide
-    narrow = line.text(progress(4.0, 1.5), 79).plain
+    narrow = line.text(replace(progress(4.0, 1.5), fraction=0.2, seconds_left=3.9), 79).plain
     for words in (" 4.00 / 20 s", "step 400", "3 it", "2 zones, 25 % rod", "4 x", "0:04 left"):
         assert words in narrow
     assert "4.00 / 20 s" in line.text(progress(4.0, 1.5), 20).plain
@@ -103,7 +105,7 @@ def test_it_draws_on_a_terminal_and_goes_away_at_the_end() -> None:
 
 
 def test_it_says_nothing_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
-    line = live_line()
+    line = ProgressLine()
     for t in (1.0, 20.0):
         line(progress(t, t))
     assert tuple(capsys.readouterr()) == ("", "")
@@ -113,12 +115,12 @@ def test_compilation_is_announced_before_it_happens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: False)
-    assert Voice(as_json=False, quiet=False).compiling()
+    assert commands_console.Console(as_json=False, quiet=False).compiling()
     assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
-    assert Voice(as_json=True, quiet=False).compiling()
+    assert commands_console.Console(as_json=True, quiet=False).compiling()
     assert capsys.readouterr().out == '{"event": "compiling"}\n'
     monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: True)
-    assert not Voice(as_json=False, quiet=False).compiling()
+    assert not commands_console.Console(as_json=False, quiet=False).compiling()
     assert tuple(capsys.readouterr()) == ("", "")
 
 
@@ -132,7 +134,28 @@ def test_a_notebook_sees_one_display_that_changes(monkeypatch: pytest.MonkeyPatc
 
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace())
     monkeypatch.setitem(sys.modules, "IPython.display", SimpleNamespace(display=display))
-    line = LiveLine(Console(file=io.StringIO(), force_jupyter=True))
+    line = ProgressLine(Console(file=io.StringIO(), force_jupyter=True))
     for t in (1.0, 2.0, 20.0):
         line(progress(t, t))
     assert "1.00 / 20 s" in shown[0] and "2.00 / 20 s" in shown[1] and shown[2:] == [""]
+
+
+def test_one_bar_over_all_passes_and_the_pass_is_named() -> None:
+    line, stream = screen(140)
+    one = replace(progress(20.0, 1.0), run=2, runs=4, name="error estimation", fraction=0.4, seconds_left=61.2)
+    line(one)
+    assert "\x1b[2K" not in stream.getvalue(), "the line stays until the last pass is done"
+    text = line.text(one, 140).plain
+    assert "run 2 of 4: error estimation" in text and "1:02 left" in text
+    bar = text.split("  ")[0]
+    assert bar.count("━") == round(0.4 * len(bar))
+    line(replace(progress(20.0, 2.0), run=4, runs=4, name="result", fraction=1.0, seconds_left=0.0))
+    assert stream.getvalue().endswith("\x1b[2K")
+
+
+def test_shells_complete_commands(capsys: pytest.CaptureFixture[str]) -> None:
+    from hybrid.cli.commands import main
+
+    with pytest.raises(SystemExit):
+        main(["--show-completion", "bash"])
+    assert "complete" in capsys.readouterr().out

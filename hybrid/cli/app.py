@@ -1,0 +1,142 @@
+"""The command line application: options that commands share, and the session that turns errors into exit codes."""
+
+from __future__ import annotations
+
+import signal
+import threading
+import traceback
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+
+if TYPE_CHECKING:
+    from hybrid.cli.console import Console
+    from hybrid.scene.schema import Scene
+
+REFUSED, FAILED, INTERRUPTED = 1, 2, 130
+
+app = typer.Typer(
+    help="Dynamics of long cables: flexible catenaries where they are taut, rods where they bend.",
+    epilog="Exit codes: 0 done, 1 input refused, 2 computation failed, 130 interrupted.",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+UsageError: Any = typer.BadParameter.__mro__[1]  # typer has no public name for it
+
+
+def numbers(text: str) -> list[float]:
+    try:
+        return [float(x) for x in text.split(",")]
+    except ValueError:
+        raise typer.BadParameter(f"'{text}' is no list of numbers such as 0,1.5,2") from None
+
+
+def words(text: str) -> list[str]:
+    return [word.strip() for word in text.split(",") if word.strip()]
+
+
+def window(text: str) -> tuple[float | None, float | None]:
+    first, colon, last = text.partition(":")
+    try:
+        window = (float(first) if first.strip() else None, float(last) if last.strip() else None)
+    except ValueError:
+        colon = ""
+    if not colon:
+        raise typer.BadParameter(f"'{text}' is no window of time such as 20:60, 20: or :60")
+    return window
+
+
+def flag(*names: str, help: str) -> Any:
+    return typer.Option(*names, metavar="", help=help)  # it takes no value, so none is named
+
+
+def output_option(help: str) -> Any:
+    return typer.Option("--output", "-o", metavar="FILE", help=help)
+
+
+SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene to read.", show_default=False)]
+RunFile = Annotated[Path | None, output_option("Result; else SCENE.h5, in this folder.")]
+StaticFile = Annotated[Path | None, output_option("Result; else SCENE.static.h5, here.")]
+Picture = Annotated[Path | None, output_option("PNG, PDF or SVG; else RUN.png, RUN.zones.png.")]
+Settings = Annotated[
+    list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
+]
+Drawn = Annotated[bool, flag("--plot", help="Draw it as well, as PNG beside it.")]
+Keep = Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older result.")]
+Foreign = Annotated[bool, flag("--overwrite", help="Replace a file that is not of hybrid.")]
+Quiet = Annotated[bool, flag("--quiet", "-q", help="Print nothing but errors.")]
+Json = Annotated[bool, flag("--json", help="Print JSON, one object per line.")]
+
+
+@app.callback(invoke_without_command=True)
+def hybrid_(
+    context: typer.Context, version: Annotated[bool, flag("--version", help="Print the version.")] = False
+) -> None:
+    if version:
+        print(f"hybrid {hybrid.__version__}")
+        raise typer.Exit
+    if context.invoked_subcommand is None:
+        print(context.get_help())
+
+
+@contextmanager
+def session(as_json: bool, quiet: bool) -> Iterator[Console]:
+    """The console of one command; errors become words and exit codes."""
+    from hybrid.cli.console import Console
+    from hybrid.errors import ComputationError, ResultError, ResultHeld, SceneError
+
+    console, code = Console(as_json, quiet), 0
+    in_main = threading.current_thread() is threading.main_thread()
+    before = signal.signal(signal.SIGTERM, signal.default_int_handler) if in_main else None
+    try:
+        yield console
+    except SceneError as error:
+        from hybrid.scene.read import located
+
+        console.refused(located(error, console.source, console.settings) if console.source else error)
+        code = REFUSED
+    except ComputationError as error:
+        console.failed(error)
+        code = FAILED
+    except ResultHeld as error:
+        console.error("result", str(error))
+        code = REFUSED
+    except ResultError as error:
+        console.error("result", str(error), file=console.written)
+        code = FAILED if console.written else REFUSED
+    except KeyboardInterrupt:
+        console.interrupted()
+        code = INTERRUPTED
+    except Exception:
+        head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
+        console.error("bug", f"{head}\n{traceback.format_exc()}")
+        code = FAILED
+    finally:
+        if in_main:
+            signal.signal(signal.SIGTERM, before)
+    if code:
+        raise typer.Exit(code)
+
+
+def load(console: Console, path: Path, settings: list[str] | None) -> Scene:
+    """The scene of a command; keys with a former name are noted."""
+    from hybrid.scene.read import read_scene
+
+    console.source, console.settings = str(path), settings or []
+    scene, renamed = read_scene(path, console.settings)
+    for key in renamed:
+        console.json("note", text=str(key), **vars(key))
+        console.note(f"note: {key}")
+    return scene
+
+
+def picture_beside(target: Path, plot: bool) -> Path | None:
+    """Where a picture beside a result goes, checked before the work; None: none is asked for."""
+    from hybrid.view.save import PICTURES, check_target
+
+    return check_target(target.with_suffix(".png"), PICTURES) if plot else None

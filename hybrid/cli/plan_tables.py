@@ -1,0 +1,107 @@
+"""What `hybrid plan` prints: a dozen lines, or everything that is on and off and who asked for it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+from hybrid.cli.progress_line import span
+from hybrid.kernels.forces import FORCES
+
+if TYPE_CHECKING:
+    from hybrid.model.plan import Plan
+    from hybrid.scene.schema import Scene
+
+LINES, COLUMNS = 12, 80  # of the short form
+# Forces whose names are too long for it.
+SHORT = {
+    "mass-proportional damping": "mass damping",
+    "stiffness-proportional damping": "stiffness damping",
+    "partly wetted cells at the surface": "surface",
+    "drag, added mass or wetting of bodies": "bodies",
+    "seabed contact": "seabed",
+    "seabed friction": "friction",
+}
+
+
+def plan_lines(scene: Scene, plan: Plan) -> list[str]:
+    """The plan in at most LINES lines of COLUMNS columns."""
+    on = {entry.what: entry.why for entry in plan.ledger if entry.on}
+    sections, attached = scene.cable.sections, len(scene.cable.attachments)
+    length = sum(section.length for section in sections)
+    line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
+    plane = any(what.startswith("computed in a plane") for what in on)
+    asked = on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
+    rows = {
+        "implausible": "; ".join(f"{entry.what}: {entry.why}" for entry in plan.ledger if entry.event == "implausible"),
+        "line": ", ".join(line),
+        "ends": "; ".join(what.removeprefix("ends.") for what in on if what.startswith("ends.")),
+        "model": _model(plan),
+        "dimension": "2: all of the scene lies in a plane" if plane else "3",
+        "mesh": _mesh(plan),
+        "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
+        "time": _time(scene, plan),
+        "accuracy": asked,
+        "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
+    }
+    body = [f"{name:<13s}{text}" for name, text in rows.items() if text]
+    lines = [scene.title or "untitled scene", *body[: LINES - 2], "all that is on and off, and why: --verbose"]
+    return [text if len(text) <= COLUMNS else text[: COLUMNS - 4] + " ..." for text in lines]
+
+
+def _has(on: dict[str, str], what: str) -> bool:
+    return any(name.startswith(what) for name in on)
+
+
+def _count(n: int, what: str) -> str:
+    return f"{n} {what}{'s' * (n != 1)}"
+
+
+def _model(plan: Plan) -> str:
+    """Kinds of zones; the first four of many."""
+    if plan.base_cells is not None:
+        return "adaptive: rod where a criterion asks for it, catenary elsewhere"
+    if len(plan.zones) == 1:
+        return plan.zones[0].kind
+    kinds = [f"{zone.kind} {zone.s_b - zone.s_a:.6g} m" for zone in plan.zones]
+    return ", ".join(kinds[:4]) + (f" and {len(kinds) - 4} more" if len(kinds) > 4 else "")
+
+
+def _mesh(plan: Plan) -> str:
+    cells = sum(plan.cells)
+    if plan.base_cells is not None:
+        return f"{plan.base_cells} cells as catenary, {cells} ({plan.unknowns} unknowns) if all is rod"
+    return f"{_count(cells, 'cell')}, {plan.unknowns} unknowns"
+
+
+def _time(scene: Scene, plan: Plan) -> str:
+    if scene.time is None:
+        return "no motion, statics only"
+    steps = f"{scene.time.duration:.6g} s in {plan.steps} steps"
+    if scene.time.controlled:
+        return f"{steps} or more, as the motion asks; {span(plan.seconds)} or more of CPU"
+    asked = scene.time.step or plan.step
+    short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
+    most = "about" if plan.base_cells is None else "at most about"
+    return f"{steps} of {plan.step:.6g} s{short}; {most} {span(plan.seconds)} of CPU"
+
+
+def ledger_table(plan: Plan) -> Any:
+    """Everything: what is on and who asked for it, what is off and what would switch it on, cells of every zone."""
+    from rich.console import Group
+    from rich.table import Table
+
+    ledger = Table.grid(padding=(0, 3, 0, 0))
+    ledger.add_column(no_wrap=True)
+    ledger.add_column(overflow="fold")
+    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would ask for it")):
+        ledger.add_row(what, why, style="bold")
+        for entry in (e for e in plan.ledger if e.on == on):
+            ledger.add_row(entry.what, entry.why, style="" if on else "dim")
+        ledger.add_row()
+    zones = Table.grid(padding=(0, 3, 0, 0))
+    zones.add_row("zone", "from", "to", "cells", style="bold")
+    moving = plan.base_cells is not None
+    for zone, cells in zip(plan.zones, plan.cells, strict=True):
+        kind, count = ("adaptive", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
+        zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
+    return Group("", ledger, zones)

@@ -1,0 +1,105 @@
+"""Commands that read a result: plot, report, export."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+from hybrid.cli.app import Foreign, Json, Picture, Quiet, app, flag, numbers, output_option, session, window, words
+
+if TYPE_CHECKING:
+    from hybrid.cli.console import Console
+    from hybrid.store.reader import Result
+
+
+@app.command()
+def plot(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to draw.", show_default=False)],
+    output: Picture = None,
+    times: Annotated[Any, typer.Option(metavar="T,T,..", parser=numbers, help="Earlier shapes to draw (s).")] = None,
+    history: Annotated[
+        Any, typer.Option(metavar="S,S,..", parser=numbers, help="Arc lengths to follow over time (m).")
+    ] = None,
+    zones: Annotated[bool, flag("--zones", help="Draw zones along s over time instead.")] = False,
+    film: Annotated[bool, flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
+    overwrite: Foreign = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Draw a result: shapes, profiles along the cable, histories; its zones over time; or a film."""
+    if (zones or film) and (times or history):
+        raise typer.BadParameter("--times and --history choose what a page without --zones or --animate shows")
+    if zones and film:
+        raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
+    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+        if film:
+            _film(console, opened, result, output, overwrite)
+            return
+        if zones:
+            picture = output or result.with_suffix(".zones.png")
+            hybrid.plot_zones(opened, picture, overwrite=overwrite)
+        else:
+            picture = output or result.with_suffix(".png")
+            hybrid.plot(opened, picture, times=times, history=history, overwrite=overwrite)
+        n = len(opened.times)
+        over = f", t = {opened.times[0]:.6g} to {opened.times[-1]:.6g} s" if n > 1 else ""
+        console.done(f"{n} output{'s' * (n != 1)}{over}", picture, status=opened.status)
+
+
+@app.command()
+def report(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to report.", show_default=False)],
+    output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
+    overwrite: Foreign = False,
+    quiet: Quiet = False,
+    as_json: Json = False,
+) -> None:
+    """Write one HTML file that explains a result: what to know first, moving pictures, events, energy, the scene."""
+    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+        from hybrid.view.summary import facts_of
+
+        page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite)
+        size, facts = page.stat().st_size, [fact._asdict() for fact in facts_of(opened)] if as_json else []
+        console.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
+
+
+@app.command()
+def export(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to export.", show_default=False)],
+    output: Annotated[Path | None, output_option("FILE.nc, .csv or .vtkhdf; else RUN.nc ..")] = None,
+    format: Annotated[
+        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else what FILE says.")
+    ] = None,
+    at: Annotated[Any, typer.Option(metavar="S,S,..", parser=numbers, help="Only at these arc lengths (m).")] = None,
+    names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,
+    times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
+    keep: Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue."""
+    from hybrid.exports.api import beside
+
+    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+        target = output or beside(result, format)
+        made = hybrid.export(opened, target, format=format, names=names, times=times, at=at, overwrite=not keep)
+        for text in made.notes:
+            console.json("note", text=text)
+            console.note(f"note: {text}")
+        status = "" if opened.status == "complete" else f"; {opened.status_text}"
+        console.done(made.text + status, *made.files, status=opened.status, notes=list(made.notes))
+
+
+def _film(console: Console, result: Result, source: Path, output: Path | None, overwrite: bool) -> None:
+    """Make a film, as mp4 where this machine can."""
+    from hybrid.view.animation import animate, ffmpeg
+
+    suffix = ".mp4" if output or ffmpeg() else ".gif"
+    if suffix == ".gif":
+        console.note('note: there is no ffmpeg for mp4, so it is a gif; pip install "hybrid-cable[video]" brings one')
+    film = animate(result, output or source.with_suffix(suffix), overwrite=overwrite)
+    size = film.path.stat().st_size
+    facts = {"status": result.status, "size": size} | {k: v for k, v in film._asdict().items() if k != "path"}
+    console.done(f"{film.text}, {size / 1e6:.1f} MB", film.path, **facts)
