@@ -13,27 +13,28 @@ too, which is how its derivatives are proved.
     f        force on the node                                  3      N        inertial
     B, D, L  df/du, df/dr (through vd), df/de                   9      N s/m, N/m  inertial
 
-Drag (Morison): f = -cn |un| un - ct |ut| ut d, un and ut the normal and tangential parts of u;
-the tangential coefficient refers to the wetted surface (pi D per length), the normal one to D.
+The law of drag itself stands in drag_law.py; un and ut are the normal and tangential parts of u.
+The tangential coefficient refers to the wetted surface (pi D per length), the normal one to D.
 """
 
 from __future__ import annotations
 
 import numpy as np
 
+from hybrid.kernels import drag_law
 from hybrid.kernels.compile import inner
+
+split, half_cell, body = inner(drag_law.split), inner(drag_law.half_cell), inner(drag_law.body)
 
 
 @inner
 def half_cell_drag(u, d, il, cn, ct):
     """Drag force on one half cell, B = df/du and L = df/de."""
-    ut = u[0] * d[0] + u[1] * d[1] + u[2] * d[2]
-    un = (u[0] - ut * d[0], u[1] - ut * d[1], u[2] - ut * d[2])
-    s = np.sqrt(un[0] * un[0] + un[1] * un[1] + un[2] * un[2])
+    ut, un, square = split(u, d)
+    s = np.sqrt(square)
     a = ut if ut.real > 0.0 else -ut  # |ut|
     i = 1.0 / s if s.real > 0.0 else 0.0 * s
-    p, q = cn * s, ct * a * ut
-    f = (-p * un[0] - q * d[0], -p * un[1] - q * d[1], -p * un[2] - q * d[2])
+    f, p, q = half_cell(ut, un, a, s, d, cn, ct)
 
     # df/du = -cn (|un| P + un un^T/|un|) - 2 ct |ut| d d^T
     c1, c2, c3 = -p, -cn * i, p - 2.0 * ct * a
@@ -86,8 +87,9 @@ def half_cell_added_mass(vd, d, il, an, at, ca):
 def body_drag(u, c):
     """Drag of a body without direction, f = -c |u| u, and B = df/du."""
     s = np.sqrt(u[0] * u[0] + u[1] * u[1] + u[2] * u[2])
-    p, q = -c * s, -c / s if s.real > 0.0 else 0.0 * s
-    return (p * u[0], p * u[1], p * u[2]), (
+    q = -c / s if s.real > 0.0 else 0.0 * s
+    f, p = body(u, s, c)
+    return f, (
         p + q * u[0] * u[0], q * u[0] * u[1], q * u[0] * u[2],
         q * u[1] * u[0], p + q * u[1] * u[1], q * u[1] * u[2],
         q * u[2] * u[0], q * u[2] * u[1], p + q * u[2] * u[2],

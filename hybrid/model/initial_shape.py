@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from scipy.optimize import brentq
 
+from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
@@ -132,7 +133,7 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
     found = None
     for _ in range(1 + DRAG_ROUNDS * bool(line.bits & FLOW)):
         if found is not None:
-            drag = 0.5 * (drag + drag_on(line, sea, found.r))
+            drag = 0.5 * (drag + current_drag(line, sea, found.r))
         if all(places):
             first = np.array(places[0], float)
             found = hang(loads + drag, line.h, line.ck, first, np.array(places[1], float) - first)
@@ -163,22 +164,20 @@ def _floating_end(scene: Scene, line: Line) -> int | None:
     return None
 
 
-def drag_on(line: Line, sea: Sea, r: Floats) -> Floats:
+def current_drag(line: Line, sea: Sea, r: Floats) -> Floats:
     """Drag of the current (N+1, 3) N on a line at rest with nodes r."""
     e = np.diff(r, axis=0)
-    d = e / np.linalg.norm(e, axis=1)[:, None]
+    d = tuple((e / np.linalg.norm(e, axis=1)[:, None]).T)
+    u = [-np.interp(r[:, 2], sea.z, sea.current[:, k]) for k in range(3)]  # of the line relative to the water
     f = np.zeros_like(r)
-    for first in (0, 1):
-        z = r[first : r.shape[0] - 1 + first, 2]
-        U = np.column_stack([np.interp(z, sea.z, sea.current[:, k]) for k in range(3)])
-        along = np.einsum("ij,ij->i", U, d)[:, None] * d
-        across = U - along
-        if line.bits & DRAG:
-            f[first : first + line.h.size] += line.drag_n[:, None] * np.linalg.norm(across, axis=1)[:, None] * across
-            f[first : first + line.h.size] += line.drag_t[:, None] * np.linalg.norm(along, axis=1)[:, None] * along
+    if line.bits & DRAG:
+        n = line.h.size
+        for side in (slice(0, n), slice(1, n + 1)):
+            ut, un, square = split([x[side] for x in u], d)
+            force, _, _ = half_cell(ut, un, np.abs(ut), np.sqrt(square), d, line.drag_n, line.drag_t)
+            f[side] += np.column_stack(force)
     if line.bits & BODIES:
-        U = np.column_stack([np.interp(r[:, 2], sea.z, sea.current[:, k]) for k in range(3)])
-        f += line.point_drag[:, None] * np.linalg.norm(U, axis=1)[:, None] * U
+        f += np.column_stack(body(u, np.sqrt(u[0] ** 2 + u[1] ** 2 + u[2] ** 2), line.point_drag)[0])
     return f
 
 

@@ -1,0 +1,50 @@
+"""The first shape of a search for equilibrium."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.loads import body_drag, half_cell_drag
+from hybrid.model.build import build
+from hybrid.model.initial_shape import current_drag
+
+
+def test_drag_on_the_first_shape_is_that_of_the_kernels():
+    scene = hybrid.validate_scene(
+        {
+            "environment": {
+                "fluid": {
+                    "density": 1025,
+                    "current": [{"z": -50, "velocity": [0.2, 0.1, 0]}, {"z": 0, "velocity": [1, -1, 0]}],
+                }
+            },
+            "cable": {
+                "sections": [
+                    {"length": 60, "mass": 3, "diameter": 0.05, "drag": {"normal": 1.2, "tangential": 0.1}},
+                ],
+                "attachments": [{"kind": "clump", "at": 30, "mass": 20, "drag_area": 0.3}],
+            },
+            "ends": {
+                "start": {"kind": "pinned", "position": [0, 0, 0]},
+                "end": {"kind": "pinned", "position": [30, 0, -40]},
+            },
+            "initial": "equilibrium",
+            "model": "catenary",
+            "mesh": {"cells": 6},
+        }
+    )
+    model = build(scene)
+    line, sea, r = model.line, model.sea.values, model.start.r
+    expected = np.zeros_like(r)
+    u = [tuple(-np.array([np.interp(z, sea.z, sea.current[:, k]) for k in range(3)])) for z in r[:, 2]]
+    for c in range(6):
+        e = r[c + 1] - r[c]
+        size = float(np.linalg.norm(e))
+        for i in (c, c + 1):
+            expected[i] += half_cell_drag(u[i], tuple(e / size), 1 / size, line.drag_n[c], line.drag_t[c])[0]
+    for i in range(7):
+        expected[i] += body_drag(u[i], line.point_drag[i])[0]
+    assert line.point_drag.any() and np.abs(expected).min(axis=0)[0] > 0
+    assert current_drag(line, sea, r) == pytest.approx(expected, rel=1e-12, abs=1e-12)
