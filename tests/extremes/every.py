@@ -53,7 +53,7 @@ def listed() -> dict[str, str]:
 
 
 HEAD = """\
-# Extremes
+# Extreme cases
 
 Where each model holds, degrades and refuses.  Every line below was computed, and this page written, by
 `pytest tests/extremes -m "not bench" --write-extremes`.
