@@ -239,7 +239,7 @@ def _kernels(scene: Scene) -> list[str]:
     if scene.model.kind == "adaptive":
         needed.append("zone_criteria.weigh")
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
-        needed.append("bending_error.follow")
+        needed.append("bending_error.advance_error")
     return needed
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 from hybrid.kernels.compile import inner
 
 # Least distance in time, in steps, between the moments that two algorithmic accelerations stand for: below, the weights
@@ -31,3 +33,22 @@ def weights(rho, ratio):
     be = (1.0 / 6.0 - delta * ratio * ratio - 0.5 * theta * ratio) / span
     ga = (0.5 + delta * (1.0 - ratio * ratio) - theta * ratio) / span
     return am / span, af, ga, be, abs(delta) / span
+
+
+class Scheme(NamedTuple):
+    """Weights of a step of dt, and dv'/dr', dvd'/dr'."""
+
+    dt: float  # s
+    am: float
+    af: float
+    ga: float
+    be: float
+    cv: float  # 1/s
+    ca: float  # 1/s2
+
+
+@inner
+def scheme(rho, before, dt):
+    """Scheme of a step of dt after one of `before`."""
+    am, af, ga, be, _ = weights(rho, before / dt)
+    return Scheme(dt, am, af, ga, be, ga / (be * dt), (1.0 - am) / ((1.0 - af) * be * dt * dt))

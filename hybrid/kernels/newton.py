@@ -18,7 +18,7 @@ from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.generalized_alpha import weights
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.out_of_plane import step_aside
+from hybrid.kernels.out_of_plane import step_out_of_plane
 from hybrid.kernels.plane import chord2, part2
 from hybrid.kernels.report import (
     BEND,
@@ -406,7 +406,7 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
             report[SEABED_ENERGY] = stored(line, sea, new.r)
         if was.shape[0] > 0:
-            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_aside(
-                line, sea, ends, new.r, new.e, new.v, new.vd, new.T, new.a1, dt, before, rho, was, now, X
+            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
+                line, sea, ends, new, dt, before, rho, was, now, X
             )
     return outcome, iterations, left, where

@@ -1,4 +1,4 @@
-"""What a small push out of the plane would do to a cable that is computed in it.
+"""A small push out of the plane of a cable that is computed in a plane, carried along with its motion.
 
 Across the plane a small displacement w of the nodes, and a spin psi of the cells of rods, obey linear equations of
 their own, whose coefficients come from the motion in the plane.  They are stepped along with it by the same
@@ -10,6 +10,7 @@ of compressed or twisted rods, whirling and parametric resonance of taut lines. 
     zeta     tilt of a chord out of the plane, (w_{c+1} - w_c)/l         -      rad
     psi      spin of a cell about its chord                              -      rad
     C        dM = C (dth_b - dth_a) - M J dth_a, J = n x                 4      N m, plane
+    dMz, dMp dM of an element by the tilt and by the spin of a cell      2      N m, plane
     was, now w, its rate, algorithmic and true acceleration              N+1, 4 m, s
 
 What only damps or turns sections (stiffness-proportional damping, rotary inertia) is left out, which lets a push
@@ -19,21 +20,42 @@ grow rather than fade; so is what a chord's tilt does to its contact with the be
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
 from hybrid.kernels.assembly_plane import end_chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
-from hybrid.kernels.generalized_alpha import weights
+from hybrid.kernels.generalized_alpha import scheme
 from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, part2
 from hybrid.kernels.rotations import jacobian_functions
 from hybrid.kernels.water import current_at
 
 REACH = 4  # an equation of node i reaches to node i + 2, two unknowns a node
 BAND = 2 * REACH + 2  # numbers of an equation: its band and its right-hand side
+LEAST_SPIN_STIFFNESS = 1e-9  # part of the torsional stiffness that holds a spin which nothing else does
+Z2 = (0.0, 0.0)
+
+
+class Joint(NamedTuple):
+    """The element between two cells: its moment and how that answers to the tilt and spin of the cells."""
+
+    M: float  # N m, about the normal of the plane
+    dMz_before: tuple[float, float]
+    dMp_before: tuple[float, float]
+    dMz_after: tuple[float, float]
+    dMp_after: tuple[float, float]
+    torsion: float  # N m
+
+
+class Cell(NamedTuple):
+    """Chord of a cell in the plane: direction, 1/length (1/m)."""
+
+    d: tuple[float, float]
+    il: float
 
 
 @inner
-def answer(kappa, M, out, torsion, d):
+def moment_stiffness(kappa, M, out, torsion, d):
     """C (in the plane) and C + M J of an element with bend kappa, moment M, stiffness out of the plane and in torsion.
 
     d: the chord before it.  P = c I - kappa/2 J, c = kappa/2 cot(kappa/2); C = (D + P^T K) P, D = M (g kappa - J/2).
@@ -60,16 +82,16 @@ def times2(A, x):
 
 
 @inner
-def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
+def loads_out_of_plane(line, sea, i, state):
     """Loads on node i across the plane: factors of w, its rate, its acceleration, and of the tilt before and after."""
-    bits, plane = line.bits, line.plane
+    bits, plane, e = line.bits, line.plane, state.e
     stiff, rate, inert = 0.0, 0.0, line.mass[i]
     before = after = 0.0
     if bits & MASS_DAMPING:
         rate += line.damp[i]
     if bits & (DRAG | ADDED_MASS | BODIES):
-        u, b = part2(plane, v, i), part2(plane, vd, i)
-        z, eta = r[i, 2], sea.surface
+        u, b = part2(plane, state.v, i), part2(plane, state.vd, i)
+        z, eta = state.r[i, 2], sea.surface
         if bits & FLOW:
             U, _ = current_at(sea.z, sea.current, sea.now[1], z)
             u = (
@@ -116,90 +138,113 @@ def loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca):
     return stiff, rate, inert, before, after
 
 
-@kernel
-def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, before, rho, was, now, A):
-    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, to (r, e, v, vd, T, a1).
+@inner
+def first_joint(line, ends, a1, d):
+    """The element at the start, before the chord d."""
+    plane = line.plane
+    if not line.element[0]:
+        return Joint(-across2(plane, ends.moment, 0), Z2, Z2, Z2, Z2, 0.0)
+    k, k0 = about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
+    ghost = end_chord(plane, ends.frame, 0)
+    kappa = angle_between(ghost, d)
+    M = k * (kappa - k0)
+    C, _ = moment_stiffness(kappa, M, line.kb[0, 0] + line.kb[0, 1] - k, line.kb[0, 2], ghost)
+    return Joint(M, Z2, Z2, times2(C, (d[1], -d[0])), times2(C, d), line.kb[0, 2])
 
-    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
-    of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the
-    step can follow.
-    """
-    am, af, ga, be, _ = weights(rho, before / dt)
-    cv = ga / (be * dt)
-    ca = (1.0 - am) / ((1.0 - af) * be * dt * dt)
+
+@inner
+def joint_after(line, ends, a1, c, d, dn):
+    """The element after cell c with the chord d, before the chord dn."""
+    plane, n = line.plane, a1.shape[0]
+    if not line.element[c + 1]:
+        return Joint(across2(plane, ends.moment, 1) if c + 1 == n else 0.0, Z2, Z2, Z2, Z2, 0.0)
+    k, k0 = about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
+    kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
+    M = k * (kappa - k0)
+    C, CJ = moment_stiffness(kappa, M, line.kb[c + 1, 0] + line.kb[c + 1, 1] - k, line.kb[c + 1, 2], d)
+    zn, pn = Z2, Z2
+    if c + 1 < n:
+        zn, pn = times2(C, (dn[1], -dn[0])), times2(C, dn)
+    return Joint(M, times2(CJ, (-d[1], d[0])), times2(CJ, (-d[0], -d[1])), zn, pn, line.kb[c + 1, 2])
+
+
+@inner
+def add_shear(A, c, n, T, before, cell, after, joint, next_joint):
+    """Shear S_c = T zeta_c + m_c.(dM_{c+1} - dM_c)/l_c into the balances of the nodes c and c+1."""
+    d, il = cell
+    m = (-d[1], d[0])
+    # S_c by zeta and psi of cells c-1, c, c+1
+    sz0, sp0 = -il * dot2(m, joint.dMz_before), -il * dot2(m, joint.dMp_before)
+    sz1 = T + il * (dot2(m, next_joint.dMz_before) - dot2(m, joint.dMz_after))
+    sp1 = il * (dot2(m, next_joint.dMp_before) - dot2(m, joint.dMp_after))
+    sz2, sp2 = il * dot2(m, next_joint.dMz_after), il * dot2(m, next_joint.dMp_after)
+    a, b, g = sz0 * before.il, sz1 * il, sz2 * after.il  # by w_{c-1} .. w_{c+2}: -a, a - b, b - g, g
+    for side in range(2):  # + on node c, - on node c+1
+        sign = 1.0 - 2.0 * side
+        o = 2 * (c + side) * BAND + REACH - 2 * side
+        if c > 0:
+            A[o - 2] -= sign * a
+            A[o - 1] += sign * sp0
+        A[o] += sign * (a - b)
+        A[o + 1] += sign * sp1
+        A[o + 2] += sign * (b - g)
+        if c + 1 < n:
+            A[o + 3] += sign * sp2
+            A[o + 4] += sign * g
+
+
+@inner
+def add_spin(A, c, n, before, cell, after, joint, next_joint):
+    """The row of the spin of cell c: d_c.(dM_{c+1} - dM_c) + Q_c zeta_c = 0."""
+    d, il = cell
+    o = (2 * c + 1) * BAND + REACH
+    rz0, rp0 = -dot2(d, joint.dMz_before) * before.il, -dot2(d, joint.dMp_before)
+    rz1 = (dot2(d, next_joint.dMz_before) - dot2(d, joint.dMz_after) + next_joint.M - joint.M) * il
+    rp1 = dot2(d, next_joint.dMp_before) - dot2(d, joint.dMp_after)
+    rz2, rp2 = dot2(d, next_joint.dMz_after) * after.il, dot2(d, next_joint.dMp_after)
+    if c > 0:
+        A[o - 3], A[o - 2] = -rz0, rp0
+    A[o - 1], A[o + 1] = rz0 - rz1, rz1 - rz2
+    A[o] = rp1 - LEAST_SPIN_STIFFNESS * (joint.torsion + next_joint.torsion)
+    if c + 1 < n:
+        A[o + 2], A[o + 3] = rp2, rz2
+
+
+@inner
+def assemble_cells(line, ends, e, T, a1, A):
+    """Shear and spin rows, cell by cell, into A, which is zero."""
     n = e.shape[0]
     plane = line.plane
-    for j in range((2 * (n + 1) + REACH) * BAND):  # with room for the rows that the last ones reach to
-        A[j] = 0.0
-
-    # shear S_c = T zeta_c + m_c.(dM_{c+1} - dM_c)/l_c, spin row d_c.(dM_{c+1} - dM_c) + Q_c zeta_c, cell by cell
+    before = Cell(Z2, 0.0)
     d, _, il = chord2(part2(plane, e, 0))
-    soft = 0.0
-    M = -across2(plane, ends.moment, 0)
-    # dM of the element before cell c by the tilt and spin of cells c-1 and c
-    z0, p0, z1, p1 = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
-    il0 = 0.0
-    if line.element[0]:
-        k, k0 = about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
-        ghost = end_chord(plane, ends.frame, 0)
-        kappa = angle_between(ghost, d)
-        M = k * (kappa - k0)
-        C, _ = answer(kappa, M, line.kb[0, 0] + line.kb[0, 1] - k, line.kb[0, 2], ghost)
-        z1, p1 = times2(C, (d[1], -d[0])), times2(C, d)
-        soft = line.kb[0, 2]
+    cell = Cell(d, il)
+    joint = first_joint(line, ends, a1, d)
     for c in range(n):
-        dn, iln = (0.0, 0.0), 0.0
+        after = Cell(Z2, 0.0)
         if c + 1 < n:
-            dn, _, iln = chord2(part2(plane, e, c + 1))
-        Mn, softn = 0.0, 0.0
-        # dM of the element after cell c by the tilt and spin of cells c and c+1
-        zc, pc, zn, pn = (0.0, 0.0), (0.0, 0.0), (0.0, 0.0), (0.0, 0.0)
-        if line.element[c + 1]:
-            k, k0 = about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
-            kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
-            Mn = k * (kappa - k0)
-            C, Ca = answer(kappa, Mn, line.kb[c + 1, 0] + line.kb[c + 1, 1] - k, line.kb[c + 1, 2], d)
-            zc, pc = times2(Ca, (-d[1], d[0])), times2(Ca, (-d[0], -d[1]))
-            if c + 1 < n:
-                zn, pn = times2(C, (dn[1], -dn[0])), times2(C, dn)
-            softn = line.kb[c + 1, 2]
-        elif c + 1 == n:
-            Mn = across2(plane, ends.moment, 1)
-        m = (-d[1], d[0])
-        # S_c by zeta and psi of cells c-1, c, c+1
-        sz0, sp0 = -il * dot2(m, z0), -il * dot2(m, p0)
-        sz1, sp1 = T[c] + il * (dot2(m, zc) - dot2(m, z1)), il * (dot2(m, pc) - dot2(m, p1))
-        sz2, sp2 = il * dot2(m, zn), il * dot2(m, pn)
-        a, b, g = sz0 * il0, sz1 * il, sz2 * iln  # by w_{c-1} .. w_{c+2}: -a, a - b, b - g, g
-        for side in range(2):  # + on node c, - on node c+1
-            sign = 1.0 - 2.0 * side
-            o = 2 * (c + side) * BAND + REACH - 2 * side
-            if c > 0:
-                A[o - 2] -= sign * a
-                A[o - 1] += sign * sp0
-            A[o] += sign * (a - b)
-            A[o + 1] += sign * sp1
-            A[o + 2] += sign * (b - g)
-            if c + 1 < n:
-                A[o + 3] += sign * sp2
-                A[o + 4] += sign * g
-        o = (2 * c + 1) * BAND + REACH
+            d, _, il = chord2(part2(plane, e, c + 1))
+            after = Cell(d, il)
+        next_joint = joint_after(line, ends, a1, c, cell.d, after.d)
+        add_shear(A, c, n, T[c], before, cell, after, joint, next_joint)
         if line.spin[c]:
-            rz0, rp0 = -dot2(d, z0) * il0, -dot2(d, p0)
-            rz1, rp1 = (dot2(d, zc) - dot2(d, z1) + Mn - M) * il, dot2(d, pc) - dot2(d, p1)
-            rz2, rp2 = dot2(d, zn) * iln, dot2(d, pn)
-            if c > 0:
-                A[o - 3], A[o - 2] = -rz0, rp0
-            A[o - 1], A[o], A[o + 1] = rz0 - rz1, rp1 - 1e-9 * (soft + softn), rz1 - rz2
-            if c + 1 < n:
-                A[o + 2], A[o + 3] = rp2, rz2
+            add_spin(A, c, n, before, cell, after, joint, next_joint)
         else:
-            A[o] = -1.0
-        z0, p0, z1, p1 = zc, pc, zn, pn
-        il0 = il
-        d, il, M, soft = dn, iln, Mn, softn
+            A[(2 * c + 1) * BAND + REACH] = -1.0
+        before, cell, joint = cell, after, next_joint
     A[(2 * n + 1) * BAND + REACH] = -1.0
 
+
+@inner
+def held(ends, i, n):
+    """Whether node i of n cells is held."""
+    return (i == 0 and ends.held[0]) or (i == n and ends.held[1])
+
+
+@inner
+def assemble_nodes(line, sea, ends, state, s, was, now, A):
+    """Loads on the nodes into their balances in A; the push as predicted into `now`."""
+    plane, n = line.plane, state.e.shape[0]
+    dt, am, af, _, be, cv, ca = s
     for i in range(n + 1):
         o = 2 * i * BAND + REACH
         ai = was[i, 2]
@@ -207,25 +252,28 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, before, rho, was, now, A
         vp = was[i, 1] + dt * ai
         vdp = (am * ai - af * was[i, 3]) / (1.0 - af) + ca * be * dt * dt * ai
         now[i, 0], now[i, 1], now[i, 3] = wp, vp, vdp
-        if (i == 0 and ends.held[0]) or (i == n and ends.held[1]):
+        if held(ends, i, n):
             for j in range(-REACH, REACH + 1):
                 A[o + j] = 0.0
             A[o] = -1.0
             continue
-        stiff, rate, inert, before, after = loads_aside(line, sea, ends, i, r, e, v, vd, cv, ca)
+        stiff, rate, inert, before, after = loads_out_of_plane(line, sea, i, state)
         A[o] -= stiff + cv * rate + ca * inert
         if before != 0.0:
-            _, _, x = chord2(part2(plane, e, i - 1))
+            _, _, x = chord2(part2(plane, state.e, i - 1))
             A[o] += before * x
             A[o - 2] -= before * x
         if after != 0.0:
-            _, _, x = chord2(part2(plane, e, i))
+            _, _, x = chord2(part2(plane, state.e, i))
             A[o] -= after * x
             A[o + 2] += after * x
         A[o + REACH + 1] = rate * (vp - cv * wp) + inert * (vdp - ca * wp)
 
+
+@inner
+def eliminate(A, rows):
+    """Forward elimination without pivoting; how many pivots have the wrong sign."""
     wrong = 0
-    rows = 2 * (n + 1)
     for i in range(rows):
         o = i * BAND + REACH
         if not A[o] < 0.0:
@@ -244,20 +292,44 @@ def step_aside(line, sea, ends, r, e, v, vd, T, a1, dt, before, rho, was, now, A
                 A[p + 3] -= f * b3
                 A[p + 4] -= f * b4
                 A[p + j + REACH + 1] -= f * b
+    return wrong
+
+
+@inner
+def substitute_push(line, ends, s, was, now, A):
+    """Solve back from the end, correct `now`, and return its kinetic energy, J."""
+    n = now.shape[0] - 1
+    dt, _, _, _, be, cv, ca = s
     energy = 0.0
     x1 = x2 = x3 = x4 = 0.0
-    for i in range(rows - 1, -1, -1):
+    for i in range(2 * n + 1, -1, -1):
         o = i * BAND + REACH
         x = (A[o + 5] - A[o + 1] * x1 - A[o + 2] * x2 - A[o + 3] * x3 - A[o + 4] * x4) * A[o]
         x1, x2, x3, x4 = x, x1, x2, x3
         if i % 2 == 0:
             k = i // 2
-            more = x - now[k, 0]
-            if (k == 0 and ends.held[0]) or (k == n and ends.held[1]):
-                more = -now[k, 0]
+            more = -now[k, 0] if held(ends, k, n) else x - now[k, 0]
             now[k, 0] += more
             now[k, 1] += cv * more
             now[k, 2] = was[k, 2] + more / (be * dt * dt)
             now[k, 3] += ca * more
             energy += 0.5 * line.mass[k] * now[k, 1] * now[k, 1]
-    return energy, wrong
+    return energy
+
+
+@kernel
+def step_out_of_plane(line, sea, ends, state, dt, before, rho, was, now, A):
+    """Step the push from `was` to `now` (N+1, 4) over a step dt, after one of `before`, that led to `state`.
+
+    A: work array with BAND numbers for each of 2 (N+1) equations, and for REACH more.  Returns the kinetic energy
+    of the push at the end of the step, J, and how many pivots have the wrong sign: with one, it grows faster than the
+    step can follow.
+    """
+    s = scheme(rho, before, dt)
+    rows = 2 * (state.e.shape[0] + 1)
+    for j in range((rows + REACH) * BAND):  # with room for the rows that the last ones reach to
+        A[j] = 0.0
+    assemble_cells(line, ends, state.e, state.T, state.a1, A)
+    assemble_nodes(line, sea, ends, state, s, was, now, A)
+    wrong = eliminate(A, rows)
+    return substitute_push(line, ends, s, was, now, A), wrong

@@ -1,4 +1,4 @@
-"""The model error of a line along its run: what leaving bending out of its catenaries shifts it by.
+"""The model error of a line along its run: what neglecting bending in its catenaries shifts it by.
 
 One way only: nothing of it goes back into the line.  docs/theory.md, 14; the kernels are in kernels.bending_error.
 """
@@ -11,9 +11,10 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.bending_error import follow
+from hybrid.kernels.bending_error import ErrorArrays, Step, advance_error
 from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
+from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.newton import lay
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, no_sea
@@ -58,15 +59,16 @@ class Corrector:
         tangent: (2,) 1 where an end prescribes one; length: m; scale: tension scale, N.
         """
         n = line.h.size
-        self.line, self.ki, self.floor, self.tangent = line, ki, floor, np.asarray(tangent, np.int8)
-        self.length, self.scale = length, scale
+        soft = np.divide(1.0, ki, out=np.zeros(n + 1), where=ki > 0.0)
+        self.line, self.ki, self.length, self.scale = line, ki, length, scale
+        self.bending = Bending(soft, np.asarray(tangent, np.int8), floor)
         self.error, self._spare = np.zeros((2, 4, n + 1, 4))
-        self.slid = np.zeros((n + 1, 3))
-        self.x, self._b = np.zeros((2, n + 1, 5))
-        self.moment, self.left = np.zeros((2, n + 1, 3))
-        self._work = np.zeros((4, n + 1, 4))
-        self._chords, self._turned = np.zeros((2, n, 5))
-        self._soft = np.divide(1.0, ki, out=np.zeros(n + 1), where=ki > 0.0)
+        self.slid, self.moment, self.left = np.zeros((3, n + 1, 3))
+        self.x, b = np.zeros((2, n + 1, 5))
+        chords, turned = np.zeros((2, n, 5))
+        self._arrays = ErrorArrays(
+            self.slid, self.x, self.moment, self.left, chords, turned, b, np.zeros((4, n + 1, 4))
+        )
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step
 
@@ -107,7 +109,7 @@ class Corrector:
         forces = (self._end_forces(ends, state, SMALL) - now) / SMALL * ends.held[:, None]
         return Shift(
             self.position.copy(), self.error[1, :, :3].copy(), self.tension.copy(), self.moment.copy(),
-            self.ki * self.line.hn, forces, self.tangent,
+            self.ki * self.line.hn, forces, self.bending.tangent,
         )  # fmt: skip
 
     def _end_forces(self, ends: Ends, state: State, part: float) -> Floats:
@@ -161,26 +163,20 @@ class Corrector:
             np.zeros_like(state.w), 0.0, ca, gaps, W, X, report, rows,
         )  # fmt: skip
         self.slid[:] = 0.0
-        self._follow(line, sea, ends, state, still, torque, 0.0, 0.0, 0.0, X, W)
+        self._advance(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), X, W)
 
     def step(
         self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, before: float, rho: float,
         torque: float = 0.0,
     ) -> None:  # fmt: skip
         """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
-        self._follow(self.line, sea, ends, state, stepper.u, torque, dt, before, rho, stepper.X, stepper.W)
+        self._advance(self.line, sea, ends, state, Step(stepper.u, dt, before, rho, torque), stepper.X, stepper.W)
 
-    def _follow(
-        self, line: Line, sea: Sea, ends: Ends, state: State, u: Floats, torque: float, dt: float, before: float,
-        rho: float,
-        X: Floats, W: Floats,
-    ) -> None:  # fmt: skip
+    def _advance(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, X: Floats, W: Floats) -> None:
         self.sea = sea
-        self.finite, self.clipped, self.where = follow(
-            line, sea, ends, self._soft, self.tangent, self.floor, state, u, self.error, self.slid, self._spare, torque,
-            dt, before, rho, self.most, X, W, self._chords, self._turned, self._work, self._b, self.x, self.moment,
-            self.left,
-        )  # fmt: skip
+        self.finite, self.clipped, self.where = advance_error(
+            line, sea, ends, self.bending, state, step, X, W, self.error, self._spare, self.most, self._arrays
+        )
         if self.finite:
             self.error, self._spare = self._spare, self.error
         else:

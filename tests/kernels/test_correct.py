@@ -1,4 +1,4 @@
-"""The model error: what leaving bending out shifts a cable by (docs/theory.md, 14)."""
+"""The model error: what neglecting bending shifts a cable by (docs/theory.md, 14)."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ from test_jacobian import BITS, CA, CV, ZONES, N, assembled, random_case
 
 import hybrid
 from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.bending_error import lay_out, left_out, right_side
+from hybrid.kernels.bending_error import History, right_hand_side
 from hybrid.kernels.block_elimination import again
 from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.neglected_moments import Bending, neglected_moments, tabulate_chords
 from hybrid.kernels.state import no_sea
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build
@@ -64,13 +65,11 @@ def test_keeping_factors_changes_nothing():
 def history(line, sea, ends, st, q):
     """Right-hand side (N+1, 5) that history alone makes: of cv q and ca q in the rates."""
     chords = np.zeros((N, 5))
-    lay_out(st.e, chords)
+    tabulate_chords(st.e, chords)
     nothing, b, out = np.zeros((N + 1, 3)), np.zeros((N + 1, 5)), np.zeros((N + 1, 4))
     zero = np.zeros((N + 1, 4))
-    right_side(
-        line, sea, ends, chords, st.r, nothing, st.e, st.v, st.vd, nothing, CV * q, CA * q, zero, zero, nothing, out,
-        True, b,
-    )  # fmt: skip
+    past = History(CV * q, CA * q, zero, zero, nothing, out)
+    right_hand_side(line, sea, ends, chords, st, nothing, nothing, True, past, b)
     return b
 
 
@@ -144,12 +143,10 @@ def chain(cells, angle=0.1, EI=2.0, T=50.0, tangent=(0, 0), turn=None):
     model = build(what)
     ki, floor = full_bending(model.cable, model.line.s, model.line.h, model.tension_scale)
     chords, work = np.zeros((cells, 5)), np.zeros((cells + 1, 4))
-    lay_out(e, chords)
+    tabulate_chords(e, chords)
     dM, M = np.zeros((2, cells + 1, 3))
-    left_out(
-        model.line, model.ends.at(0.0), 1.0 / ki, np.array(tangent, np.int8), floor, chords, chords, np.full(cells, T),
-        0.0, work, dM, M,
-    )  # fmt: skip
+    bending = Bending(1.0 / ki, np.array(tangent, np.int8), floor)
+    neglected_moments(model.line, model.ends.at(0.0), bending, chords, chords, np.full(cells, T), 0.0, work, dM, M)
     np.testing.assert_array_equal(dM, M)  # a catenary has none of it
     return s, dM[:, 1]
 

@@ -15,7 +15,7 @@ from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.assembly_plane import WIDE, march_planar, substitute_planar, update_planar
 from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.out_of_plane import BAND, step_aside
+from hybrid.kernels.out_of_plane import BAND, step_out_of_plane
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import State
 
@@ -176,7 +176,7 @@ def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
     g = np.random.default_rng(seed)
     was, now, A = np.zeros((N + 1, 4)), np.zeros((N + 1, 4)), np.zeros(45 * (N + 1))
     was[1:, 1] = g.normal(size=N)
-    step_aside(line, sea, ends, st.r, st.e, st.v, st.vd, st.T, st.a1, dt, dt, rho, was, now, A)
+    step_out_of_plane(line, sea, ends, st, dt, dt, rho, was, now, A)
     am, af = (2 * rho - 1) / (rho + 1), rho / (rho + 1)
     ga = 0.5 - am + af
     be = 0.25 * (ga + 0.5) ** 2
