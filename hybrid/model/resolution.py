@@ -10,7 +10,7 @@ from math import sqrt
 
 from hybrid.model.mesh_grading import Grading
 from hybrid.scene.accuracy import Accuracy, amount
-from hybrid.scene.motion import shortest_period
+from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.schema import AdaptiveModel, Scene, ZonesModel
 
 USUAL = "1%"  # of a scene that asks for nothing and leaves its steps open

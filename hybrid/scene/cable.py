@@ -68,6 +68,11 @@ class Environment(Table):
     seabed: Seabed | None = Field(default=None, description="the ground the cable can lie on; absent: none")
 
     @property
+    def waves(self) -> Waves | None:
+        """The waves, if there are any."""
+        return self.fluid.waves if self.fluid is not None else None
+
+    @property
     def depth(self) -> float | None:
         """Depth of the water [m] that waves feel, at x = y = 0; None: deep, or no surface."""
         if self.fluid is None or self.fluid.surface is None:

@@ -1,22 +1,15 @@
-"""A recorded motion: a CSV file read with care, and judged for jumps of velocity.
-
-The kink test.  At sample i let c_i be the change of slope, c_i = s_i - s_{i-1}.  Where the
-motion is smooth, c_i is its acceleration times the local sample spacing, so c_i / spacing
-varies slowly from sample to sample; a jump J of velocity adds J to one c_i (or, when it
-falls between two samples, shares it between two neighbours).  So one sample, or a pair, is
-left out, its c is interpolated from the two samples on each side, and the excess J is a kink if
-  - it exceeds ISOLATED times every change of slope among the four samples on either side,
-  - it exceeds NEGLIGIBLE of the top speed, and
-  - the digits of the file cannot explain it.
-A sine of 12 samples a period leaves an excess of 0.01 (single) and 0.1 (pair) of its
-neighbours, a sine that starts without ramp 2 and more, the corner of a triangle any number.
-"""
+"""A motion file: a CSV table of times, positions and rotations, read with care; splines through its samples."""
 
 from __future__ import annotations
 
 import math
+import os
+import stat
+from array import array
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,21 +18,14 @@ from hybrid.scene.base import Finding
 
 Array = NDArray[np.float64]
 
-SHIFT_COLUMNS, TURN_COLUMNS = ("x", "y", "z"), ("rx", "ry", "rz")
+SHIFT_COLUMNS, ROTATION_COLUMNS = ("x", "y", "z"), ("rx", "ry", "rz")
 COLUMNS = "t,x,y,z or t,rx,ry,rz or t,x,y,z,rx,ry,rz"
 
-# What it takes to tell whether a record starts from rest.
+# Bytes: twelve hours of seven columns at 100 Hz take 400 MB, and 12 samples a period of any sea a hundredth of that.
+LARGEST_FILE = 200_000_000
+
+# The fewest rows from which the velocity at the start can be told.
 FEWEST_ROWS = 6
-
-# A velocity jump of 2 % of the top speed is what two-digit data cannot avoid and a cable hardly feels.
-NEGLIGIBLE = 0.02
-
-# Half way (in ratio) between the worst smooth signal of 12 samples a period and an unramped sine.
-ISOLATED = 1.25
-
-# How many samples on either side count as neighbours: a third of a period at 12 samples a period,
-# so the next corner of a triangle is never among them.
-NEIGHBOURS = 4
 
 # Numbers of one or two digits are typed by hand and meant exactly; longer ones are rounded.
 ROUNDED = 3
@@ -47,18 +33,25 @@ ROUNDED = 3
 # No end of a cable is further away, in m or degrees; larger numbers are typing errors and overflow.
 LARGEST = 1e12
 
-# Characters of a line of the file that a complaint repeats.
-SHOWN = 60
+# A time step must not miss a bow of more than this part of the range of a record: six steps a period of a harmonic
+# bow by 13 %, which is a poor answer but the same motion.
+MISSED = 0.15
 
-# The file and the scene may round a position differently, but not by more than this part of the excursion.
-SAME_START = 1e-3
+# What a path may lead to that is no regular file.
+_KINDS = (
+    (stat.S_ISDIR, "a folder"),
+    (stat.S_ISFIFO, "a named pipe"),
+    (stat.S_ISCHR, "a device"),
+    (stat.S_ISBLK, "a device"),
+    (stat.S_ISSOCK, "a socket"),
+)
 
 
 class RecordRefused(Exception):
     """The file cannot be used; `finding` says why, relative to the `motion` table."""
 
-    def __init__(self, expected: str, fix: str, given: str | None = None, at: str = "file") -> None:
-        self.finding = Finding((at,), expected, fix, given)
+    def __init__(self, expected: str, fix: str, given: str | None = None) -> None:
+        self.finding = Finding(("file",), expected, fix, given)
         super().__init__(f"{given or 'motion file'}: expected {expected}")
 
 
@@ -66,271 +59,188 @@ class RecordRefused(Exception):
 class Record:
     """Samples of a motion.
 
-    times: (n,) s, increasing; shift: (n, 3) m, inertial, absolute, or None; turn: (n, 3) rotation
-    vectors in degrees, inertial axes, or None; shift_unit, turn_unit: what the last written digit
-    of every number is worth.
+    times: (n,) s, increasing; shift: (n, 3) m, inertial, absolute, or None; rotation: (n, 3) rotation vectors in
+    degrees, inertial axes, or None; shift_unit, rotation_unit: what the last written digit of every number is worth.
     """
 
     times: Array
     shift: Array | None
-    turn: Array | None
+    rotation: Array | None
     shift_unit: Array | None
-    turn_unit: Array | None
+    rotation_unit: Array | None
     name: str
 
+    def splines(self) -> Iterator[Any]:
+        """C2 splines through the shift [m] and the rotation [deg], of those that are there."""
+        for values in (self.shift, self.rotation):
+            if values is not None:
+                yield spline(self.times, values)
 
-# --- reading -----------------------------------------------------------------------------------
+
+def spline(times: Array, values: Array) -> Any:
+    """C2 spline through `values`, counted from their value at t = 0 so that no rounding shows as a jump."""
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    # A record that begins with the computation begins from rest (judge_record sees to it).
+    start = (1, np.zeros(3)) if times[0] == 0.0 else "not-a-knot"
+    zero = CubicSpline(times, values, bc_type=(start, "not-a-knot"))(0.0)
+    return CubicSpline(times, values - zero, bc_type=(start, "not-a-knot"))
 
 
 def read_record(path: str | Path) -> Record:
-    """Read a motion file; RecordRefused names file and line of what cannot be understood."""
+    """Read a motion file; RecordRefused names file and line of what cannot be understood, and repeats none of it."""
     name = Path(path).name
+    check_file(path)
     try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        fix = "check the name; it is relative to the folder of the scene file"
-        raise RecordRefused("a CSV file", fix, f"{path}, which does not exist") from None
+        with Path(path).open(encoding="utf-8-sig") as lines:
+            header, values, precisions, numbers = _table(name, lines)
     except (OSError, UnicodeDecodeError, ValueError):
         raise RecordRefused("a CSV text file", f"columns {COLUMNS}", f"{path}, which cannot be read") from None
-
-    lines = [(i, line) for i, line in enumerate(text.splitlines(), start=1) if line.strip() and line.strip()[0] != "#"]
-    rows = [(i, [cell.strip() for cell in line.split(",")]) for i, line in lines]
-    header = rows[0][1] if rows else []
-    wanted = [c for group in (SHIFT_COLUMNS, TURN_COLUMNS) if set(group) <= set(header) for c in group]
-    if "t" not in header or not wanted or len(header) != len(wanted) + 1:
-        first = _shown(",".join(header))
-        given = f"{name} with columns {first}" if header else f"{name}, which is empty"
-        raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line of the file", given)
-
-    values = [[_cell(name, i, cell) for cell in _row(name, i, row, len(header))] for i, row in rows[1:]]
-    if len(values) < FEWEST_ROWS:
-        raise RecordRefused(
-            f"at least {FEWEST_ROWS} rows",
-            "sample more finely; 12 rows a period is the least",
-            f"{name}, {len(values)} rows",
-        )
-    table = np.array(values)
+    if len(numbers) < FEWEST_ROWS:
+        fix = "sample more finely; 12 rows a period is the least"
+        raise RecordRefused(f"at least {FEWEST_ROWS} rows", fix, f"{name}, {len(numbers)} rows")
+    table = np.array(values).reshape(len(numbers), len(header))
     times = table[:, header.index("t")]
     for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
-        line, before, after = rows[k + 2][0], times[k], times[k + 1]
-        given = f"{name}, line {line}: t = {after:.9g} after t = {before:.9g}"
+        given = f"{name}, line {numbers[k + 1]}: t = {times[k + 1]:.9g} after t = {times[k]:.9g}"
         raise RecordRefused("times that increase strictly", "sort the rows and drop duplicates", given)
 
     def columns(group: tuple[str, ...]) -> tuple[Array | None, Array | None]:
-        if group[0] not in wanted:
+        if group[0] not in header:
             return None, None
         picked = [header.index(c) for c in group]
-        units = [_last_digit([row[j] for _, row in rows[1:]], table[:, j]) for j in picked]
-        return table[:, picked], np.stack(units, axis=1)
+        return table[:, picked], np.stack([precisions[j].unit(table[:, j]) for j in picked], axis=1)
 
     shift, shift_unit = columns(SHIFT_COLUMNS)
-    turn, turn_unit = columns(TURN_COLUMNS)
-    return Record(times, shift, turn, shift_unit, turn_unit, name)
+    rotation, rotation_unit = columns(ROTATION_COLUMNS)
+    return Record(times, shift, rotation, shift_unit, rotation_unit, name)
 
 
-def _row(name: str, line: int, row: list[str], n: int) -> list[str]:
-    if len(row) != n:
-        raise RecordRefused(
-            f"{n} numbers in every row", "complete that row", f"{name}, line {line}: {len(row)} entries"
-        )
-    return row
+def check_file(path: str | Path) -> None:
+    """RecordRefused if there is no regular file of bounded size; nothing is opened, so that a pipe cannot wait."""
+    try:
+        status = os.stat(path)
+    except FileNotFoundError:
+        fix = "check the name; it is relative to the folder of the scene file"
+        raise RecordRefused("a CSV file", fix, f"{path}, which does not exist") from None
+    except (OSError, ValueError):
+        raise RecordRefused("a CSV text file", "check the path", f"{path}, which cannot be read") from None
+    if not stat.S_ISREG(status.st_mode):
+        kind = next((name for test, name in _KINDS if test(status.st_mode)), "no regular file")
+        fix = "name a file; what comes through a pipe or a device has to be written to one first"
+        raise RecordRefused("a CSV file", fix, f"{path}, which is {kind}")
+    if status.st_size > LARGEST_FILE:
+        fix = "sample less finely, as 20 rows a period are enough; or cut it to time.duration"
+        given = f"{path}, {status.st_size / 1e6:.0f} MB"
+        raise RecordRefused(f"a file of at most {LARGEST_FILE / 1e6:.0f} MB", fix, given)
 
 
-def _cell(name: str, line: int, text: str) -> float:
+def _table(name: str, lines: Iterator[str]) -> tuple[list[str], array[float], list[Precision], array[int]]:
+    """Column names, values row by row, the precision of each column, and the line of each row."""
+    header: list[str] = []
+    values, numbers = array("d"), array("q")
+    precisions: list[Precision] = []
+    for i, line in enumerate(lines, start=1):
+        if not line.strip() or line.lstrip()[0] == "#":
+            continue
+        cells = [cell.strip() for cell in line.split(",")]
+        if not header:
+            header = _checked_header(name, cells)
+            precisions = [Precision() for _ in header]
+            continue
+        if len(cells) != len(header):
+            given = f"{name}, line {i}: {len(cells)} entries"
+            raise RecordRefused(f"{len(header)} numbers in every row", "complete that row", given)
+        for column, cell, precision in zip(header, cells, precisions, strict=True):
+            values.append(_number(name, i, column, cell))
+            precision.add(cell)
+        numbers.append(i)
+    if not header:
+        raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line", f"{name}, which is empty")
+    return header, values, precisions, numbers
+
+
+def _checked_header(name: str, header: list[str]) -> list[str]:
+    groups = [group for group in (SHIFT_COLUMNS, ROTATION_COLUMNS) if set(group) <= set(header)]
+    if "t" in header and groups and len(header) == 1 + sum(map(len, groups)):
+        return header
+    known = [c for c in ("t", *SHIFT_COLUMNS, *ROTATION_COLUMNS) if c in header]
+    given = f"{name} with {len(header)} columns, of which {', '.join(known) or 'none'} can be used"
+    raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line of the file", given)
+
+
+def _number(name: str, line: int, column: str, text: str) -> float:
     try:
         value = float(text)
     except ValueError:
         value = math.nan
     if not abs(value) <= LARGEST:
-        raise RecordRefused("finite numbers", "mend or drop that row", f"{name}, line {line}: {_shown(text)}")
+        given = f"{name}, line {line}: {column} is {'no finite number' if text else 'empty'}"
+        raise RecordRefused("finite numbers", "correct or drop that row", given)
     return value
 
 
-def _shown(text: str) -> str:
-    """What is written, as far as a complaint has room for it and a terminal can print it."""
-    short = text if len(text) <= SHOWN else text[: SHOWN - 4] + " ..."
-    return (short if short.isprintable() else ascii(short)) or "nothing"
+class Precision:
+    """How finely the numbers of a column are written.
 
-
-def _last_digit(written: list[str], values: Array) -> Array:
-    """What the last digit of each number of a column is worth.
-
-    Writers round to a number of decimals or to a number of digits and may strip zeros, so the
-    most precise entry of the column speaks for all: the coarser of the two readings is taken.
+    Writers round to a number of decimals or to a number of digits and may strip zeros, so the most precise entry of
+    the column speaks for all: the coarser of the two readings is taken.
     """
-    decimals, digits = -300, 1
-    for text in written:
+
+    def __init__(self) -> None:
+        self.decimals, self.digits = -300, 1
+
+    def add(self, text: str) -> None:
+        """Take one number of the column into account, as it is written."""
         mantissa, _, exponent = text.lower().partition("e")
         whole, _, fraction = mantissa.lstrip("+-").partition(".")
-        decimals = max(decimals, len(fraction) - int(exponent or 0))
-        digits = max(digits, len((whole + fraction).lstrip("0")))
-    if digits < ROUNDED:
-        return np.zeros(len(values))
-    size = np.where(values == 0.0, 0.0, 10.0 ** (np.floor(np.log10(np.abs(values) + 1e-300)) - digits + 1))
-    return np.maximum(size, 10.0 ** -min(max(decimals, -300), 300))
+        self.decimals = max(self.decimals, len(fraction) - int(exponent or 0))
+        self.digits = max(self.digits, len((whole + fraction).lstrip("0")))
+
+    def unit(self, values: Array) -> Array:
+        """What the last digit of each value of the column is worth."""
+        if self.digits < ROUNDED:
+            return np.zeros(len(values))
+        exponents = np.floor(np.log10(np.abs(values) + 1e-300)) - self.digits + 1
+        size = np.where(values == 0.0, 0.0, 10.0**exponents)
+        return np.maximum(size, 10.0 ** -min(max(self.decimals, -300), 300))
 
 
-# --- judging -----------------------------------------------------------------------------------
+# --- how fast it moves -------------------------------------------------------------------------
 
 
-def judge_record(record: Record, position: Array | None, duration: float | None) -> list[Finding]:
-    """What is wrong with a record as motion of an end that starts from rest at `position` ((3,) m, or None)."""
-    found: list[Finding] = []
-    times = record.times
-    if times[0] > 0:
-        given = f"{record.name}, which starts at t = {times[0]:.6g} s"
-        found.append(Finding(("file",), "a record that starts at t <= 0", "add a row at t = 0", given))
-    if duration is not None and times[-1] < duration * (1 - 1e-9):
-        given = f"{record.name}, which ends at t = {times[-1]:.6g} s"
-        expected = f"a record that covers time.duration, {duration:.6g} s"
-        found.append(Finding(("file",), expected, "a longer record or a shorter duration", given))
-    if found:
-        return found
-    if record.shift is not None and position is not None:
-        fix = "make the first row and the position of the end equal"
-        found += _starts_at(record, record.shift, position, "position", "m", fix)
-    if record.turn is not None:
-        fix = "rotation counts from the tangent of the end: subtract the first row"
-        found += _starts_at(record, record.turn, np.zeros(3), "rotation", "deg", fix)
-    for values, unit, name, measure in (
-        (record.shift, record.shift_unit, "velocity", "m/s"),
-        (record.turn, record.turn_unit, "angular velocity", "deg/s"),
-    ):
-        if values is not None and unit is not None:
-            jump = first_jump(times, values, unit, math.inf if duration is None else duration)
-            if jump is not None:
-                found.append(_jump_finding(record.name, jump, name, measure))
-    return found
+def shortest_in(record: Record) -> float:
+    """What is to a record as a period is to a harmonic, s.
 
-
-def _starts_at(record: Record, values: Array, base: Array, what: str, unit: str, fix: str) -> list[Finding]:
-    # A record may begin before t = 0; what counts is where it is when the computation begins.
-    first = np.array([np.interp(0.0, record.times, column) for column in values.T])
-    excursion = float(np.linalg.norm(values - first, axis=1).max())
-    if np.linalg.norm(first - base) <= SAME_START * excursion + 1e-9 * float(np.linalg.norm(base)):
-        return []
-    row = "in its first row" if record.times[0] == 0 else "at t = 0"
-    given = f"{record.name}, {_triple(first)} {unit} {row}"
-    return [Finding(("file",), f"{_triple(base)} {unit}, the {what} of this end at the start", fix, given)]
-
-
-def _triple(x: Array) -> str:
-    return f"[{x[0]:.8g}, {x[1]:.8g}, {x[2]:.8g}]"
-
-
-def _jump_finding(name: str, jump: tuple[float, float], what: str, unit: str) -> Finding:
-    t, size = jump
-    if t == 0.0:
-        given = f"{name}, which starts with {size:.4g} {unit}"
-        fix = "let the record begin at rest, or grow from rest over about two periods"
-        return Finding(("file",), f"no {what} at t = 0, because the cable starts at rest", fix, given)
-    given = f"{name}, whose {what} jumps by {size:.4g} {unit} at t = {t:.6g} s"
-    return Finding(("file",), f"a smooth {what}", "smooth the record there, or sample it more finely", given)
-
-
-def first_jump(times: Array, values: Array, unit: Array, until: float = math.inf) -> tuple[float, float] | None:
-    """Time and size of the first jump of velocity in [0, until], None if there is none.
-
-    times: (n,) s; values, unit: (n, 3) samples and what their last digits are worth.
+    Over a step of h a path with acceleration a leaves its chord by a h^2/8; MISSED of its range is too much, and of a
+    harmonic a quarter of its period is that long.
     """
-    slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
-    top = float(np.linalg.norm(slopes, axis=1).max())
-    if top == 0.0:
-        return None
-    start = [_start_speed(times, values[:, j], unit[:, j]) for j in range(values.shape[1])]
-    speed, doubt = float(np.linalg.norm([v for v, _ in start])), float(np.linalg.norm([d for _, d in start]))
-    if speed > NEGLIGIBLE * top + doubt:
-        return 0.0, speed
-    jumps = [j for k in range(values.shape[1]) for j in _kinks(times, values[:, k], unit[:, k], NEGLIGIBLE * top)]
-    if not jumps:
-        jumps = [j for column in values.T for j in _leap_at_the_end(times, column, NEGLIGIBLE * top)]
-    jumps = [(max(t, 0.0), size) for t, size in jumps if 0.0 <= t <= until]
-    return min(jumps) if jumps else None
+    shortest = math.inf
+    t = np.linspace(record.times[0], record.times[-1], min(200_000, 4 * record.times.size))
+    for path in record.splines():
+        reach, bend = float(np.ptp(path(t), axis=0).max()), float(np.abs(path(t, 2)).max())
+        if reach > 0.0 and bend > 0.0:
+            shortest = min(shortest, 4.0 * math.sqrt(8.0 * MISSED * reach / bend))
+    return shortest
 
 
-def _start_speed(times: Array, x: Array, unit: Array) -> tuple[float, float]:
-    """Speed at t = 0 and how far it may be wrong.
-
-    The quintic through the six samples next to 0, held against the quartic and the cubic through
-    five and four of them: their differences bound what sparse sampling leaves open (a few per cent
-    at 12 samples a period, nothing that shows at 24).
-    """
-    i = int(np.searchsorted(times, 0.0, side="right")) - 1
-    low = max(0, min(i - (2 if times[0] < 0 else 0), len(times) - 6))
-    estimates = []
-    for n in (4, 5, 6):
-        w = _slope_weights(times[low : low + n])
-        estimates.append((float(w @ x[low : low + n]), float(np.abs(w) @ unit[low : low + n]) / 2))
-    (cubic, _), (quartic, _), (quintic, noise) = estimates
-    return abs(quintic), 2 * max(abs(cubic - quartic), abs(quartic - quintic)) + noise
+def missed_between(record: Record, step: float) -> float | None:
+    """Time at which a record departs most from its chord over a step, when that is a large part of its range."""
+    last = float(record.times[-1])
+    t = np.linspace(0.0, max(last - step, 0.0), min(20_000, max(2, int(4 * last / step))))
+    for path in record.splines():
+        bow = np.abs(path(t + 0.5 * step) - 0.5 * (path(t) + path(np.minimum(t + step, last)))).max(axis=1)
+        reach = float(np.ptp(path(t), axis=0).max())
+        if reach > 0.0 and bow.max() > MISSED * reach:
+            return float(t[int(bow.argmax())])
+    return None
 
 
-def _slope_weights(t: Array) -> Array:
-    """Weights w with w @ x = p'(0), p the polynomial through the samples (t, x)."""
-    scale = t[-1] - t[0]
-    u = t / scale
-    rhs = np.zeros(len(t))
-    rhs[1] = 1.0 / scale
-    weights: Array = np.asarray(np.linalg.solve(np.vander(u, increasing=True).T, rhs), dtype=np.float64)
-    return weights
-
-
-def _kinks(times: Array, x: Array, unit: Array, negligible: float) -> list[tuple[float, float]]:
-    """(time, velocity jump) of every kink of one column."""
-    if times[0] == 0.0:
-        # The cable is at rest before the record begins, which gives the first samples neighbours.
-        n = NEIGHBOURS + 1
-        rest = -np.arange(n, 0, -1) * (times[1] - times[0])
-        times, x = np.concatenate([rest, times]), np.concatenate([np.full(n, x[0]), x])
-        unit = np.concatenate([np.zeros(n), unit])
-    h = np.diff(times)
-    spacing = (h[:-1] + h[1:]) / 2
-    accel = np.diff(np.diff(x) / h) / spacing
-    centre = (times[:-2] + times[1:-1] + times[2:]) / 3
-    # Every sample may be wrong by half its last digit.
-    doubt = ((unit[:-2] + unit[1:-1]) / h[:-1] + (unit[1:-1] + unit[2:]) / h[1:]) / 2 / spacing
-
-    found: list[tuple[int, float]] = []
-    for width in (1, 2):
-        # Two neighbours on either side; the last two samples of a record have too few to be judged.
-        first = np.arange(2, len(accel) - width - 1)
-        inside = first[:, None] + np.arange(width)
-        near = first[:, None] + np.array([-2, -1, width, width + 1])
-        reach = np.r_[-NEIGHBOURS:0, width : width + NEIGHBOURS]
-        around = np.clip(first[:, None] + reach, 0, len(accel) - 1)
-        w = _weights(centre[near], centre[inside])
-        each = np.abs(accel[inside] - np.einsum("nij,nj->ni", w, accel[near])) * spacing[inside]
-        excess = each.sum(axis=1)
-        unsure = ((doubt[inside] + np.einsum("nij,nj->ni", np.abs(w), doubt[near])) * spacing[inside]).sum(axis=1)
-        typical = np.abs(accel[around]).max(axis=1) * spacing[inside].max(axis=1)
-        kink = (excess > ISOLATED * typical) & (excess > negligible) & (excess > unsure)
-        worst = first + each.argmax(axis=1)
-        jump = (np.abs(accel[inside]) * spacing[inside]).max(axis=1)
-        found += zip(worst[kink].tolist(), jump[kink].tolist(), strict=True)
-    # A kink casts its shadow on the samples that are interpolated from it: of neighbours, the largest is meant.
-    largest = [k for k in found if all(k[1] >= other[1] for other in found if abs(k[0] - other[0]) <= NEIGHBOURS)]
-    return [(float(times[i + 1]), size) for i, size in largest]
-
-
-def _leap_at_the_end(times: Array, x: Array, negligible: float) -> list[tuple[float, float]]:
-    """A leap between the last samples, which have too few neighbours for the kink test: (time, velocity jump).
-
-    A motion of 12 samples a period moves by at most a quarter of its range from one sample to the next, so more
-    than half of it, at more than twice the speed just before, is a leap.
-    """
-    slopes, leaps = np.abs(np.diff(x) / np.diff(times)), np.abs(np.diff(x))
-    for i in (len(x) - 3, len(x) - 2):
-        jump = float(slopes[i] - slopes[max(i - NEIGHBOURS, 0) : i].max())
-        if leaps[i] > 0.5 * np.ptp(x) and jump > 0.5 * slopes[i] and jump > negligible:
-            return [(float(times[i]), jump)]
-    return []
-
-
-def _weights(t: Array, at: Array) -> Array:
-    """Weights (n, m, 4) that evaluate at `at` (n, m) the cubics through samples at `t` (n, 4) (Lagrange)."""
-    w = np.ones((*at.shape, t.shape[1]))
-    for j in range(t.shape[1]):
-        for k in range(t.shape[1]):
-            if k != j:
-                w[:, :, j] *= (at - t[:, None, k]) / (t[:, None, j] - t[:, None, k])
-    return w
+def fastest_in(record: Record) -> tuple[float, float]:
+    """Largest speed [m/s] and acceleration [m/s^2] between the samples of a record; zero if it shifts nothing."""
+    if record.shift is None:
+        return 0.0, 0.0
+    h = np.diff(record.times)
+    velocity = np.diff(record.shift, axis=0) / h[:, None]
+    acceleration = np.diff(velocity, axis=0) / (0.5 * (h[:-1] + h[1:]))[:, None]
+    return float(np.linalg.norm(velocity, axis=1).max()), float(np.linalg.norm(acceleration, axis=1).max())

@@ -16,7 +16,6 @@ from hybrid.scene.analysis import Initial, Points, Straight
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import SHIFTS, TURNS, End, Ends, Motion, Triple
-from hybrid.scene.motion_file import RecordRefused, read_record
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
 
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
@@ -202,11 +201,13 @@ def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
     if motion.follow is not None:
         yield Witness((*here, "follow"), "along", UP)
     if motion.file is not None:
+        from hybrid.scene.motion_file import RecordRefused, read_record  # numpy, for scenes that need it
+
         try:
             record = read_record(motion.file)
         except RecordRefused:
             return  # whoever follows it says why
-        for rows, kind in ((record.shift, "along"), (record.turn, "normal")):
+        for rows, kind in ((record.shift, "along"), (record.rotation, "normal")):
             if rows is not None:
                 for row in (rows - rows[0]).tolist():
                     if any(row):

@@ -19,8 +19,8 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import usual_model
 from hybrid.scene.base import Finding, Place, Table, as_written, dotted
 from hybrid.scene.checks import contradictions
-from hybrid.scene.motion import motion_findings, resolution_findings
-from hybrid.scene.schema import Ends, Environment, Scene, Time
+from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.schema import Scene
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
 
@@ -210,13 +210,7 @@ def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) ->
             # The tables that can be read are held against each other all the same.
             tables = _readable_tables(data) if isinstance(data, dict) else {}
             found += [(finding, False) for finding in contradictions(tables)]
-        ends, around, time = tables.get("ends"), tables.get("environment"), tables.get("time")
-        if isinstance(ends, Ends):
-            duration = time.duration if isinstance(time, Time) else None
-            moving = motion_findings(ends, duration)
-            if isinstance(time, Time) and not moving:
-                moving = resolution_findings(ends, around if isinstance(around, Environment) else None, time.step)
-            found += [(finding, False) for finding in moving]
+        found += [(finding, False) for finding in motion_findings(tables)]
     complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
         raise SceneError(_in_order(complaints), file)

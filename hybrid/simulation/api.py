@@ -21,7 +21,7 @@ import numpy as np
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError, SceneError
 from hybrid.model.resolution import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
-from hybrid.scene.motion import check_motions
+from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case

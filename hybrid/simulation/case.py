@@ -20,7 +20,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.resolution import Effort, mesh_is_free, wants_errors
 from hybrid.model.sections import allowed_radius, weakest_bending
 from hybrid.outputs.probes import Observer, output_points
-from hybrid.scene.motion import ramp_ends
+from hybrid.scene.motion_checks import ramp_ends
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction

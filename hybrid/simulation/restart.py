@@ -16,7 +16,7 @@ from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Effort
-from hybrid.scene.motion import check_motions
+from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_scene, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import effort_from, refused

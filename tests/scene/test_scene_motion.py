@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Callable
 from pathlib import Path
@@ -9,10 +10,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from scene_texts import OCEAN, change
+from scene_texts import OCEAN, change, complaints
 
 from hybrid.errors import SceneError
-from hybrid.scene.motion import EndMotion, check_motions
+from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_scene
 from hybrid.scene.schema import Harmonic, Motion, Scene
 
@@ -206,10 +208,10 @@ BAD_FILES = {
     "half the columns": ("t,x,y\n0,205,0\n", "t,x,y,z"),
     "a column too many": ("t,x,y,z,w\n0,205,0,0,1\n", "t,x,y,z"),
     "short row": (_rows({**STILL, 20.0: "205,0"}), "line 4: 3 entries"),
-    "word": (_rows({**STILL, 20.0: "205,0,up"}), "line 4: up"),
-    "nan": (_rows({**STILL, 20.0: "205,0,nan"}), "line 4: nan"),
-    "infinity": (_rows({**STILL, 20.0: "205,0,inf"}), "line 4: inf"),
-    "gap": (_rows({**STILL, 20.0: "205,0,"}), "line 4: nothing"),
+    "word": (_rows({**STILL, 20.0: "205,0,up"}), "line 4: z is no finite number"),
+    "nan": (_rows({**STILL, 20.0: "205,0,nan"}), "line 4: z is no finite number"),
+    "infinity": (_rows({**STILL, 20.0: "205,0,inf"}), "line 4: z is no finite number"),
+    "gap": (_rows({**STILL, 20.0: "205,0,"}), "line 4: z is empty"),
     "few rows": ("t,x,y,z\n0,205,0,0\n200,205,0,0\n", "2 rows"),
     "time stands": (_rows(STILL).replace("20.0,", "10.0,"), "line 4: t = 10 after t = 10"),
     "time runs back": (_rows(STILL).replace("30.0,", "5.0,"), "line 5: t = 5 after t = 20"),
@@ -237,7 +239,55 @@ def test_good_files(tmp_path: Path) -> None:
 def test_not_text(tmp_path: Path) -> None:
     (tmp_path / "x.csv").write_bytes(b"\xff\xfe\x00\x01")
     assert "cannot be read" in _refusal(f"{{file: {tmp_path / 'x.csv'}}}")
-    assert "cannot be read" in _refusal(f"{{file: {tmp_path}}}")
+    assert "which is a folder" in _refusal(f"{{file: {tmp_path}}}")
+
+
+def test_what_is_no_regular_file_is_refused_unread(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A pipe nobody writes to would be waited for, and a device can be read for ever."""
+    os.mkfifo(tmp_path / "pipe.csv")
+    (tmp_path / "link.csv").symlink_to("/dev/zero")
+    for file, kind in (("pipe.csv", "a named pipe"), ("/dev/zero", "a device"), ("link.csv", "a device")):
+        assert f"which is {kind}" in _refusal(f"{{file: {tmp_path / file}}}")
+    monkeypatch.setattr("hybrid.scene.motion_file.LARGEST_FILE", 100)
+    assert "at most 0 MB" in _refusal(_motion_file(tmp_path, _rows(STILL)))
+
+
+def test_a_refusal_repeats_nothing_of_the_file(tmp_path: Path) -> None:
+    secret = "root:x:0"
+    texts = (f"{secret}\n", f"t,x,{secret}\n", f"t,x,y,z\n0,205,0,{secret}\n", f"t,x,y,z\n0,205,{secret}\n")
+    for text in texts:
+        assert secret not in _refusal(_motion_file(tmp_path, text))
+
+
+def _moved(by: str, over: float) -> str:
+    text = change(OCEAN, HEAVE, f"{{travel: {{by: {by}, over: {over}, begin: 30}}}}")
+    return change(text, ", step: 0.02", "")
+
+
+def test_a_travel_no_cable_can_follow_is_refused() -> None:
+    """20 m in 0.05 s, a typing error: the speed and acceleration it asks for, and what would be accepted."""
+    (complaint,) = complaints(_moved("[20, 0, 0]", 0.05))
+    assert complaint.where == "ends.end.motion.travel.over" and complaint.line == 10
+    assert "20 m in 0.05 s: up to 750 m/s and 4.62e+04 m/s^2" in complaint.value
+    assert "5 %" in complaint.expected and "23.7 %" in complaint.expected
+    accepted = float(complaint.fix.split()[1])
+    assert complaints(_moved("[20, 0, 0]", accepted)) == []
+    assert complaints(_moved("[20, 0, 0]", 0.9 * accepted)) != []
+    # what hardly reaches into the cable, or is slow, may be short
+    assert complaints(_moved("[0, 0, 0.5]", 0.01)) == [] and complaints(_moved("[0, 0, 40]", 10.0)) == []
+    (stiff,) = complaints(change(_moved("[-20, 0, 0]", 0.05), "axial_stiffness: 2.0e8, ", ""))
+    assert "5000 m/s" in stiff.expected
+
+
+def test_a_record_as_fast_is_refused_alike(tmp_path: Path) -> None:
+    """Smooth, with 20 rows in the 0.05 s of the move."""
+    t = np.arange(0.0, 101.0, 0.0025)
+    x = np.clip((t - 30.0) / 0.05, 0.0, 1.0)
+    shift = np.zeros((len(t), 3))
+    shift[:, 0] = 205.0 + 20.0 * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    file = _csv(tmp_path / "m.csv", t, {"": shift})
+    (complaint,) = complaints(change(change(OCEAN, HEAVE, f"{{file: {file}}}"), ", step: 0.02", ""))
+    assert complaint.where == "ends.end.motion.file" and "m/s^2" in complaint.value and "units" in complaint.fix
 
 
 def test_end_motion_refuses_a_bad_file_too(tmp_path: Path) -> None:

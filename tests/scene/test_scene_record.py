@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from hybrid.scene.motion_file import _last_digit, first_jump
+from hybrid.scene.motion_file import Precision
+from hybrid.scene.motion_jumps import first_jump
 
 Array = NDArray[np.float64]
 
@@ -23,6 +24,13 @@ def _triangle(t: Array) -> Array:
     return 2 / np.pi * np.arcsin(np.sin(W * t))
 
 
+def _units(written: list[str], values: Array) -> Array:
+    precision = Precision()
+    for text in written:
+        precision.add(text)
+    return precision.unit(values)
+
+
 def _jump(t: Array, x: Array, form: str | None) -> tuple[float, float] | None:
     """The first jump of a signal along y, written with `form` (None: all digits)."""
     values, unit = np.zeros((len(t), 3)), np.full((len(t), 3), 1e-15)
@@ -30,7 +38,7 @@ def _jump(t: Array, x: Array, form: str | None) -> tuple[float, float] | None:
     if form is not None:
         written = [form % v for v in x]
         values[:, 1] = [float(w) for w in written]
-        unit[:, 1] = _last_digit(written, values[:, 1])
+        unit[:, 1] = _units(written, values[:, 1])
     return first_jump(t, values, unit)
 
 
@@ -120,10 +128,10 @@ def test_jumps_outside_the_computation_do_not_matter() -> None:
 
 def test_last_digits() -> None:
     written = ["0", "0.0012", "12.3450", "100"]  # four decimals, six digits
-    units = _last_digit(written, np.array([float(w) for w in written]))
+    units = _units(written, np.array([float(w) for w in written]))
     np.testing.assert_allclose(units, [1e-4, 1e-4, 1e-4, 1e-3], rtol=1e-12)
     written = ["1.234e3", "1.2e-3", "-5.678e0"]  # four digits
-    units = _last_digit(written, np.array([float(w) for w in written]))
+    units = _units(written, np.array([float(w) for w in written]))
     np.testing.assert_allclose(units, [1.0, 1e-4, 1e-3], rtol=1e-12)
     # one or two digits are meant exactly: 0, 0.5, 1 is not a rounded 0.6
-    assert not _last_digit(["0", "0.5", "1"], np.array([0.0, 0.5, 1.0])).any()
+    assert not _units(["0", "0.5", "1"], np.array([0.0, 0.5, 1.0])).any()

@@ -12,7 +12,8 @@ import numpy as np
 from hybrid.model.build import build
 from hybrid.outputs.probes import output_points
 from hybrid.scene.ends import Pinned
-from hybrid.scene.motion import EndMotion, shortest_period
+from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
 

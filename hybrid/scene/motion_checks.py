@@ -1,0 +1,248 @@
+"""Whether prescribed motions can be computed: they start from rest, are smooth, no faster than a cable can follow,
+and resolved by the time step.
+
+Files are read only if a scene has one, and numpy is imported only then.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Mapping
+from typing import TYPE_CHECKING, Any
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.analysis import Time
+from hybrid.scene.base import Finding, Place, dotted
+from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.ends import SHIFTS, End, Ends, Harmonic, Motion
+
+if TYPE_CHECKING:
+    from hybrid.scene.motion_file import Record
+    from hybrid.scene.schema import Scene
+
+# A harmonic motion counts as starting from rest below this part of its top speed: round-off.
+AT_REST = 1e-6
+# Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
+SAMPLES, RAMP_STEPS = 6, 3
+# The most that an end may be turned in a step (rad): beyond half a turn nobody knows which way it went.
+MOST_TURN = 1.0
+
+# Stretch at which a section is taken to break; steel and fibre ropes break at 2 to 5 %, umbilicals before.
+MOST_STRETCH = 0.05
+# Speed of tension waves, m/s, in what is given as inextensible: that of steel; ropes and chains are slower.
+STEEL_WAVES = 5000.0
+# Largest speed and acceleration of a smooth move, over way / time and way / time^2: 15/8, and that of the polynomial
+# 10 x^3 - 15 x^4 + 6 x^5 at x = (3 - sqrt(3)) / 6.
+TOP_SPEED, TOP_ACCELERATION = 1.875, 10.0 / math.sqrt(3.0)
+
+
+def check_motions(scene: Scene) -> None:
+    """SceneError if a motion cannot be read, does not start from rest, jumps, is too fast, or ends too early."""
+    found = motion_findings({name: getattr(scene, name) for name in ("ends", "time", "cable", "environment")})
+    if found:
+        raise SceneError([Complaint(dotted(f.at), f.given or "motion", f.expected, f.fix) for f in found])
+
+
+def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
+    """What is wrong with the motions of both ends, by the tables of a scene that can be read (name -> table)."""
+    ends, time, cable, environment = (tables.get(name) for name in ("ends", "time", "cable", "environment"))
+    if not isinstance(ends, Ends):
+        return []
+    step = time.step if isinstance(time, Time) else None
+    found: list[Finding] = []
+    late: list[Finding] = []  # about the time step, which says nothing where the motion itself is wrong
+    for here, end, motion in _motions(ends):
+        record, wrong = None, list(_harmonic_jump(motion))
+        if motion.file is not None:
+            record, wrong = _judged(end, motion.file, time.duration if isinstance(time, Time) else None)
+        if not wrong and isinstance(cable, Cable):
+            wrong = list(_too_fast(cable, motion, record))
+        found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
+        if step is not None and not wrong:
+            late += _unresolved(here, motion, record, environment, step)
+    if step is not None:
+        late += _fastest_period(ends, environment, step)
+    return found or late
+
+
+def _motions(ends: Ends) -> list[tuple[tuple[str, ...], End, Motion]]:
+    """Place, end and motion of the ends that are moved."""
+    return [
+        (("ends", name, "motion"), end, end.prescribed_motion)
+        for name, end in ends.named().items()
+        if end.prescribed_motion is not None
+    ]
+
+
+# --- where it starts, and how fast it moves ----------------------------------------------------
+
+
+def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
+    """A harmonic motion without ramp starts with a velocity (phase 0), a displacement (phase 90), or both."""
+    moving = [(name, h) for name, listed in motion.harmonics().items() for h in listed if h.amplitude != 0.0]
+    if motion.ramp is not None or not moving:
+        return
+    name, h = moving[0]
+    w, phase = 2 * math.pi / h.period, math.radians(h.phase)
+    unit = "m" if name in SHIFTS else "deg"
+    speed, offset = h.amplitude * w * math.cos(phase), h.amplitude * math.sin(phase)
+    jump = f"velocity jumps to {speed:.4g} {unit}/s"
+    if abs(speed) <= AT_REST * abs(h.amplitude) * w:
+        jump = f"position jumps by {offset:.4g} {unit}"
+    expected = "motion that starts from rest where the end is held, because the cable starts at rest"
+    fix = f"give `ramp: {2 * max(h.period for _, h in moving):.6g}` (s), two periods"
+    yield Finding((), expected, fix, f"{name} without ramp: {jump} at t = 0")
+
+
+def _judged(end: End, file: str, duration: float | None) -> tuple[Record | None, list[Finding]]:
+    """A motion file, if it can be read, and what is wrong with it."""
+    from hybrid.scene.motion_file import RecordRefused, read_record
+    from hybrid.scene.motion_jumps import judge_record
+
+    try:
+        record = read_record(file)
+    except RecordRefused as refused:
+        return None, [refused.finding]
+    if end.held_tangent is None and record.rotation is not None:
+        given, expected = f"{record.name} with rotations", "columns t,x,y,z, because a pinned end turns freely"
+        return record, [Finding(("file",), expected, "kind: clamped can be turned", given)]
+    if end.held_position is None and record.shift is not None:
+        given, expected = (
+            f"{record.name} with positions",
+            "columns t,rx,ry,rz, because the position of a guided end is free",
+        )
+        return record, [Finding(("file",), expected, "kind: clamped can be moved", given)]
+    return record, judge_record(record, end.held_position, duration)
+
+
+def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[Finding]:
+    """A travel or a recorded motion at which a cable would break at once: by a typing error, most likely.
+
+    An end that is pulled at v sends a wave of tension along the cable, which stretches it by v/c behind its front,
+    c = sqrt(EA/m); with acceleration a, no more than the whole cable of length L does by its inertia, a L/c^2.
+    """
+    c = max(math.sqrt(s.axial_stiffness / s.mass) if s.axial_stiffness else STEEL_WAVES for s in cable.sections)
+    limit = f"at most {100 * MOST_STRETCH:g} % of stretch"
+
+    def stretch(speed: float, acceleration: float) -> float:
+        return min(speed / c, acceleration * cable.length / c**2)
+
+    def said(speed: float, acceleration: float) -> str:
+        strain = 100 * stretch(speed, acceleration)
+        return f"{limit}; with tension waves of {c:.4g} m/s, this speed asks for {strain:.3g} %"
+
+    if motion.travel is not None:
+        way, over = math.hypot(*motion.travel.by), motion.travel.over
+        speed, acceleration = TOP_SPEED * way / over, TOP_ACCELERATION * way / over / over
+        if stretch(speed, acceleration) > MOST_STRETCH:
+            enough = min(TOP_SPEED * way / (MOST_STRETCH * c),
+                         math.sqrt(TOP_ACCELERATION * way * cable.length / MOST_STRETCH) / c)  # fmt: skip
+            given = f"{way:.6g} m in {over:g} s: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
+            fix = f"over: {_rounded_up(enough)} (s) or more, if way and time are meant so"
+            yield Finding(("travel", "over"), said(speed, acceleration), fix, given)
+    if record is not None:
+        from hybrid.scene.motion_file import fastest_in
+
+        speed, acceleration = fastest_in(record)
+        if stretch(speed, acceleration) > MOST_STRETCH:
+            given = f"{record.name}: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
+            fix = f"check the units of the columns (s, m): {MOST_STRETCH * c:.3g} m/s would be accepted"
+            yield Finding(("file",), said(speed, acceleration), fix, given)
+
+
+# --- what the time step resolves ---------------------------------------------------------------
+
+
+def _periods(here: Place, motion: Motion) -> Iterator[tuple[str, str, Harmonic]]:
+    """Key, name (`heave`) and table of every harmonic of a motion that moves."""
+    for name, harmonics in motion.harmonics().items():
+        listed = not isinstance(getattr(motion, name), Harmonic)
+        for i, h in enumerate(harmonics):
+            if h.amplitude:
+                yield dotted((*here, name, i) if listed else (*here, name)), name, h
+
+
+def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
+    """Every period, s, that a scene names, by the key that names it."""
+    waves = environment.waves if environment is not None else None
+    periods = {} if waves is None else {"environment.fluid.waves": waves.main_period}
+    return periods | {key: h.period for here, _, motion in _motions(ends) for key, _, h in _periods(here, motion)}
+
+
+def shortest_period(ends: Ends, environment: Environment | None) -> float:
+    """The shortest period, ramp or move of a scene, s; infinity if it names none."""
+    times = list(_all_periods(ends, environment).values())
+    for _, _, motion in _motions(ends):
+        times += [t for t in (motion.ramp, motion.travel.over if motion.travel else None) if t]
+        if motion.file is not None:
+            from hybrid.scene.motion_file import read_record, shortest_in
+
+            times.append(shortest_in(read_record(motion.file)))
+    return min(times, default=math.inf)
+
+
+def ramp_ends(scene: Scene) -> list[float]:
+    """Times, s, at which something stops growing or moving: a step should end there."""
+    fluid, ends = scene.environment.fluid, scene.ends
+    moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]
+    times = [m.ramp for _, _, m in _motions(ends)] + [t for m in moves for t in (m.begin, m.begin + m.over)]
+    times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
+    times += [load.ramp for end in ends.both for load in end.loads]
+    return [t for t in times if t]
+
+
+def _unresolved(
+    here: Place, motion: Motion, record: Record | None, environment: Environment | None, step: float
+) -> Iterator[Finding]:
+    """Turns, ramps, moves and records that a fixed time step cannot follow."""
+    harmonics = list(_periods(here, motion))
+    for key, name, h in harmonics:
+        rate = 2 * math.pi * math.radians(abs(h.amplitude)) / h.period if name not in SHIFTS else 0.0
+        if rate * step > MOST_TURN:
+            expected = f"at most {_rounded_down(MOST_TURN / rate)} s: the end turns by a radian in that, by {key}"
+            fix = f"time.step: {0.3 * MOST_TURN / rate:.3g}, or less"
+            yield Finding(("time", "step"), expected, fix, f"{step:g}")
+    shortest, steps = RAMP_STEPS * step * (1 - 1e-9), f"{RAMP_STEPS} time steps of {step:g} s"
+    if motion.ramp is not None and motion.ramp < shortest:
+        slow = max((h.period for _, _, h in harmonics), default=None)
+        fix = f"ramp: {2 * slow:.3g}, two periods" if slow else "a longer ramp, or a smaller time.step"
+        yield Finding((*here, "ramp"), f"a ramp of at least {steps}, or it is a jump", fix, f"{motion.ramp:g}")
+    if motion.travel is not None and motion.travel.over < shortest:
+        fix = "a longer time, or a smaller time.step"
+        at, over = (*here, "travel", "over"), motion.travel.over
+        yield Finding(at, f"a move over at least {steps}, or it is a jump", fix, f"{over:g}")
+    waves = environment.waves if environment is not None else None
+    if motion.follow is not None and waves is not None and waves.ramp is not None and waves.ramp < shortest:
+        expected = f"a ramp of at least {steps}, because {dotted(here)} follows the waves"
+        fix = f"ramp: {2 * waves.main_period:.3g}, two periods"
+        yield Finding(("environment", "fluid", "waves", "ramp"), expected, fix, f"{waves.ramp:g}")
+    if record is not None:
+        from hybrid.scene.motion_file import missed_between
+
+        missed = missed_between(record, step)
+        if missed is not None:
+            where = dotted((*here, "file"))
+            expected = f"steps so short that {where} is nearly straight within each; it turns at t = {missed:g} s"
+            yield Finding(("time", "step"), expected, "a smaller step, or a smoother record", f"{step:g}")
+
+
+def _fastest_period(ends: Ends, environment: Environment | None, step: float) -> Iterator[Finding]:
+    periods = _all_periods(ends, environment)
+    fastest = min(periods, key=lambda name: periods[name], default="")
+    if fastest and periods[fastest] < SAMPLES * step * (1 - 1e-9):
+        period = periods[fastest]
+        expected = f"at most a sixth of the shortest period, {_rounded_down(period / SAMPLES)} s, of {fastest}"
+        yield Finding(("time", "step"), expected, f"time.step: {period / 20:.3g}, or less", f"{step:g}")
+
+
+def _rounded_down(x: float) -> str:
+    """Three digits of a positive number that do not exceed it, for bounds that are to be copied."""
+    x = max(x, 1e-300)  # below, the last of three digits underflows
+    unit = 10.0 ** (math.floor(math.log10(x)) - 2)
+    return f"{math.floor(x / unit * (1 + 1e-9)) * unit:.3g}"
+
+
+def _rounded_up(x: float) -> str:
+    """Two digits of a positive number that are no less than it."""
+    unit = 10.0 ** (math.floor(math.log10(x)) - 1)
+    return f"{math.ceil(x / unit * (1 - 1e-9)) * unit:.2g}"
