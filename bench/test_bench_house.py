@@ -1,6 +1,6 @@
 """The size of the house: lines by room, median and longest file and function.
 
-    pytest bench -m bench -s -k house
+pytest bench -m bench -s -k house
 """
 
 import ast

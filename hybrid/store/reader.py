@@ -41,7 +41,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.integrity import being_written, readable
-from hybrid.store.old_names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
+from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 
 if TYPE_CHECKING:
     import xarray
@@ -50,7 +50,6 @@ FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
 TEXTS = ("scene", "changes")
 HIDDEN = ("checkpoint",)  # what is for the program alone
-ALIASES = {"times": "t", "moment": "bending_moment"}
 
 # The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
 _PATIENCE = 1.0

@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
-from hybrid.store.reader import ALIASES
+from hybrid.store.names import ALIASES
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result

@@ -9,7 +9,7 @@ import numpy as np
 
 import hybrid
 from hybrid.store.format import Field
-from hybrid.store.old_names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
+from hybrid.store.names import OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
 from hybrid.store.writer import Recorder
 
 

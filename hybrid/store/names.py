@@ -1,7 +1,8 @@
-"""Names in files of older versions, and what they are called now: the reader understands both."""
+"""Other names of what a file holds, which the reader understands too: short ones, and those of older versions."""
 
 from __future__ import annotations
 
+ALIASES = {"times": "t", "moment": "bending_moment"}
 OLD_NAMES = {
     f"{table}/pull_{end}": f"{table}/end_force_{end}"
     for table in ("steps", *(f"errors/{cause}" for cause in ("mesh", "time", "model", "total")))
