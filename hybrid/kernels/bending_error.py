@@ -19,27 +19,13 @@ from typing import NamedTuple
 
 from hybrid.kernels.block_elimination import again
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.forces import (
-    ADDED_MASS,
-    BODIES,
-    DRAG,
-    FLOW,
-    FRICTION,
-    MASS_DAMPING,
-    ROTARY,
-    SEABED,
-    STIFFNESS_DAMPING,
-    SURFACE,
-    WAVES,
-)
+from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.generalized_alpha import Scheme, scheme
-from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
 from hybrid.kernels.neglected_moments import chord_of, neglected_moments, tabulate_chords, turn_chords
-from hybrid.kernels.node_forces import WATER, Z3, get3
+from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
 from hybrid.kernels.state import Floats
-from hybrid.kernels.water import current_at, wetted, wetted_stretch
 
 
 class Step(NamedTuple):
@@ -63,6 +49,7 @@ class ErrorArrays(NamedTuple):
     turned: Floats  # (N, 5) as of `turn_chords`
     b: Floats  # (N+1, 5), right-hand side
     work: Floats  # (4, N+1, 4)
+    powers: Floats  # (REPORT_SIZE,)
 
 
 class History(NamedTuple):
@@ -74,39 +61,7 @@ class History(NamedTuple):
     old: Floats  # (N+1, 4) m, the error before the step
     slid: Floats  # (N+1, 3) m, error of friction's travel before the step
     travel: Floats  # (N+1, 4) filled here: direction in which a node slides, zero where it sticks; travel kept, a part
-
-
-@inner
-def half_cell_rates(line, c, side, z, eta, u, b, y, yz, d, l, il):
-    """Change of the force of the water on a half cell when its velocity changes by y and its acceleration by yz."""
-    bits = line.bits
-    f = Z3
-    if bits & DRAG:
-        _, B, _ = half_cell_drag(u, d, il, line.drag_n[c], line.drag_t[c])
-        f = mat_vec(B, y)
-    if bits & ADDED_MASS:
-        _, D, _ = half_cell_added_mass(b, d, il, line.added_n[c], line.added_t[c], 1.0)
-        f = add(f, mat_vec(D, yz))
-    if bits & SURFACE:
-        iD = 1.0 / line.diameter[c]
-        xa = (eta - z) * iD + 0.5
-        wet, _, _ = wetted_stretch(xa, xa - side * 0.5 * l * d[2] * iD)
-        f = scale(wet, f)
-    return f
-
-
-@inner
-def body_rates(line, i, z, eta, u, y, yz):
-    """The same for a body at node i."""
-    _, B = body_drag(u, line.point_drag[i])
-    f = sub(mat_vec(B, y), scale(line.point_added[i], yz))
-    if line.bits & SURFACE and line.point_height[i] > 0.0:
-        x = (eta - z) / line.point_height[i] + 0.5
-        wet, _, _ = wetted(x)
-        if line.point_upright[i]:
-            wet = min(max(x, 0.0), 1.0)
-        f = scale(wet, f)
-    return f
+    powers: Floats  # (REPORT_SIZE,) what the forces report on the way, which is not read
 
 
 @inner
@@ -158,29 +113,24 @@ def seabed_rates(line, sea, i, state, u, left, right, history):
 
 @inner
 def rates(line, sea, i, state, u, dl, ll, ill, dr, lr, ilr, left, right, history):
-    """Force that history adds on node i: d(force)/d(v) y + d(force)/d(vd) z, and the seabed's (`seabed_rates`)."""
+    """Force that history adds on node i: d(force)/d(v) y + d(force)/d(vd) z, and the seabed's (`seabed_rates`).
+
+    The derivative of the loads by position is affine in the weights of the march, D = K + cv C + ca M, so three of them
+    give C y + M z = D(1, 0) y + D(0, 1) z - D(0, 0) (y + z).
+    """
     yi, zi = get3(history.y, i), get3(history.z, i)
-    bits = line.bits
-    F = scale(-line.mass[i], zi)
-    if bits & MASS_DAMPING:
-        F = sub(F, scale(line.damp[i], yi))
-    if bits & WATER:
-        h, eta = state.r[i, 2], sea.surface
-        w, b = get3(state.v, i), get3(state.vd, i)
-        if bits & FLOW:
-            U, _ = current_at(sea.z, sea.current, sea.now[1], h)
-            w = sub(w, U)
-        if bits & WAVES:
-            w = sub(w, get3(sea.flow, i))
-            b = sub(b, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
-            eta += sea.flow[i, 6]
-        if left:
-            F = add(F, half_cell_rates(line, i - 1, -1.0, h, eta, w, b, yi, zi, dl, ll, ill))
-        if right:
-            F = add(F, half_cell_rates(line, i, 1.0, h, eta, w, b, yi, zi, dr, lr, ilr))
-        if bits & BODIES:
-            F = add(F, body_rates(line, i, h, eta, w, yi, zi))
-    if bits & SEABED:
+    v, vd, F = get3(state.v, i), get3(state.vd, i), Z3
+    for k in range(3):
+        cv, ca, x = 0.0, 0.0, scale(-1.0, add(yi, zi))
+        if k == 1:
+            cv, x = 1.0, yi
+        elif k == 2:
+            ca, x = 1.0, zi
+        _, D, _, _ = inertia_and_water(
+            line, sea, i, state.r[i, 2], v, vd, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, history.powers
+        )
+        F = add(F, mat_vec(D, x))
+    if line.bits & SEABED:
         F = add(F, seabed_rates(line, sea, i, state, u, left, right, history))
     return F
 
@@ -304,7 +254,7 @@ def advance_error(line, sea, ends, bending, state, step, X, W, old, new, most, a
         neglected_moments(line, ends, bending, chords, arrays.turned, state.T, torque, work[0], dM, M)
     moving = dt > 0.0
     s = scheme(step.rho, step.before, dt) if moving else Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3])
+    history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     if moving:
         predict_error(old, s, history)
     right_hand_side(line, sea, ends, chords, state, step.u, M, moving, history, arrays.b)

@@ -146,9 +146,8 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
 
 
 @inner
-def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
-    """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
-    vi, vdi = get3(v, i), get3(vd, i)
+def inertia_and_water(line, sea, i, z, vi, vdi, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
+    """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords)."""
     m = line.mass[i]
     F = sub(get3(line.force, i), scale(m, vdi))
     c = -ca * m
@@ -162,7 +161,7 @@ def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, rig
         D = (D[0] + c, D[1], D[2], D[3], D[4] + c, D[5], D[6], D[7], D[8] + c)
         report[MASS_DAMPING_POWER] += b * dot(vi, vi)
     if bits & WATER:
-        z, eta = r[i, 2] + u[i, 2], sea.surface
+        eta = sea.surface
         U, U1 = Z3, Z3
         w, b, af = vi, vdi, Z3
         if bits & FLOW:
@@ -181,7 +180,16 @@ def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, rig
         if bits & BODIES:
             f, Df = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca, report)
             F, D = add(F, f), madd(D, Df)
-    if bits & SEABED:
+    return F, D, GL, GR
+
+
+@inner
+def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
+    """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
+    F, D, GL, GR = inertia_and_water(
+        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(vd, i), dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report
+    )
+    if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
         f, Df, L, R = seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report)
         F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)

@@ -16,6 +16,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.newton import lay
+from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, no_sea
 from hybrid.solve.stepper import Stepper
@@ -67,7 +68,15 @@ class Corrector:
         self.x, b = np.zeros((2, n + 1, 5))
         chords, turned = np.zeros((2, n, 5))
         self._arrays = ErrorArrays(
-            self.slid, self.x, self.moment, self.left, chords, turned, b, np.zeros((4, n + 1, 4))
+            self.slid,
+            self.x,
+            self.moment,
+            self.left,
+            chords,
+            turned,
+            b,
+            np.zeros((4, n + 1, 4)),
+            np.zeros(REPORT_SIZE),
         )
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step

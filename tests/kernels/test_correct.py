@@ -14,6 +14,7 @@ from hybrid.kernels.bending_error import History, right_hand_side
 from hybrid.kernels.block_elimination import again
 from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.neglected_moments import Bending, neglected_moments, tabulate_chords
+from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.state import no_sea
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import build
@@ -68,7 +69,7 @@ def history(line, sea, ends, st, q):
     tabulate_chords(st.e, chords)
     nothing, b, out = np.zeros((N + 1, 3)), np.zeros((N + 1, 5)), np.zeros((N + 1, 4))
     zero = np.zeros((N + 1, 4))
-    past = History(CV * q, CA * q, zero, zero, nothing, out)
+    past = History(CV * q, CA * q, zero, zero, nothing, out, np.zeros(REPORT_SIZE))
     right_hand_side(line, sea, ends, chords, st, nothing, nothing, True, past, b)
     return b
 
