@@ -66,7 +66,7 @@ class Console:
 
     def compiling(self, kernels: Sequence[str] = ("newton.advance",)) -> bool:
         """Whether kernels have to be compiled first, which takes long; if so, say it beforehand."""
-        from hybrid.kernels.compile import is_warm
+        from hybrid.kernels.cache import is_warm
 
         if is_warm(kernels):
             return False

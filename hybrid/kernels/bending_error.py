@@ -226,7 +226,8 @@ def predict_error(old, s, history):
 def carry_travel(sea, slid, travel, old, new, i):
     """The error of friction's travel at node i after the step."""
     q = add(get3(slid, i), sub(get3(new[0], i), get3(old[0], i)))
-    q = sub(q, scale(dot(sea.normal, q), (sea.normal[0], sea.normal[1], sea.normal[2])))
+    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
+    q = sub(q, scale(dot(normal, q), normal))
     slides = get3(travel, i)
     slid[i, 0], slid[i, 1], slid[i, 2] = scale(travel[i, 3], sub(q, scale(dot(slides, q), slides)))
 

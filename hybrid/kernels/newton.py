@@ -396,11 +396,12 @@ def advance(line, sea, ends, old, new, u, dt, before, rho, reach, scale, most, g
         change, place = unrest(old, new)
         report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place
         if line.bits & SEABED:
+            normal = (sea.normal[0], sea.normal[1], sea.normal[2])
             for i in range(n + 1):  # force times way: bounded by the energy of a blow, however short the step is not
                 b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
                      0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
                 ui = get3(u, i)
-                along = dot(sea.normal, ui) * dot(sea.normal, b)
+                along = dot(normal, ui) * dot(normal, b)
                 report[CONTACT_WORK] += along
                 report[FRICTION_WORK] += dot(b, ui) - along
                 new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)

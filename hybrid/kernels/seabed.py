@@ -95,6 +95,23 @@ def contact(p0, p1, v0, v1, h, k, c, o):
 
 
 @kernel
+def normal_forces(line, sea, r, N):
+    """Force N (N+1,) N of the bed along its normal on the nodes of a line at rest."""
+    n, o = sea.normal, sea.onset
+    for i in range(N.shape[0]):
+        N[i] = 0.0
+    for i in range(N.shape[0]):
+        p0 = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+        if i < line.h.shape[0]:
+            p1 = sea.offset + 0.5 * o - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
+            if p0 > 0.0 or p1 > 0.0:
+                N[i] += contact(p0, p1, 0.0, 0.0, line.h[i], sea.stiffness, sea.damping, o)[0]
+                N[i + 1] += contact(p1, p0, 0.0, 0.0, line.h[i], sea.stiffness, sea.damping, o)[0]
+        if line.footing[i] > 0.0:
+            N[i] += line.footing[i] * pressure(0.0, p0, p0, 0.0, 0.0, sea.stiffness, sea.damping, o)[0]
+
+
+@kernel
 def stored(line, sea, r):
     """Energy (J) that the bed has stored under the line."""
     energy = 0.0

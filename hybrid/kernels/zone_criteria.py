@@ -57,7 +57,8 @@ def get9(A, i):
 
 @inner
 def depth(sea, r, i):
-    return sea.offset + 0.5 * sea.onset - dot(sea.normal, get3(r, i))
+    n = (sea.normal[0], sea.normal[1], sea.normal[2])
+    return sea.offset + 0.5 * sea.onset - dot(n, get3(r, i))
 
 
 @kernel

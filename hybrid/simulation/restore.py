@@ -19,7 +19,7 @@ import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError
-from hybrid.kernels.compile import kernel_hash
+from hybrid.kernels.cache import kernel_hash
 from hybrid.model.build import MOST_PARTS, Model, build, given_zones
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone

@@ -15,7 +15,7 @@ from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.newton import advance, lay
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
-from hybrid.kernels.seabed import contact, pressure, stored
+from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.water import stir
 from hybrid.solve.plane_stability import NOTHING, Push
@@ -53,14 +53,8 @@ def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
 
     sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
     """
-    p = sea.offset + 0.5 * sea.onset - r @ sea.normal
     N = np.zeros(r.shape[0])
-    for near, far in ((slice(0, -1), slice(1, None)), (slice(1, None), slice(0, -1))):
-        for c, (a, b) in enumerate(zip(p[near], p[far], strict=True)):
-            if a > 0.0 or b > 0.0:
-                N[near][c] += contact(a, b, 0.0, 0.0, line.h[c], sea.stiffness, sea.damping, sea.onset)[0]
-    for i in np.flatnonzero((line.footing > 0.0) & (p > 0.0)):
-        N[i] += line.footing[i] * pressure(0.0, p[i], p[i], 0.0, 0.0, sea.stiffness, sea.damping, sea.onset)[0]
+    normal_forces(line, sea, r, N)
     side = np.cross(sea.normal, sea.axis)
     parts = []
     for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):

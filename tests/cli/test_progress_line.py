@@ -114,12 +114,12 @@ def test_it_says_nothing_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
 def test_compilation_is_announced_before_it_happens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: False)
+    monkeypatch.setattr("hybrid.kernels.cache.is_warm", lambda _: False)
     assert commands_console.Console(as_json=False, quiet=False).compiling()
     assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
     assert commands_console.Console(as_json=True, quiet=False).compiling()
     assert capsys.readouterr().out == '{"event": "compiling"}\n'
-    monkeypatch.setattr("hybrid.kernels.compile.is_warm", lambda _: True)
+    monkeypatch.setattr("hybrid.kernels.cache.is_warm", lambda _: True)
     assert not commands_console.Console(as_json=False, quiet=False).compiling()
     assert tuple(capsys.readouterr()) == ("", "")
 

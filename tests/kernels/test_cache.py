@@ -131,7 +131,7 @@ def test_own_numba_functions_keep_their_own_cache(tmp_path: Path) -> None:
 
 
 def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybrid.kernels.compile import cache_folder, kernel_hash
+    from hybrid.kernels.cache import cache_folder, kernel_hash
 
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
     monkeypatch.delenv("HYBRID_CACHE_DIR", raising=False)

@@ -11,16 +11,27 @@ import math
 import os
 from itertools import pairwise
 
+import numba
 import numpy as np
 import pytest
 from scipy.integrate import quad
 
 import hybrid
-from hybrid.kernels.seabed import contact, friction, pressure
+from hybrid.kernels import seabed, water
+from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import no_sea
-from hybrid.kernels.water import FADED, SAME_WETNESS, current_at, stir, wetted, wetted_stretch
+from hybrid.kernels.water import FADED, SAME_WETNESS, stir
 from hybrid.model.sea import Surroundings, components, current_table, frequencies, jonswap, surroundings
 from hybrid.scene.sea import JonswapWaves, RegularWaves
+
+
+def entry(law):
+    """An entry for Python to a law that only kernels call."""
+    return numba.njit(lambda *x: law(*x))
+
+
+current_at, wetted, wetted_stretch = entry(water.current_at), entry(water.wetted), entry(water.wetted_stretch)
+pressure, friction = entry(seabed.pressure), entry(seabed.friction)
 
 G = 9.81
 ROUND_OFF, QUADRATURE, DIFFERENCE = 1e-12, 1e-10, 1e-8

@@ -1,0 +1,89 @@
+"""Every kernel is compiled for one signature, whatever the scene: a second one would double the wait of a first run."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import numba
+import pytest
+
+from hybrid.kernels.compile import inner
+
+# A line in a plane with a zone of each kind; in space; its equilibrium; zones that move over a seabed with friction;
+# the effect of bending followed along.  Prints the signatures of all that was compiled or loaded.
+SCRIPT = """
+import importlib, json, pkgutil
+import hybrid, hybrid.kernels
+from numba.core.dispatcher import Dispatcher
+
+cable = {"length": 20.0, "diameter": 0.05, "mass": 4.0, "axial_stiffness": 1e7, "bending_stiffness": 50.0,
+         "torsional_stiffness": 40.0, "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+         "damping": {"mass": 0.1, "stiffness": 0.01}}
+time = {"duration": 0.2, "step": 0.1}
+held = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [15, 0, 0]}}
+sea = {"fluid": {"density": 1000.0, "current": [0.5, 0, 0], "surface": 5.0,
+                 "waves": {"kind": "regular", "height": 1.0, "period": 6.0}}}
+bed = {"fluid": {"density": 1000.0}, "seabed": {"z": -4.0, "stiffness": 1e4, "damping": 100.0, "friction": 0.5}}
+zones = {"kind": "zones", "zones": [{"catenary": 12.0}, {"rod": 8.0}]}
+
+
+def scene(**more):
+    base = {"cable": {"sections": [cable]}, "ends": held, "initial": "equilibrium", "model": zones,
+            "mesh": {"cells": 20}, "time": time}
+    return hybrid.validate_scene({**base, **more})
+
+
+hybrid.run(scene(environment=sea))
+across = {"fluid": {**sea["fluid"], "current": [0.3, 0.4, 0]}}
+hybrid.run(scene(environment=across))
+hybrid.static(scene(environment=bed))
+hybrid.run(scene(environment=bed, model="adaptive"))
+hybrid.run(scene(environment=bed, model={"kind": "zones", "zones": [{"corrected": 20.0}]}))
+
+found = {}
+rooms = [f"hybrid.kernels.{x.name}" for x in pkgutil.iter_modules(hybrid.kernels.__path__)] + ["hybrid.adapt.zone_rules"]
+for room in rooms:
+    for name, f in vars(importlib.import_module(room)).items():
+        if isinstance(f, Dispatcher) and f.__module__ == room:
+            found[f"{room}.{name}"] = [str(x) for x in f.signatures]
+print(json.dumps(found))
+"""
+
+
+def signatures(environment: dict[str, str]) -> dict[str, list[str]]:
+    command = [sys.executable, "-c", SCRIPT]
+    done = subprocess.run(command, env=os.environ | environment, capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return json.loads(done.stdout.splitlines()[-1])
+
+
+def test_kernels_have_one_signature() -> None:
+    found = signatures({})
+    used = [name for name, all_of_it in found.items() if all_of_it]
+    assert len(used) >= 10, used
+    assert {name: x for name, x in found.items() if len(x) > 1} == {}
+
+
+@pytest.mark.slow
+def test_what_kernels_inline_has_one_signature(tmp_path: Path) -> None:
+    """From an empty cache, so that nothing is loaded instead of being compiled; without optimisation, to be quick."""
+    found = signatures({"HYBRID_CACHE_DIR": str(tmp_path), "NUMBA_OPT": "0"})
+    assert {name: x for name, x in found.items() if len(x) > 1} == {}
+
+
+def test_what_kernels_inline_cannot_be_called_from_python() -> None:
+    """numba alone would jump to address 0 once it is compiled, and end the process."""
+
+    @inner
+    def half(x):
+        return 0.5 * x
+
+    with pytest.raises(TypeError, match=r"half.*@kernel"):
+        half(3.0)
+    assert numba.njit(lambda x: half(half(x)))(3.0) == 0.75
+    with pytest.raises(TypeError, match=r"half.*@kernel"):
+        half(3.0)
