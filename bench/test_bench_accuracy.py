@@ -18,7 +18,7 @@ import numpy as np
 import pytest
 
 import hybrid
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 from hybrid.simulation.case import Case
 
 sys.path.insert(0, str(Path(__file__).parent.parent))
@@ -108,13 +108,13 @@ def test_accuracy_asked_and_achieved():
     assert np.mean(silent) <= 0.05
 
 
-def runs(scene, efforts):
-    """Errors of position against the last of the efforts, and CPU seconds, median of five."""
+def runs(scene, resolutions):
+    """Errors of position against the last of the resolutions, and CPU seconds, median of five."""
     case = Case(scene, None)
-    exact = case.sample(efforts[-1])
+    exact = case.sample(resolutions[-1])
     out = []
-    for effort in efforts[:-1]:
-        tries = [case.sample(effort) for _ in range(5)]
+    for resolution in resolutions[:-1]:
+        tries = [case.sample(resolution) for _ in range(5)]
         error = np.linalg.norm(tries[0].values["position"] - exact.values["position"], axis=2).max()
         out.append((float(error), median(t.cpu for t in tries), tries[0].steps))
     return out
@@ -140,10 +140,10 @@ def test_accuracy_steps_that_follow(name):
     """CPU time of the best fixed step over that of steps that follow, at equal error, on one mesh."""
     make, steps, largest, asked = STEPS[name]
     scene = make()
-    exact = Effort(1.0, steps[-1] / 8, None, 1e-3)
-    fix = runs(scene, [*(Effort(1.0, dt, None, 1e-3) for dt in steps), exact])
+    exact = Resolution(1.0, steps[-1] / 8, None, 1e-3)
+    fix = runs(scene, [*(Resolution(1.0, dt, None, 1e-3) for dt in steps), exact])
     tolerances = 10.0 ** np.arange(-3.0, -9.0, -1.0) * scene.length / 2
-    follow = runs(scene, [*(Effort(1.0, largest, tol, 1e-3) for tol in tolerances), exact])
+    follow = runs(scene, [*(Resolution(1.0, largest, tol, 1e-3) for tol in tolerances), exact])
     errors, cpu = np.array(fix)[::-1, 0], np.array(fix)[::-1, 1]
     ratios = []
     for tol, (error, seconds, count) in zip(tolerances, follow, strict=True):

@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hybrid.adapt.manager import Look
+    from hybrid.adapt.manager import NodeState
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import import_moordyn
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
-    "Look": ("hybrid.adapt.manager", "Look"),
+    "NodeState": ("hybrid.adapt.manager", "NodeState"),
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),
@@ -60,7 +60,7 @@ _HOME = {
 __all__ = [
     "ComputationError",
     "HybridError",
-    "Look",
+    "NodeState",
     "Outcome",
     "Result",
     "ResultError",
@@ -83,12 +83,19 @@ __all__ = [
     "validate_scene",
 ]
 
+_FORMER = {"Look": "NodeState"}  # public names that have changed: the old one still works
+
 
 def __getattr__(name: str) -> Any:
     if name == "__version__":
         from importlib.metadata import version
 
         return version("hybrid-cable")
+    if name in _FORMER:
+        import warnings
+
+        warnings.warn(f"hybrid.{name} is now hybrid.{_FORMER[name]}", DeprecationWarning, stacklevel=2)
+        return getattr(import_module("hybrid"), _FORMER[name])
     if name not in _HOME:
         raise AttributeError(f"module 'hybrid' has no attribute {name!r}")
     module, attribute = _HOME[name]

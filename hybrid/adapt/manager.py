@@ -44,7 +44,7 @@ REMEMBERED = (
 )  # fmt: skip
 
 
-class Look(NamedTuple):
+class NodeState(NamedTuple):
     """What a criterion of the user gets to see; arrays are not his to change.
 
     t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
@@ -61,7 +61,7 @@ class Look(NamedTuple):
 
 
 # (N+1,) at 1 asks for rod around a node, below 0.5 lets go.
-UserCriterion = Callable[[Look], Floats]
+UserCriterion = Callable[[NodeState], Floats]
 
 
 class Reason(NamedTuple):
@@ -242,7 +242,7 @@ class DomainManager:
 
     def _ask_user(self, line: Line, state: State, t: float) -> None:
         assert self.user is not None
-        look = Look(t, self.s, state.r, state.v, state.T, self.turn / line.hn, self.EI)
+        look = NodeState(t, self.s, state.r, state.v, state.T, self.turn / line.hn, self.EI)
         for x in look[1:]:
             x.flags.writeable = False
         try:

@@ -25,7 +25,7 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plane import in_plane, planar
-from hybrid.model.resolution import Effort, first_effort, mesh_is_free
+from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free
 from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.sections import merged_sections
@@ -117,11 +117,11 @@ def corrects(scene: Scene) -> bool:
 
 
 def build(
-    scene: Scene, effort: Effort | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None
+    scene: Scene, resolution: Resolution | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None
 ) -> Model:
-    """Make the model that a scene requires; effort: how finely, None: as it asks for.
+    """Make the model that a scene requires; resolution: how finely, None: as it asks for.
 
-    mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as effort places them.
+    mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as resolution places them.
 
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
@@ -129,7 +129,7 @@ def build(
     cable = material(scene)
     plans = zone_plans(scene)
     cuts = sorted({*cable.cuts, *corners(scene)})
-    effort = effort or first_effort(scene)
+    resolution = resolution or first_resolution(scene)
     layout = None
     if isinstance(mesh, Layout):
         layout, s, zones = mesh, mesh.nodes, mesh.zones
@@ -138,10 +138,10 @@ def build(
     elif isinstance(scene.model, AdaptiveModel):
         wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
         edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
-        layout = _layout(scene, cable, sorted({*cuts, *edges}), effort)
+        layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
         s, zones = layout.nodes, layout.zones
     else:
-        s, zones = _placed(scene, plans, cuts, effort, DEFAULT_CELLS)
+        s, zones = _placed(scene, plans, cuts, resolution, DEFAULT_CELLS)
     n = s.size - 1
     middle = 0.5 * (s[:-1] + s[1:])
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
@@ -184,7 +184,7 @@ def build(
         spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
         others.append((name, spare))
     corrected = corrects(scene)
-    follows = (effort.follow or corrected) and followed(scene, zones, corrected).on
+    follows = (resolution.follow or corrected) and followed(scene, zones, corrected).on
     plane, flat = in_plane(scene, start, others, ends.values)
     if follows and scene.dimension is None:
         plane, flat = None, replace(flat, on=False, why="what leaving bending out does is followed in space")
@@ -221,35 +221,35 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
 
 
 def _placed(
-    scene: Scene, plans: tuple[ZonePlan, ...], cuts: Sequence[float], effort: Effort, usual: int
+    scene: Scene, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution, usual: int
 ) -> tuple[Floats, tuple[Zone, ...]]:
     """Nodes and zones; usual: cells of a line whose scene does not say."""
     mesh, free = scene.mesh, mesh_is_free(scene)
-    if free and effort.grading is not None:
+    if free and resolution.grading is not None:
         bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
         bounds[-1] = scene.length
         zones = tuple(Zone(plan.kind, float(a), float(b)) for plan, (a, b) in zip(plans, pairwise(bounds), strict=True))
-        return effort.grading.nodes(sorted({*bounds.tolist(), *cuts}), effort.fineness), zones
+        return resolution.grading.nodes(sorted({*bounds.tolist(), *cuts}), resolution.fineness), zones
     if free:
-        cells = max(round(usual * effort.fineness), FEWEST_CELLS * len(plans))
+        cells = max(round(usual * resolution.fineness), FEWEST_CELLS * len(plans))
         return place_nodes(plans, cuts, None, None, cells)
     if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
     else:
         ratio, given = (mesh.ratio, mesh.cells) if mesh is not None else (None, None)
         s, zones = place_nodes(plans, cuts, given, ratio, usual)
-    if effort.fineness < 1.0:
-        s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / effort.fineness))
+    if resolution.fineness < 1.0:
+        s = thinned(s, [z.s_b for z in zones[:-1]] + list(cuts), round(1.0 / resolution.fineness))
     return s, zones
 
 
-def _layout(scene: Scene, cable: Material, cuts: Sequence[float], effort: Effort) -> Layout:
+def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Resolution) -> Layout:
     """Base cells, all rod."""
     model = scene.model
     assert isinstance(model, AdaptiveModel)
-    base, _ = _placed(scene, (ZonePlan("rod", scene.length),), cuts, effort, BASE_CELLS)
+    base, _ = _placed(scene, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
     middle = 0.5 * (base[:-1] + base[1:])
-    cell = rod_cells(scene, cable, middle, effort.grading) / effort.fineness
+    cell = rod_cells(scene, cable, middle, resolution.grading) / resolution.fineness
     parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(base.size - 1, bool))
 

@@ -11,7 +11,7 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import FORCES
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import USUAL, asked, first_effort, mesh_is_free, wants_errors
+from hybrid.model.resolution import USUAL, first_resolution, mesh_is_free, requested_accuracy, wants_errors
 from hybrid.model.sea import current_table
 from hybrid.model.sections import weight
 from hybrid.scene.schema import AdaptiveModel, Scene
@@ -61,7 +61,7 @@ def _watched(scene: Scene) -> Iterator[Entry]:
     """The criteria by which zones move, with their thresholds."""
     assert isinstance(scene.model, AdaptiveModel)
     why = "model.tolerance x length" if scene.model.tolerance else "1e-3 of the length, or a part of what accuracy asks"
-    yield Entry(f"zones that move; tolerance {first_effort(scene).zones * scene.length:.3g} m", True, why)
+    yield Entry(f"zones that move; tolerance {first_resolution(scene).zones * scene.length:.3g} m", True, why)
     for x in CRITERIA:
         asked = x.name != "given" or scene.model.force_rod or scene.model.force_catenary
         yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)
@@ -90,14 +90,16 @@ def _moving(model: AdaptiveModel) -> Iterator[Entry]:
 
 def _accuracy(scene: Scene) -> Iterator[Entry]:
     """What is asked of the result, and what it sets."""
-    want, effort, time = asked(scene), first_effort(scene), scene.time
+    want, resolution, time = requested_accuracy(scene), first_resolution(scene), scene.time
     if want is None:
         yield Entry("accuracy", False, "not asked for: `accuracy: 1%`, `3 cm` or `50 N`")
     else:
         yield Entry("accuracy", True, f"{'accuracy' if scene.accuracy else f'no time.step, so {USUAL}'}: {want.text}")
-    if time is not None and effort.local is not None:
-        why = f"error of a step {effort.local:.2g} m at most, by {'time.tolerance' if time.tolerance else 'accuracy'}"
-        yield Entry("steps that follow the motion", True, f"{why}; {effort.step:.3g} s at most")
+    if time is not None and resolution.local is not None:
+        why = (
+            f"error of a step {resolution.local:.2g} m at most, by {'time.tolerance' if time.tolerance else 'accuracy'}"
+        )
+        yield Entry("steps that follow the motion", True, f"{why}; {resolution.step:.3g} s at most")
     elif time is not None:
         yield Entry("steps that follow the motion", False, "time.step fixes them")
     graded = want is not None and mesh_is_free(scene) and time is not None

@@ -11,7 +11,7 @@ from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, ST
 from hybrid.model.build import build
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import first_effort, wants_errors
+from hybrid.model.resolution import first_resolution, wants_errors
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
 
@@ -102,7 +102,7 @@ def count_steps(scene: Scene) -> int:
     Where steps follow the motion: the least that there may be.
     """
     time, every = scene.require_time(), output_interval(scene)
-    step = first_effort(scene).step
+    step = first_resolution(scene).step
     whole = parts(time.duration, every) - 1
     last = time.duration - whole * every
     return whole * parts(every, step) + parts(last, step)
@@ -119,7 +119,7 @@ def plan(scene: SceneLike) -> Plan:
     steps, step = 0, 0.0
     if scene.time:
         every = output_interval(scene)
-        steps, step = count_steps(scene), every / parts(every, first_effort(scene).step)
+        steps, step = count_steps(scene), every / parts(every, first_resolution(scene).step)
     cost = COST if model.plane is None else FLAT_COST
     each = sum(cost[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
     each += model.cells * sum(x[model.plane is not None] for bit, x in MORE.items() if model.line.bits & bit)

@@ -1,4 +1,4 @@
-"""How finely a scene is computed: what accuracy asks for becomes cells, steps and the tolerance of zones.
+"""How finely a scene is computed: the requested accuracy becomes cells, steps and the tolerance of zones.
 
 A scene's own step, mesh and model.tolerance stand; what it leaves open follows from the accuracy it asks for.
 """
@@ -13,15 +13,15 @@ from hybrid.scene.accuracy import Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.schema import AdaptiveModel, Scene, ZonesModel
 
-USUAL = "1%"  # of a scene that asks for nothing and leaves its steps open
-# Parts of what is asked that zones may make of it; mesh and time step share the rest as they come.
+USUAL = "1%"  # of a scene that requests nothing and leaves its steps open
+# Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
 OF_ZONES = 0.1
-ONE = 0.01  # what the guesses below are for
-ZONES = 1e-3  # of a scene that asks for nothing: part of the length
+ONE = 0.01  # the requested error that the guesses below are for
+ZONES = 1e-3  # tolerance of zones of a scene that requests nothing, as a part of the length
 # Fineness of the mesh for 1 % of tension at the ends, and for 1 % of the length; it grows as second order wants it.
 # First guesses after runs of the examples, as are those of the step below: the error figure decides, not they.
 FOR_TENSION, FOR_POSITION = 1.5, 0.4
-# Fewer cells show no shape; more are not needed before the first error figure has said so.
+# Fewer cells do not resolve the shape; more are not needed before the first error figure is known.
 COARSEST, FINEST = 0.5, 20.0
 # What a step may be wrong by, as a part of the length, for 1 % of tension and for 1 % of the length; of third order.
 STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 5e-4
@@ -32,35 +32,35 @@ LEAST_STEPS, SHORTEST = 10, 1e-6
 
 
 @dataclass(frozen=True)
-class Asked:
-    """Errors asked for, in m and N or as parts (of the length; of the largest pull at the ends); None: not asked."""
+class RequestedAccuracy:
+    """Requested errors, in m and N or as parts (of the length; of the largest end force); None: not requested."""
 
     position: float | None
     tension: float | None
-    of_pull: float | None
+    of_end_force: float | None
     of_curvature: float | None = None  # a part of the largest
 
     @property
     def text(self) -> str:
         """In words."""
-        said = [f"{self.position:.3g} m of position"] if self.position is not None else []
+        parts = [f"{self.position:.3g} m of position"] if self.position is not None else []
         if self.tension is not None:
-            said.append(f"{self.tension:.3g} N of pull at the ends")
-        if self.of_pull is not None:
-            said.append(f"{100 * self.of_pull:.3g} % of the pull at the ends")
+            parts.append(f"{self.tension:.3g} N of the end forces")
+        if self.of_end_force is not None:
+            parts.append(f"{100 * self.of_end_force:.3g} % of the end forces")
         if self.of_curvature is not None:
-            said.append(f"{100 * self.of_curvature:.3g} % of the curvature")
-        return ", ".join(said)
+            parts.append(f"{100 * self.of_curvature:.3g} % of the curvature")
+        return ", ".join(parts)
 
 
 @dataclass(frozen=True)
-class Effort:
+class Resolution:
     """How finely a scene is computed.
 
-    fineness: cells, in times those of the mesh as it is; grading: where they go, None: as the scene or the program
-    places them; step: s, fixed, or the largest; local: m, error of a step, None: steps are fixed; zones: error that
-    leaving bending out may make, as a part of the length; every: outputs of the result to one of such a run.
-    follow: whether the error of leaving bending out is followed along the run.
+    fineness: number of cells, relative to the default mesh; grading: density of cells along the line, None: as the
+    scene or the program places them; step: s, fixed, or the largest; local: m, error allowed per step, None: steps are
+    fixed; zones: error that neglected bending may make, as a part of the length; every: outputs of the result to one
+    of such a run; follow: whether the error of neglected bending is followed along the run.
     """
 
     fineness: float
@@ -71,43 +71,43 @@ class Effort:
     every: int = 1
     follow: bool = False
 
-    def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Effort:
-        """With cells and steps so many times as long; the error of a step is of third order."""
+    def coarser(self, cells: float = 1.0, steps: float = 1.0) -> Resolution:
+        """With cells and steps longer by these factors; the error of a step is of third order."""
         local = None if self.local is None else self.local * steps**3
         every = round(steps) if steps > 1.0 else 1
         return replace(self, fineness=self.fineness / cells, step=self.step * steps, local=local, every=every)
 
     @property
     def shortest(self) -> float:
-        """Step, s, below which one that fails is given up."""
+        """Step, s, below which a failing step ends the run."""
         return SHORTEST * self.step
 
 
 def accuracy_of(scene: Scene) -> Accuracy | None:
-    """The accuracy a scene asks for; one that leaves its steps open asks for the usual one."""
+    """The accuracy a scene requests; USUAL where it leaves its steps open."""
     if scene.accuracy is None and scene.time is not None and scene.time.controlled and scene.time.tolerance is None:
         return Accuracy(position=USUAL, tension=USUAL)
     return scene.accuracy
 
 
-def asked(scene: Scene) -> Asked | None:
-    """The same in numbers; None if it asks for nothing."""
+def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
+    """The same in numbers; None if nothing is requested."""
     accuracy = accuracy_of(scene)
     if accuracy is None:
         return None
-    position = tension = of_pull = None
+    position = tension = of_end_force = None
     if accuracy.position is not None:
         what, size = amount(accuracy.position)
         position = size * scene.length if what == "part" else size
     if accuracy.tension is not None:
         what, size = amount(accuracy.tension)
-        tension, of_pull = (None, size) if what == "part" else (size, None)
+        tension, of_end_force = (None, size) if what == "part" else (size, None)
     of_curvature = amount(accuracy.curvature)[1] if accuracy.curvature is not None else None
-    return Asked(position, tension, of_pull, of_curvature)
+    return RequestedAccuracy(position, tension, of_end_force, of_curvature)
 
 
 def wants_errors(scene: Scene) -> bool:
-    """Whether a result is to say how wrong it may be."""
+    """Whether the error of the result is estimated."""
     if scene.output.errors is not None:
         return scene.output.errors
     return accuracy_of(scene) is not None
@@ -120,18 +120,18 @@ def mesh_is_free(scene: Scene) -> bool:
 
 
 def zones_are_free(scene: Scene) -> bool:
-    """Whether the program chooses how much bending zones may leave out."""
+    """Whether the program chooses the tolerance of zones."""
     return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
 
 
-def first_effort(scene: Scene) -> Effort:
-    """What a scene's accuracy asks for, before anything is known of its errors."""
-    want = asked(scene)
+def first_resolution(scene: Scene) -> Resolution:
+    """The resolution for a scene's accuracy, before anything is known of its errors."""
+    want = requested_accuracy(scene)
     zones = scene.model.tolerance if isinstance(scene.model, AdaptiveModel) else None
     fineness, local, part = 1.0, 1.0, ZONES / OF_ZONES
     if want is not None:
-        tension, position = want.of_pull or ONE, (want.position or ONE * scene.length) / scene.length
-        which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_pull or want.tension else []
+        tension, position = want.of_end_force or ONE, (want.position or ONE * scene.length) / scene.length
+        which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_end_force or want.tension else []
         which += [(want.of_curvature, FOR_TENSION, STEP_FOR_TENSION)] if want.of_curvature else []
         which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
         part = min(x for x, _, _ in which)
@@ -141,10 +141,10 @@ def first_effort(scene: Scene) -> Effort:
     part *= OF_ZONES
     time = scene.time
     if time is None:
-        return Effort(fineness, 0.0, None, zones or part)
+        return Resolution(fineness, 0.0, None, zones or part)
     if not time.controlled:
         assert time.step is not None
-        return Effort(fineness, time.step, None, zones or part)
+        return Resolution(fineness, time.step, None, zones or part)
     step = min(time.step or time.duration / LEAST_STEPS, time.duration)
     step = min(step, shortest_period(scene.ends, scene.environment) / PER_PERIOD)
-    return Effort(fineness, step, time.tolerance or local, zones or part)
+    return Resolution(fineness, step, time.tolerance or local, zones or part)

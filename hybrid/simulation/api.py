@@ -20,14 +20,21 @@ import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError, SceneError
-from hybrid.model.resolution import Effort, asked, first_effort, mesh_is_free, wants_errors, zones_are_free
+from hybrid.model.resolution import (
+    Resolution,
+    first_resolution,
+    mesh_is_free,
+    requested_accuracy,
+    wants_errors,
+    zones_are_free,
+)
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
-from hybrid.simulation.error_control import ErrorController, comparison_efforts
+from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_estimate import Errors, RunSample, summary
-from hybrid.simulation.mesh_survey import survey_effort
+from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import Remainder, remainder
@@ -39,7 +46,7 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import amend, check_target
 
-Record = Callable[[Effort, Path | io.BytesIO], RunSample]
+Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 
 
 def run(
@@ -56,7 +63,7 @@ def run(
     result in memory.  progress: True for a line on the error stream, or a function that gets a
     `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an
     existing result (never another program's file).  criterion: for zones that move, one more: it gets a
-    `hybrid.Look` at every step and gives a number (N+1,) per node, 1 or more where the cable must be a rod.
+    `hybrid.NodeState` at every step and gives a number (N+1,) per node, 1 or more where the cable must be a rod.
 
     Raises SceneError when the scene is refused and ComputationError when the computation
     stops; what was computed until then is in the file, and the last good state beside it.
@@ -123,36 +130,36 @@ def _run(case: Case, target: Path | io.BytesIO, source: Path | None = None, left
     anew = left is None or left.anew
     control: ErrorController | None = None
 
-    def first(effort: Effort, to: Path | io.BytesIO) -> RunSample:
+    def first(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
         if anew or source is None or isinstance(to, io.BytesIO):
-            return case.record(effort, to, kept())
+            return case.record(resolution, to, kept())
         return case.go_on(source, to, kept())
 
-    def later(effort: Effort, to: Path | io.BytesIO) -> RunSample:
-        if isinstance(to, Path) and case.goes_on(to, effort):  # one that was cut off
+    def later(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
+        if isinstance(to, Path) and case.goes_on(to, resolution):  # one that was cut off
             return case.go_on(to, to, kept())
-        return case.record(effort, to, kept())
+        return case.record(resolution, to, kept())
 
     def kept() -> Tree:
         return control.checkpoint() if control is not None else {}
 
-    effort = first_effort(scene) if left is None else left.effort
+    resolution = first_resolution(scene) if left is None else left.resolution
     if not wants_errors(scene):
-        first(effort, target)
+        first(resolution, target)
         return
     compute = _kept(target, first, later)
     try:
-        control = ErrorController(asked(scene), _free(scene), True, case.sample, compute)
+        control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute)
         if left is not None and left.before:
             with refused(source or Path()):
                 control.restore(left.before, scene)
             final, errors = control.proceed()
         else:
-            surveys = left is None and asked(scene) is not None
-            _expect(case, effort, surveys and mesh_is_free(scene))
+            surveys = left is None and requested_accuracy(scene) is not None
+            _expect(case, resolution, surveys and mesh_is_free(scene))
             if surveys:
-                effort = replace(effort, grading=case.survey(effort))
-            final, errors = control.start(effort)
+                resolution = replace(resolution, grading=case.survey(resolution))
+            final, errors = control.start(resolution)
     except KeyboardInterrupt:
         if control is not None and control.estimate is not None:
             # stopped in a finer run: the result before it stands, with its figure
@@ -169,11 +176,11 @@ def _free(scene: Scene) -> Free:
     return Free(mesh_is_free(scene), steps, zones_are_free(scene))
 
 
-def _expect(case: Case, effort: Effort, surveys: bool) -> None:
+def _expect(case: Case, resolution: Resolution, surveys: bool) -> None:
     """Tell the progress which passes are to come: surveys, whether the first looks how the cable bends."""
-    passes = [(PRE_RUN, survey_effort(effort))] if surveys else []
-    passes += [(ESTIMATION, x) for x in comparison_efforts(effort, moves=True)]
-    case.progress.expect([*passes, (RESULT, effort)], effort)
+    passes = [(PRE_RUN, survey_resolution(resolution))] if surveys else []
+    passes += [(ESTIMATION, x) for x in comparison_resolutions(resolution, moves=True)]
+    case.progress.expect([*passes, (RESULT, resolution)], resolution)
 
 
 @contextmanager
@@ -199,38 +206,38 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
         with locked(_path(output)):
             return static_shooting(scene, output, overwrite)
     case, begin = Case(scene, None), clock.process_time()
-    target, effort = _target(output, overwrite), first_effort(scene)
+    target, resolution = _target(output, overwrite), first_resolution(scene)
     with locked(_path(output)):
         if not wants_errors(scene):
-            case.record_equilibrium(effort, target)
+            case.record_equilibrium(resolution, target)
             return open_result(target)
         compute = _kept(target, case.record_equilibrium, case.record_equilibrium)
         free = _free(scene)._replace(steps=False)
-        control = ErrorController(asked(scene), free, False, case.sample_equilibrium, compute)
-        final, errors = control.start(effort)
+        control = ErrorController(requested_accuracy(scene), free, False, case.sample_equilibrium, compute)
+        final, errors = control.start(resolution)
         _amend(target, scene, final, errors, control, clock.process_time() - begin)
     return open_result(target)
 
 
-def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Effort], RunSample]:
+def _kept(target: Path | io.BytesIO, first: Record, later: Record) -> Callable[[Resolution], RunSample]:
     """Record results one after the other: a finer one takes the place of that before it when it is complete."""
     done = False
 
-    def compute(effort: Effort) -> RunSample:
+    def compute(resolution: Resolution) -> RunSample:
         nonlocal done
         if not done:
-            found, done = first(effort, target), True
+            found, done = first(resolution, target), True
             return found
         if isinstance(target, io.BytesIO):
             new = io.BytesIO()
-            found = later(effort, new)
+            found = later(resolution, new)
             target.seek(0)
             target.truncate()
             target.write(new.getvalue())
             return found
         beside = _beside(target)
         try:
-            found = later(effort, beside)
+            found = later(resolution, beside)
             os.replace(beside, target)
         finally:
             for left in (beside, beside.with_suffix(".snapshot.npz")):
@@ -248,15 +255,15 @@ def _amend(
 
     done: nothing is left to go on with; else the file keeps what a finer result goes on from.
     """
-    effort = final.effort
+    resolution = final.resolution
     attributes: dict[str, str | float | int] = {
-        "effort_fineness": effort.fineness, "effort_runs": len(control.runs),
-        "effort_cpu": cpu, "effort_step": effort.step,
+        "effort_fineness": resolution.fineness, "effort_runs": len(control.runs),
+        "effort_cpu": cpu, "effort_step": resolution.step,
     }  # fmt: skip
-    if effort.local is not None:
-        attributes["effort_step_error"] = effort.local
+    if resolution.local is not None:
+        attributes["effort_step_error"] = resolution.local
     if isinstance(scene.model, AdaptiveModel):
-        attributes["effort_zones"] = effort.zones
+        attributes["effort_zones"] = resolution.zones
     if control.asked is not None:
         attributes["accuracy_asked"] = control.asked.text
     fields: list[tuple[Field, np.ndarray]] = []

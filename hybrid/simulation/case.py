@@ -17,7 +17,7 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Effort, mesh_is_free, wants_errors
+from hybrid.model.resolution import Resolution, mesh_is_free, wants_errors
 from hybrid.model.sections import allowed_radius, weakest_bending
 from hybrid.outputs.probes import Observer, output_points
 from hybrid.scene.motion_checks import ramp_ends
@@ -27,10 +27,10 @@ from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Watch
 from hybrid.simulation.equilibrium import equilibrium_of, zones_and_rest
 from hybrid.simulation.error_estimate import COMPARED, RunSample
-from hybrid.simulation.mesh_survey import POINTS, survey_effort, survey_grading
+from hybrid.simulation.mesh_survey import POINTS, survey_grading, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import Phase, changes_text
-from hybrid.simulation.restore import effort_from, effort_tree, program, refused, restored_parts
+from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
 from hybrid.simulation.transient import Motion
 from hybrid.simulation.zone_switching import Zoning
 from hybrid.solve.statics import Equilibrium
@@ -72,10 +72,10 @@ class Case:
         self.results = 0  # that were begun
         self.interrupted: Callable[[], bool] = lambda: False
 
-    def record(self, effort: Effort, target: Path | io.BytesIO, before: Tree | None = None) -> RunSample:
+    def record(self, resolution: Resolution, target: Path | io.BytesIO, before: Tree | None = None) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
-        begin = self._begin_result(effort)
-        model, equilibrium, zoning = self._model(effort)
+        begin = self._begin_result(resolution)
+        model, equilibrium, zoning = self._model(resolution)
         observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
         outputs = output_times(self.scene)
         keeps = before or {} if isinstance(target, Path) else None
@@ -85,7 +85,7 @@ class Case:
             recorder.event(0.0, 0.0, model.length, "zones fixed", HELD)
         with recorder:
             correction = _correction(model, zoning)
-            motion = Motion(self.scene, model, effort, observer, recorder, target, zoning, correction)
+            motion = Motion(self.scene, model, resolution, observer, recorder, target, zoning, correction)
             motion.begin(equilibrium)
             motion.save()
             motion.keep()
@@ -99,12 +99,12 @@ class Case:
             self._check(point, source)
             scenes = (self.scene, *(x.scene for x in self.changes))
             with refused(source):
-                effort = effort_from(point.effort, self.scene)
-                begin = self._begin_result(effort)
-                model, zoning, correction = restored_parts(scenes, effort, point.state, self.criterion)
+                resolution = resolution_from(point.resolution, self.scene)
+                begin = self._begin_result(resolution)
+                model, zoning, correction = restored_parts(scenes, resolution, point.state, self.criterion)
                 observer = self._observer(model, zoning, output_points(self.scene.output.points, model.length))
                 now = scenes[point.state["changes"]]
-                motion = Motion(now, model, effort, observer, Notebook(), target, zoning, correction)
+                motion = Motion(now, model, resolution, observer, Notebook(), target, zoning, correction)
                 motion.restore(point.state)
                 if not point.t <= motion.t <= self.scene.require_time().duration:
                     raise ValueError(f"t = {motion.t:g} s after an output at {point.t:g} s")
@@ -119,9 +119,9 @@ class Case:
             self._finish(motion, output_times(self.scene))
         return self._seen(motion, target, clock.process_time() - begin)
 
-    def _begin_result(self, effort: Effort) -> float:
+    def _begin_result(self, resolution: Resolution) -> float:
         """The pass of a result begins; s of processor time."""
-        self.progress.begin(REFINEMENT if self.results else RESULT, effort)
+        self.progress.begin(REFINEMENT if self.results else RESULT, resolution)
         self.results += 1
         return clock.process_time()
 
@@ -140,8 +140,8 @@ class Case:
         paths = {motion.file for end in ends if (motion := end.prescribed_motion) is not None and motion.file}
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 
-    def goes_on(self, source: Path, effort: Effort) -> bool:
-        """Whether a file holds a run with this effort that was cut off."""
+    def goes_on(self, source: Path, resolution: Resolution) -> bool:
+        """Whether a file holds a run with this resolution that was cut off."""
         if not is_result(source):
             return False
         with open_result(source) as result:
@@ -152,7 +152,7 @@ class Case:
                 point = read_checkpoint(file)
         except ResultError:
             return False
-        return pack(point.effort) == pack(effort_tree(effort))
+        return pack(point.resolution) == pack(resolution_tree(resolution))
 
     def _check(self, point: Checkpoint, source: Path) -> None:
         """ResultError: the criterion of a run is missing, or the files that it reads have changed."""
@@ -175,34 +175,34 @@ class Case:
 
     def _seen(self, motion: Motion, target: Path | io.BytesIO, cpu: float) -> RunSample:
         """What is to be compared of a complete result."""
-        effort, cells, steps = motion.effort, cells_of(motion.model), motion.steps
+        resolution, cells, steps = motion.resolution, cells_of(motion.model), motion.steps
         if not wants_errors(self.scene):
-            return RunSample(effort, {}, cells, steps, 0.0)
+            return RunSample(resolution, {}, cells, steps, 0.0)
         with open_result(target) as result:
             values = {name: np.array(result[name]) for name in COMPARED if name in result}
             model_error = (
                 {k: np.array(x) for k, x in result["errors/model"].items()} if "errors/model" in result else {}
             )
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
-            notes = _damped(result) if effort.local is not None else ()
-        return RunSample(effort, values, cells, steps, cpu, 1, unresolved, model_error, 0.0, notes)
+            notes = _damped(result) if resolution.local is not None else ()
+        return RunSample(resolution, values, cells, steps, cpu, 1, unresolved, model_error, 0.0, notes)
 
-    def sample(self, effort: Effort, points: Floats | None = None) -> RunSample:
+    def sample(self, resolution: Resolution, points: Floats | None = None) -> RunSample:
         """Compute for comparison only; points: places, m, instead of those of the result.
 
-        An effort with longer steps has as many times fewer outputs, so that these do not shorten its steps.
+        An resolution with longer steps has as many times fewer outputs, so that these do not shorten its steps.
         """
         begin = clock.process_time()
-        self.progress.begin(ESTIMATION if points is None else PRE_RUN, effort)
-        model, equilibrium, zoning = self._model(effort)
+        self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
+        model, equilibrium, zoning = self._model(resolution)
         s = output_points(self.scene.output.points, model.length) if points is None else points
         observer = self._observer(model, zoning, s, COMPARED)
         notebook = Notebook()
         times = output_times(self.scene)
-        if effort.every > 1:
-            times = [*times[effort.every - 1 : -1 : effort.every], times[-1]]
+        if resolution.every > 1:
+            times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
         correction = _correction(model, zoning)
-        motion = Motion(self.scene, model, effort, observer, notebook, None, zoning, correction)
+        motion = Motion(self.scene, model, resolution, observer, notebook, None, zoning, correction)
         motion.begin(equilibrium)
         motion.save()
         self._move(motion, times)
@@ -210,17 +210,17 @@ class Case:
         values = {name: notebook[name] for name in COMPARED if name in notebook}
         model_error = {name.removeprefix(MODEL): notebook[name] for name in notebook.names if name.startswith(MODEL)}
         spent = clock.process_time() - begin
-        bound = effort.zones * model.length if zoning is not None else 0.0
+        bound = resolution.zones * model.length if zoning is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(notebook.events) if kind == BEYOND}.values())
         return RunSample(
-            effort, values, cells_of(model), motion.steps, spent, effort.every, False, model_error, bound, notes
+            resolution, values, cells_of(model), motion.steps, spent, resolution.every, False, model_error, bound, notes
         )
 
-    def survey(self, effort: Effort) -> Grading | None:
+    def survey(self, resolution: Resolution) -> Grading | None:
         """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
         if not mesh_is_free(self.scene):
             return None
-        coarse = survey_effort(effort)
+        coarse = survey_resolution(resolution)
         model = build(self.scene, coarse)
         s = np.linspace(0.0, model.length, POINTS)
         try:
@@ -230,10 +230,10 @@ class Case:
         bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
         return survey_grading(model, s, seen.values, bend)
 
-    def record_equilibrium(self, effort: Effort, target: Path | io.BytesIO) -> RunSample:
+    def record_equilibrium(self, resolution: Resolution, target: Path | io.BytesIO) -> RunSample:
         """The same of the equilibrium."""
         begin = clock.process_time()
-        model, found = self._rest(effort)
+        model, found = self._rest(resolution)
         observer = self._at_rest(model)
         with _recorder(self.scene, model, observer, target, 0, found) as recorder:
             ends = model.ends.at(np.inf)
@@ -248,14 +248,14 @@ class Case:
             values = _values_at_rest(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
-        return _sample_at_rest(effort, model, values, clock.process_time() - begin)
+        return _sample_at_rest(resolution, model, values, clock.process_time() - begin)
 
-    def sample_equilibrium(self, effort: Effort) -> RunSample:
+    def sample_equilibrium(self, resolution: Resolution) -> RunSample:
         """The equilibrium for comparison only."""
         begin = clock.process_time()
-        model, found = self._rest(effort)
+        model, found = self._rest(resolution)
         values = _values_at_rest(model, found, self._at_rest(model, COMPARED))
-        return _sample_at_rest(effort, model, values, clock.process_time() - begin)
+        return _sample_at_rest(resolution, model, values, clock.process_time() - begin)
 
     def _at_rest(self, model: Model, only: Sequence[str] | None = None) -> Observer:
         s = output_points(self.scene.output.points, model.length)
@@ -265,18 +265,18 @@ class Case:
             corrected=model.corrected,
         )  # fmt: skip
 
-    def _rest(self, effort: Effort) -> tuple[Model, Equilibrium]:
-        model = build(self.scene, effort)
+    def _rest(self, resolution: Resolution) -> tuple[Model, Equilibrium]:
+        model = build(self.scene, resolution)
         if model.layout is None:
             return model, equilibrium_of(self.scene, model, np.inf)
-        model, found, _ = zones_and_rest(self.scene, model, effort, np.inf, None, at_rest=True)
+        model, found, _ = zones_and_rest(self.scene, model, resolution, np.inf, None, at_rest=True)
         assert found is not None
         return model, found
 
-    def _model(self, effort: Effort) -> tuple[Model, Equilibrium | None, Zoning | None]:
-        model = build(self.scene, effort)
+    def _model(self, resolution: Resolution) -> tuple[Model, Equilibrium | None, Zoning | None]:
+        model = build(self.scene, resolution)
         if model.layout is not None:
-            return zones_and_rest(self.scene, model, effort, 0.0, self.criterion)
+            return zones_and_rest(self.scene, model, resolution, 0.0, self.criterion)
         found = equilibrium_of(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None
         return model, found, None
 
@@ -360,10 +360,10 @@ def _values_at_rest(model: Model, found: Equilibrium, observer: Observer) -> dic
     return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
 
 
-def _sample_at_rest(effort: Effort, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
+def _sample_at_rest(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
     kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
     left = {k.removeprefix(MODEL): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL)}
-    return RunSample(effort, kept, cells_of(model), 1, cpu, 1, False, left)
+    return RunSample(resolution, kept, cells_of(model), 1, cpu, 1, False, left)
 
 
 def cells_of(model: Model) -> int:

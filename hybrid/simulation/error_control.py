@@ -15,7 +15,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Asked, Effort
+from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import (
     COARSER,
@@ -26,7 +26,7 @@ from hybrid.simulation.error_estimate import (
     restored_sample,
 )
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
-from hybrid.simulation.restore import effort_from, effort_tree
+from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
 
 # A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
@@ -38,15 +38,17 @@ MOST_CPU = 600.0
 MOST_REFINEMENTS = 3
 
 
-def comparison_efforts(effort: Effort, moves: bool) -> tuple[Effort, Effort, Effort]:
+def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolution, Resolution, Resolution]:
     """Of the runs to compare with: longer cells and steps; the same cells, longer steps still; longer cells as well.
 
     moves: whether there are steps at all.
     """
     longer = COARSER if moves else 1.0
     return (
-        effort.coarser(COARSER, longer), effort.coarser(COARSER, longer**2), effort.coarser(COARSER**2, longer**2),
-    )  # fmt: skip
+        resolution.coarser(COARSER, longer),
+        resolution.coarser(COARSER, longer**2),
+        resolution.coarser(COARSER**2, longer**2),
+    )
 
 
 @dataclass
@@ -58,13 +60,13 @@ class ErrorController:
     with `proceed`.
     """
 
-    asked: Asked | None
+    asked: RequestedAccuracy | None
     free: Free
     moves: bool  # whether there is a time
-    sample: Callable[[Effort], RunSample]
-    result: Callable[[Effort], RunSample]
+    sample: Callable[[Resolution], RunSample]
+    result: Callable[[Resolution], RunSample]
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
-    next: Effort | None = None  # of the result that is to be computed
+    next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
     estimate: Estimate | None = None  # of the result as it is
     _ratio: float = np.inf  # of the error of the result to what is asked
@@ -77,29 +79,29 @@ class ErrorController:
         found = self.estimate
         return (*self._notes, *((*found.run.notes, *found.notes) if found is not None else ()))
 
-    def start(self, effort: Effort) -> tuple[RunSample, Errors | None]:
-        """From a first effort to the result and its errors, None where they cannot be estimated."""
-        self.comparisons, self.next = self._compute_comparisons(effort), effort
+    def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
+        """From a first resolution to the result and its errors, None where they cannot be estimated."""
+        self.comparisons, self.next = self._compute_comparisons(resolution), resolution
         return self.proceed()
 
     def proceed(self) -> tuple[RunSample, Errors | None]:
         """The same from the next result on."""
         while self.next is not None:
-            effort = self.next
+            resolution = self.next
             try:
-                result = self._counted(self.result(effort))
+                result = self._counted(self.result(resolution))
             except ComputationError as error:
                 if self.estimate is None:
                     raise
                 return self.without_refinement(f"a finer run failed: {str(error).splitlines()[0]}")
             if self.estimate is not None:
-                stricter = effort.zones < self.estimate.run.effort.zones
+                stricter = resolution.zones < self.estimate.run.resolution.zones
                 self.estimate.update(result)
                 if stricter:
-                    self._renew_model_errors(self.estimate, effort)
+                    self._renew_model_errors(self.estimate, resolution)
             elif not self._first_estimate(result):
                 return result, None
-            self.next = self._next_effort()
+            self.next = self._next_resolution()
         assert self.estimate is not None
         errors = self.estimate.errors
         if self.asked is not None:
@@ -117,10 +119,12 @@ class ErrorController:
             self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
         return run, errors
 
-    def _compute_comparisons(self, effort: Effort) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
+    def _compute_comparisons(
+        self, resolution: Resolution
+    ) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
         """The runs to compare with; None: the first has failed."""
         found: list[RunSample | None] = []
-        for coarser in comparison_efforts(effort, self.moves):
+        for coarser in comparison_resolutions(resolution, self.moves):
             try:
                 same = not self.moves and len(found) == 1
                 coarser = replace(coarser, follow=not found)
@@ -158,17 +162,17 @@ class ErrorController:
         self.estimate, self.comparisons = estimate, None
         return True
 
-    def _renew_model_errors(self, estimate: Estimate, effort: Effort) -> None:
+    def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
         """Zones have become stricter: what they neglect now."""
-        coarser = comparison_efforts(effort, self.moves)[0]
+        coarser = comparison_resolutions(resolution, self.moves)[0]
         try:
             estimate.set_model_errors(self._counted(self.sample(replace(coarser, follow=True))))
         except ComputationError as error:
             text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
             self._notes.append(("error uncertain", text))
 
-    def _next_effort(self) -> Effort | None:
-        """The effort of the next result; None: what is asked is met, or more of it would not help."""
+    def _next_resolution(self) -> Resolution | None:
+        """The resolution of the next result; None: what is asked is met, or more of it would not help."""
         assert self.estimate is not None
         if self.asked is None:
             return None
@@ -181,7 +185,7 @@ class ErrorController:
         met = verdict.ratio <= 1.0 and not (run.unresolved and self.free.mesh)
         if met or hopeless or sum(self.runs) > MOST_CPU:
             return None
-        return refined(run.effort, verdict, self.free)
+        return refined(run.resolution, verdict, self.free)
 
     def _note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
@@ -197,7 +201,7 @@ class ErrorController:
     def checkpoint(self) -> Tree:
         """What it has found until now, as named arrays and plain values."""
         return {
-            "runs": np.array(self.runs), "next": self.next and effort_tree(self.next),
+            "runs": np.array(self.runs), "next": self.next and resolution_tree(self.next),
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
             "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
@@ -210,7 +214,7 @@ class ErrorController:
         outputs = len(output_times(scene)) + 1
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._notes = list(restored_notes(saved["notes"]))
-        self.next = effort_from(saved["next"], scene) if saved["next"] is not None else None
+        self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None
         if saved["coarse"] is not None:
             first, second, third = (x and restored_sample(x, scene, outputs) for x in saved["coarse"])
             self.comparisons = first, second, third

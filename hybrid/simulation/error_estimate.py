@@ -13,10 +13,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.model.resolution import Effort, first_effort
+from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.outputs.probes import output_points
 from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import effort_from, effort_tree
+from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
@@ -41,7 +41,7 @@ Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind 
 class RunSample:
     """What is compared of a run: how finely it was computed, and its outputs (nt, ...) by name."""
 
-    effort: Effort
+    resolution: Resolution
     values: Mapping[str, np.ndarray]
     cells: int  # of zones that move: base cells
     steps: int
@@ -66,7 +66,7 @@ class RunSample:
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        return {x.name: getattr(self, x.name) for x in fields(self)} | {"effort": effort_tree(self.effort)}
+        return {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
 
 
 @dataclass(frozen=True)
@@ -240,14 +240,14 @@ def _magnitude(error: np.ndarray, name: str) -> np.ndarray:
 
 def restored_sample(tree: Any, scene: Scene, outputs: int) -> RunSample:
     """A sample from a checkpoint; outputs: of the result.  ResultError or ValueError: it is none of this scene."""
-    blank = RunSample(first_effort(scene), {}, 1, 1, 0.0).checkpoint()
-    saved = matched(tree, blank | dict.fromkeys(("effort", "values", "model_error", "notes")), "run")
+    blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
+    saved = matched(tree, blank | dict.fromkeys(("resolution", "values", "model_error", "notes")), "run")
     if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
         raise ValueError("a run without cells, steps or outputs")
     count = _every(outputs, saved["every"]).size
     return RunSample(
         **saved | {
-            "effort": effort_from(saved["effort"], scene), "notes": restored_notes(saved["notes"]),
+            "resolution": resolution_from(saved["resolution"], scene), "notes": restored_notes(saved["notes"]),
             "values": _restored_outputs(saved["values"], scene, count),
             "model_error": _restored_outputs(saved["model_error"], scene, count),
         }

@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.mesh_grading import Grading, grading
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
 CELLS, STEPS, POINTS = 2.0, 4.0, 201
@@ -18,9 +18,9 @@ CELLS, STEPS, POINTS = 2.0, 4.0, 201
 MOST_PARTS = 24.0
 
 
-def survey_effort(effort: Effort) -> Effort:
+def survey_resolution(resolution: Resolution) -> Resolution:
     """How finely the pre-run is computed."""
-    return effort.coarser(CELLS, STEPS)
+    return resolution.coarser(CELLS, STEPS)
 
 
 def survey_grading(model: Model, s: Floats, run: Mapping[str, np.ndarray], rod_cell: Floats | None) -> Grading:

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from typing import TextIO
 
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
@@ -62,9 +62,9 @@ def listener_of(progress: bool | Listener) -> Listener | None:
     return StatusLine() if progress is True else progress or None
 
 
-def cost_of(effort: Effort, result: Effort) -> float:
+def cost_of(resolution: Resolution, result: Resolution) -> float:
     """Cost of a pass over that of the result: by steps, and half by cells, the other half being the same for all."""
-    return result.step / effort.step * 0.5 * (1.0 + effort.fineness / result.fineness)
+    return result.step / resolution.step * 0.5 * (1.0 + resolution.fineness / result.fineness)
 
 
 class ProgressReporter:
@@ -73,7 +73,7 @@ class ProgressReporter:
     def __init__(self, listener: Listener | None, duration: float) -> None:
         self._listener, self._duration = listener, duration
         self._expected: list[tuple[str, float]] = []  # name and cost of passes to come
-        self._result: Effort | None = None  # whose cost is 1
+        self._result: Resolution | None = None  # whose cost is 1
         self._name, self._run = RESULT, 0
         self._done, self._cost = 0.0, 0.0  # of passes that have ended, of the present one
         self._begin: float | None = None  # s of the clock, at the first report
@@ -88,14 +88,14 @@ class ProgressReporter:
         if close is not None:
             close()
 
-    def expect(self, passes: Sequence[tuple[str, Effort]], result: Effort) -> None:
-        """The passes to come, in their order, by name and effort; the cost of the result is the unit."""
+    def expect(self, passes: Sequence[tuple[str, Resolution]], result: Resolution) -> None:
+        """The passes to come, in their order, by name and resolution; the cost of the result is the unit."""
         self._result = result
-        self._expected = [(name, cost_of(effort, result)) for name, effort in passes]
+        self._expected = [(name, cost_of(resolution, result)) for name, resolution in passes]
 
-    def begin(self, name: str, effort: Effort) -> None:
+    def begin(self, name: str, resolution: Resolution) -> None:
         """A pass begins; those expected before it that did not take place are dropped."""
-        cost = cost_of(effort, self._result or effort)
+        cost = cost_of(resolution, self._result or resolution)
         names = [expected for expected, _ in self._expected]
         if name in names:
             del self._expected[: names.index(name) + 1]

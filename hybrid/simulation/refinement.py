@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from math import sqrt
 from typing import NamedTuple
 
-from hybrid.model.resolution import Asked, Effort
+from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.error_estimate import END_FORCES, Errors, RunSample
 
 # Part of what is asked that the next run aims at.
@@ -38,7 +38,7 @@ class Verdict:
     text: str
 
 
-def judge(asked: Asked, errors: Errors, run: RunSample) -> Verdict:
+def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
     """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met."""
     bounds: list[tuple[str, str, float]] = []
     if asked.position is not None:
@@ -46,8 +46,8 @@ def judge(asked: Asked, errors: Errors, run: RunSample) -> Verdict:
     for name in END_FORCES.values():
         if asked.tension is not None:
             bounds.append((name, "N", asked.tension))
-        if asked.of_pull is not None:
-            bounds.append((name, "N", asked.of_pull * run.largest_end_force))
+        if asked.of_end_force is not None:
+            bounds.append((name, "N", asked.of_end_force * run.largest_end_force))
     if asked.of_curvature is not None and "curvature" in run.values:
         bounds.append(("curvature", "1/m", asked.of_curvature * float(run.values["curvature"].max())))
     worst = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked")
@@ -64,12 +64,12 @@ def judge(asked: Asked, errors: Errors, run: RunSample) -> Verdict:
     return worst
 
 
-def refined(effort: Effort, verdict: Verdict, free: Free) -> Effort | None:
+def refined(resolution: Resolution, verdict: Verdict, free: Free) -> Resolution | None:
     """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
 
     Errors of mesh and step add, and cost grows with fineness over step: half of what is asked is for each.
     """
-    zones, model = effort.zones, verdict.model
+    zones, model = resolution.zones, verdict.model
     if free.zones and model > MOST_OF_MODEL:
         zones *= max(OF_MODEL / model, 1.0 / MOST_FINER)
         model = OF_MODEL
@@ -83,8 +83,8 @@ def refined(effort: Effort, verdict: Verdict, free: Free) -> Effort | None:
     least = 1.0 / MOST_FINER
     cells = min(max(sqrt(max(goal_mesh, 0.0) / mesh), least), 1.0) if mesh > 0.0 else 1.0
     steps = min(max(sqrt(max(goal_time, 0.0) / time), least), 1.0) if time > 0.0 else 1.0
-    if min(cells, steps) > 0.95 and zones == effort.zones:
+    if min(cells, steps) > 0.95 and zones == resolution.zones:
         if mesh == time == 0.0:
             return None
         cells, steps = (A_LITTLE, steps) if mesh >= time else (cells, A_LITTLE)
-    return replace(effort.coarser(cells, steps), zones=zones)
+    return replace(resolution.coarser(cells, steps), zones=zones)

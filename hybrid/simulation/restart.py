@@ -15,11 +15,11 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
 from hybrid.model.plan import output_interval
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import effort_from, refused
+from hybrid.simulation.restore import refused, resolution_from
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import open_result, opened
@@ -45,13 +45,13 @@ class Phase:
 class Remainder:
     """What is to be done: a scene, what changes later, and where to begin.
 
-    before: what was found before the run, of what it is part of; {}: nothing, it begins with `effort`.  anew: from
+    before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
     t = 0, not from the checkpoint; reached: s, where it begins.
     """
 
     scene: Scene
     changes: tuple[Phase, ...]
-    effort: Effort
+    resolution: Resolution
     before: Tree
     anew: bool
     reached: float
@@ -66,14 +66,14 @@ def remainder(
     """
     scene, changes, status, before, point = _found(path)
     with refused(path):
-        effort = effort_from(point.effort, scene)
+        resolution = resolution_from(point.resolution, scene)
     if start is not None and not settings:
         raise _refused("from", f"{start:g} s", "a change from then on", "name it with --set KEY=VALUE")
     if until is None and not settings:
         if status == "complete" and not before:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return Remainder(scene, changes, effort, before, False, point.t)
+        return Remainder(scene, changes, resolution, before, False, point.t)
     if until is not None:
         scene, changes = _longer(scene, changes, until, point.t)
     anew = False
@@ -84,11 +84,11 @@ def remainder(
         end = changed.require_time().duration
         if until is not None and end != until:
             raise _refused("time.duration", f"{end:g} s", f"{until:g} s, as until says, or nothing", "say it once")
-        _check(last, changed, effort, begin, end)
+        _check(last, changed, resolution, begin, end)
         if end != scene.require_time().duration:
             scene, changes = _longer(scene, changes, end, point.t)
         changes, anew = (*changes, Phase(begin, changed)), begin < point.t
-    return Remainder(scene, changes, effort, {}, anew, 0.0 if anew else point.t)
+    return Remainder(scene, changes, resolution, {}, anew, 0.0 if anew else point.t)
 
 
 def changes_text(changes: Sequence[Phase]) -> str:
@@ -131,7 +131,7 @@ def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float
     return other(scene), tuple(Phase(x.t, other(x.scene)) for x in changes)
 
 
-def _check(last: Phase, changed: Scene, effort: Effort, begin: float, end: float) -> None:
+def _check(last: Phase, changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
     if not last.t <= begin < end:
         fix = "a later end as well, --until T" if begin == end else ""
@@ -141,8 +141,8 @@ def _check(last: Phase, changed: Scene, effort: Effort, begin: float, end: float
             fix = "run the changed scene from its start"
             raise _refused(where, value, f"one of {', '.join(MAY_CHANGE)}: a run in progress keeps the rest", fix)
     check_motions(changed)
-    model = build(changed, effort)
-    before, after = build(last.scene, effort).ends, model.ends
+    model = build(changed, resolution)
+    before, after = build(last.scene, resolution).ends, model.ends
     after.take_frames(before)
     for k, name in enumerate(("start", "end")):
         held = bool(before.values.held[k])

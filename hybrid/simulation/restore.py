@@ -25,7 +25,7 @@ from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plane import in_space, planar
-from hybrid.model.resolution import Effort, first_effort
+from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.zone_switching import Zoning, manager_for, on_layout
@@ -64,17 +64,17 @@ def refused(source: Path) -> Iterator[None]:
 # --- how finely ---------------------------------------------------------------------------------
 
 
-def effort_tree(effort: Effort) -> Tree:
-    """An effort for a checkpoint."""
-    tree = {x.name: getattr(effort, x.name) for x in fields(effort)}
-    grading = effort.grading
+def resolution_tree(resolution: Resolution) -> Tree:
+    """An resolution for a checkpoint."""
+    tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
+    grading = resolution.grading
     return tree | {"grading": grading and {"s": grading.s, "density": grading.density}}
 
 
-def effort_from(tree: Any, scene: Scene) -> Effort:
-    """The effort again.  ResultError or ValueError: it is none for this scene."""
-    first = first_effort(scene)
-    saved = matched(tree, effort_tree(first) | {"grading": None}, "effort")
+def resolution_from(tree: Any, scene: Scene) -> Resolution:
+    """The resolution again.  ResultError or ValueError: it is none for this scene."""
+    first = first_resolution(scene)
+    saved = matched(tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones"):
         asked, is_ = getattr(first, name), saved[name]
         if (asked is None) != (is_ is None):
@@ -91,7 +91,7 @@ def effort_from(tree: Any, scene: Scene) -> Effort:
             raise ValueError("cells that no mesh has")
     if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST):
         raise ValueError("cells that no mesh has")
-    return Effort(**saved | {"grading": grading})
+    return Resolution(**saved | {"grading": grading})
 
 
 # --- the model ----------------------------------------------------------------------------------
@@ -104,7 +104,7 @@ def mesh_tree(model: Model) -> Tree:
     return {"s": model.line.s, "zones": [[x.kind, x.s_a, x.s_b] for x in model.zones]}
 
 
-def restored_model(scene: Scene, effort: Effort, saved: Mapping[str, Any]) -> tuple[Model, Model]:
+def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any]) -> tuple[Model, Model]:
     """The model of a checkpoint; before it, one of the same mesh whose zones are all rod."""
     mesh, layout = saved["mesh"], None
     if isinstance(scene.model, AdaptiveModel):
@@ -114,7 +114,7 @@ def restored_model(scene: Scene, effort: Effort, saved: Mapping[str, Any]) -> tu
         fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
         if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= MOST_PARTS):
             raise ValueError("base cells that no mesh has")
-        first = build(scene, effort, layout._replace(rod=np.ones_like(layout.rod)))
+        first = build(scene, resolution, layout._replace(rod=np.ones_like(layout.rod)))
         model = on_layout(first, layout)
     else:
         s, zones = matched(mesh, {"s": np.zeros(0), "zones": None}, "mesh").values()
@@ -123,7 +123,7 @@ def restored_model(scene: Scene, effort: Effort, saved: Mapping[str, Any]) -> tu
         known = all(x.kind in ("rod", "catenary") and x.s_a < x.s_b for x in zones)
         if not (known and zones and {x.s_b for x in zones} <= set(s.tolist()) and zones[-1].s_b == s[-1]):
             raise ValueError("zones that no line has")
-        first = model = build(scene, effort, (s, zones))
+        first = model = build(scene, resolution, (s, zones))
     plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None
     line = in_space(model.line) if plane is None else planar(model.line, plane)
     return first, replace(model, line=line, plane=plane)
@@ -136,7 +136,7 @@ def _check_nodes(s: np.ndarray, scene: Scene) -> None:
 
 
 def restored_parts(
-    scenes: Sequence[Scene], effort: Effort, saved: Mapping[str, Any], criterion: UserCriterion | None
+    scenes: Sequence[Scene], resolution: Resolution, saved: Mapping[str, Any], criterion: UserCriterion | None
 ) -> tuple[Model, Zoning | None, Correction | None]:
     """What a motion consists of, as new: its model, what moves its zones, what follows its model error.
 
@@ -146,15 +146,15 @@ def restored_parts(
     if not 0 <= changes < len(scenes):
         raise ValueError(f"change {changes} of {len(scenes) - 1}")
     scene, zoning = scenes[changes], None
-    first, model = restored_model(scene, effort, saved)
+    first, model = restored_model(scene, resolution, saved)
     wanted = scene.model
     if isinstance(wanted, AdaptiveModel):
         assert first.layout is not None and model.layout is not None
         # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
-        start = first if not changes else build(scenes[0], effort, first.layout)
-        step = effort.step if effort.local is None else 0.0
+        start = first if not changes else build(scenes[0], resolution, first.layout)
+        step = resolution.step if resolution.local is None else 0.0
         given = given_zones(scene, first.layout)
-        manager = manager_for(start, effort.zones, wanted.hold_time, given, step, criterion)
+        manager = manager_for(start, resolution.zones, wanted.hold_time, given, step, criterion)
         manager.moments = model.ends.moments
         manager.loaded = bool(manager.moments.any())
         manager.follow(model.layout)

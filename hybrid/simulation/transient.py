@@ -20,14 +20,14 @@ from hybrid.kernels.state import Floats, State, blank_state
 from hybrid.model.build import Model, build
 from hybrid.model.plan import step_ends
 from hybrid.model.plane import in_space, planar
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Stop, Watch
 from hybrid.simulation.plane_monitor import Flat
-from hybrid.simulation.restore import effort_tree, mesh_tree, program
+from hybrid.simulation.restore import mesh_tree, program, resolution_tree
 from hybrid.simulation.snapshot import write_snapshot
 from hybrid.simulation.zone_switching import Zoning, on_layout
 from hybrid.solve.plane_stability import Push
@@ -53,7 +53,7 @@ class Motion:
         self,
         scene: Scene,
         model: Model,
-        effort: Effort,
+        resolution: Resolution,
         observer: Observer,
         recorder: Recorder | Notebook,
         target: Path | io.BytesIO | None,
@@ -67,8 +67,10 @@ class Motion:
         self.correction, self._beyond = correction, -np.inf
         self.stepper = self._new_stepper(floor)
         self.watch = Watch(recorder, model)
-        self.zoning, self.effort, self._stale = zoning, effort, False
-        self.control = None if effort.local is None else Controller(effort.local, effort.step, effort.shortest)
+        self.zoning, self.resolution, self._stale = zoning, resolution, False
+        self.control = (
+            None if resolution.local is None else Controller(resolution.local, resolution.step, resolution.shortest)
+        )
         self.t, self.steps, self.iterations = 0.0, 0, 0
         self.changes = 0  # of the scene, so far
         self.dt = 0.0  # s, of the last step; 0 after a start
@@ -169,7 +171,12 @@ class Motion:
 
     def _content(self) -> dict[str, Any]:
         asks = self.zoning is not None and self.zoning.manager.user is not None
-        return {"program": program(), "asks": asks, "effort": effort_tree(self.effort), "state": self.checkpoint()}
+        return {
+            "program": program(),
+            "asks": asks,
+            "resolution": resolution_tree(self.resolution),
+            "state": self.checkpoint(),
+        }
 
     def _on(self, model: Model) -> None:
         """Go on with another line on the same nodes: in a plane, or in space."""
@@ -224,7 +231,7 @@ class Motion:
         """Where steps should end on the way to `stop`."""
         assert self.scene.time is not None
         if self.control is None:
-            yield from step_ends(self.t, stop, self.effort.step)
+            yield from step_ends(self.t, stop, self.resolution.step)
             return
         while self.t < stop:
             self.control.most = self._most
@@ -278,7 +285,7 @@ class Motion:
     def change(self, scene: Scene) -> None:
         """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
         old, flat = self.model, self.flat
-        model = build(scene, self.effort, old.mesh)
+        model = build(scene, self.resolution, old.mesh)
         if self.zoning is not None:
             model = on_layout(model, self.zoning.manager.layout)
             self.zoning.settle_joints(self.state)
@@ -450,7 +457,7 @@ class Motion:
     def _ignite(self) -> None:
         assert self.scene.time is not None
         ends = self.model.ends
-        acceleration = ends.acceleration(self.t, 1e-3 * self.effort.step)
+        acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
         self._stored = 0.0
         taken = self.stepper.ignite(self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state)
         self.dt = 0.0

@@ -29,7 +29,7 @@ class Checkpoint(NamedTuple):
 
     number: it counts up; t: s; program: which wrote it; asks: whether it needs a user's criterion; files: digests of
     the files that it reads, by path; rows: of every table of the file that belong to it; happened: events by kind,
-    those not written included; zones: (kind, s_a, s_b) of the last output; effort, state: how finely it is computed
+    those not written included; zones: (kind, s_a, s_b) of the last output; resolution, state: how finely it is computed
     and where it is, for whoever computes.
     """
 
@@ -41,7 +41,7 @@ class Checkpoint(NamedTuple):
     rows: dict[str, int]
     happened: dict[str, int]
     zones: list[tuple[str, float, float]]
-    effort: Tree
+    resolution: Tree
     state: Tree
 
 
@@ -94,7 +94,7 @@ def read_checkpoint(file: h5py.File) -> Checkpoint:
 
 def _checkpoint(tree: Tree) -> Checkpoint:
     template = {"number": 0, "t": 0.0, "program": "", "asks": False}
-    free = ("files", "rows", "happened", "zones", "effort", "state")
+    free = ("files", "rows", "happened", "zones", "resolution", "state")
     point = Checkpoint(**matched(tree, template | dict.fromkeys(free)))
     for name in ("rows", "happened"):
         table = getattr(point, name)

@@ -16,7 +16,7 @@ import numpy as np
 import hybrid.studies.peers as others
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Asked, asked
+from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
 from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.read import SceneLike, as_scene, validate_scene
@@ -140,10 +140,10 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     return notes if dropped else notes[1:]
 
 
-def _asked(scene: Scene, accuracy: str, where: str) -> Asked:
+def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
     """An accuracy in numbers; SceneError if it is none."""
     try:
-        found = asked(validate_scene(rung_data(scene, scene.model.kind, accuracy)))
+        found = requested_accuracy(validate_scene(rung_data(scene, scene.model.kind, accuracy)))
     except SceneError as error:
         bad = [c for c in error.complaints if c.where.startswith("accuracy")] or error.complaints
         raise SceneError([replace(c, where=where, line=None, column=None) for c in bad]) from None
@@ -168,8 +168,8 @@ def _coarser(accuracy: str) -> str:
     )
 
 
-def _must_be_finer(goal: Asked, text: str, ladder: Sequence[Asked]) -> None:
-    for name in ("position", "tension", "of_pull"):
+def _must_be_finer(goal: RequestedAccuracy, text: str, ladder: Sequence[RequestedAccuracy]) -> None:
+    for name in ("position", "tension", "of_end_force"):
         finest = min((x for x in (getattr(each, name) for each in ladder) if x is not None), default=None)
         mine = getattr(goal, name)
         if finest is not None and mine is not None and mine > LEAST_FINER * finest:
@@ -177,10 +177,10 @@ def _must_be_finer(goal: Asked, text: str, ladder: Sequence[Asked]) -> None:
             raise SceneError([Complaint("reference", text, "at most half of the finest accuracy of the ladder", fix)])
 
 
-def _bounds(want: Asked, largest: float | None) -> tuple[float | None, float | None]:
+def _bounds(want: RequestedAccuracy, largest: float | None) -> tuple[float | None, float | None]:
     """What is asked for in m and N; the tighter one of two for the pull."""
     pulls = [want.tension] if want.tension is not None else []
-    pulls += [want.of_pull * largest] if want.of_pull is not None and largest else []
+    pulls += [want.of_end_force * largest] if want.of_end_force is not None and largest else []
     return want.position, min(pulls, default=None)
 
 

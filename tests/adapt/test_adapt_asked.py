@@ -251,3 +251,9 @@ def test_the_model_of_a_scene_that_does_not_say(section, kind):
     )
     assert what.model.kind == kind
     assert hybrid.run(what).status == "complete"
+
+
+def test_the_former_name_of_what_a_criterion_sees_still_works():
+    with pytest.warns(DeprecationWarning, match=r"hybrid\.Look is now hybrid\.NodeState"):
+        former = hybrid.Look  # type: ignore[attr-defined]
+    assert former is hybrid.NodeState

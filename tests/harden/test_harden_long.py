@@ -40,7 +40,7 @@ def _scene(steps: int) -> hybrid.Scene:
     )  # fmt: skip
 
 
-def comes_and_goes(look: hybrid.Look) -> np.ndarray:
+def comes_and_goes(look: hybrid.NodeState) -> np.ndarray:
     """A rod in the middle, for half of every period."""
     middle = np.abs(look.s - 5.0) < 2.0
     return np.where(middle & (look.t % PERIOD < 0.5 * PERIOD), 2.0, 0.1)

@@ -1,4 +1,4 @@
-"""Accuracy that is asked for: error figures against the truth, efforts that follow, and what cannot be told."""
+"""Accuracy that is asked for: error figures against the truth, resolutions that follow, and what cannot be told."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ import pytest
 import hybrid
 from hybrid.errors import SceneError
 from hybrid.model.mesh_grading import GROWTH, grading
-from hybrid.model.resolution import Asked, Effort, first_effort, wants_errors
+from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate, RunSample
@@ -73,51 +73,55 @@ def test_steps_that_follow_need_damping():
         swinging(time={"duration": 1.0, "rho_inf": 1.0})
 
 
-# --- efforts -------------------------------------------------------------------------------------
+# --- resolutions -------------------------------------------------------------------------------------
 
 
 def test_first_efforts():
     """A scene that leaves its steps open asks for 1 %; finer asks are finer; what the scene says stands."""
-    usual, fine = first_effort(swinging()), first_effort(swinging(accuracy="0.1%"))
+    usual, fine = first_resolution(swinging()), first_resolution(swinging(accuracy="0.1%"))
     assert wants_errors(swinging())
-    assert usual == first_effort(swinging(accuracy="1%"))
+    assert usual == first_resolution(swinging(accuracy="1%"))
     assert fine.fineness > 2.0 * usual.fineness and fine.local < 0.1 * usual.local
     fixed = swinging(time={"duration": 6.0, "step": 0.02}, mesh={"cells": 30}, accuracy="0.1%")
-    assert first_effort(fixed).local is None and first_effort(fixed).step == 0.02 and first_effort(fixed).fineness == 1
+    assert (
+        first_resolution(fixed).local is None
+        and first_resolution(fixed).step == 0.02
+        and first_resolution(fixed).fineness == 1
+    )
     plain = swinging(time={"duration": 6.0, "step": 0.02})
-    assert not wants_errors(plain) and first_effort(plain).local is None
-    assert first_effort(swinging(time={"duration": 6.0, "tolerance": 1e-7})).local == 1e-7
+    assert not wants_errors(plain) and first_resolution(plain).local is None
+    assert first_resolution(swinging(time={"duration": 6.0, "tolerance": 1e-7})).local == 1e-7
 
 
-def test_coarser_efforts():
-    effort = Effort(2.0, 0.1, 1e-6, 1e-3)
-    other = effort.coarser(2.0, 2.0)
+def test_coarser_resolutions():
+    resolution = Resolution(2.0, 0.1, 1e-6, 1e-3)
+    other = resolution.coarser(2.0, 2.0)
     assert (other.fineness, other.local, other.step, other.every) == (1.0, 8e-6, 0.2, 2)
-    assert Effort(2.0, 0.1, None, 1e-3).coarser(1.0, 2.0).step == 0.2
+    assert Resolution(2.0, 0.1, None, 1e-3).coarser(1.0, 2.0).step == 0.2
 
 
 # --- estimates, by pure functions ----------------------------------------------------------------
 
 
-def sample(effort: Effort, steps: int, order: float, every: int = 1, noise: float = 0.0) -> RunSample:
+def sample(resolution: Resolution, steps: int, order: float, every: int = 1, noise: float = 0.0) -> RunSample:
     """A run whose error is h^order + 0.5 dt^order in position and pull, of known sign, at 9 outputs."""
     t = np.linspace(0.0, 1.0, 9)
     keep = np.unique(np.append(np.arange(0, 9, every), 8))
-    h, dt = 1.0 / effort.fineness, 100.0 / steps
+    h, dt = 1.0 / resolution.fineness, 100.0 / steps
     wrong = (0.01 * h**order + 0.005 * dt**order) * (1.0 + t) + noise
     position = np.zeros((9, 4, 3))
     position[..., 2] = (np.sin(t) + wrong)[:, None]
     values = {"position": position[keep], "reaction_end": (np.cos(t) + wrong)[keep, None] * [0.0, 0.0, 1.0]}
-    return RunSample(effort, values, round(1000 * effort.fineness), steps, 0.0, every)
+    return RunSample(resolution, values, round(1000 * resolution.fineness), steps, 0.0, every)
 
 
 @pytest.mark.parametrize("order", [1.25, 1.4, 2.0])
 def test_an_error_of_one_order_is_found_exactly(order):
-    effort = Effort(1.0, 0.1, None, 1e-3)
-    final = sample(effort, 100, order)
-    coarse = sample(effort.coarser(2, 2), 50, order, 2)
-    rough = sample(effort.coarser(2, 4), 25, order, 4)
-    coarsest = sample(effort.coarser(4, 4), 25, order, 4)
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    final = sample(resolution, 100, order)
+    coarse = sample(resolution.coarser(2, 2), 50, order, 2)
+    rough = sample(resolution.coarser(2, 4), 25, order, 4)
+    coarsest = sample(resolution.coarser(4, 4), 25, order, 4)
     estimate = Estimate(final, coarse, rough, coarsest)
     assert estimate.order["position"] == pytest.approx(order, abs=1e-6)
     found = estimate.errors
@@ -125,7 +129,7 @@ def test_an_error_of_one_order_is_found_exactly(order):
     assert found.largest("mesh", "position") == pytest.approx(0.02, rel=1e-6)
     assert found.largest("time", "position") == pytest.approx(0.01, rel=1e-6)
     assert found.largest("total", "end_force_end") == pytest.approx(0.03, rel=1e-6)
-    better = sample(Effort(2.5, 0.03, None, 1e-3), 300, order)
+    better = sample(Resolution(2.5, 0.03, None, 1e-3), 300, order)
     estimate.update(better)
     assert estimate.errors.largest("mesh", "position") == pytest.approx(0.02 / 2.5**order, rel=1e-6)
     assert estimate.errors.largest("time", "position") == pytest.approx(0.01 / 3.0**order, rel=1e-6)
@@ -133,17 +137,17 @@ def test_an_error_of_one_order_is_found_exactly(order):
 
 def test_orders_are_bounded():
     """Runs that do not converge count as of the least order: the figure is most of what the last refinement has changed."""
-    effort = Effort(1.0, 0.1, None, 1e-3)
-    runs = [sample(effort, 100, 2.0, 1, 0.0), sample(effort.coarser(2, 2), 50, 2.0, 2, 0.5)]
-    runs += [sample(effort.coarser(2, 4), 25, 2.0, 4, 0.5), sample(effort.coarser(4, 4), 25, 2.0, 4, 0.3)]
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    runs = [sample(resolution, 100, 2.0, 1, 0.0), sample(resolution.coarser(2, 2), 50, 2.0, 2, 0.5)]
+    runs += [sample(resolution.coarser(2, 4), 25, 2.0, 4, 0.5), sample(resolution.coarser(4, 4), 25, 2.0, 4, 0.3)]
     estimate = Estimate(*runs)
     assert estimate.order["position"] == ORDERS[0]
     assert estimate.errors.largest("total", "position") > 0.3
 
 
 def test_without_the_rougher_runs_an_order_in_between_is_taken():
-    effort = Effort(1.0, 0.1, None, 1e-3)
-    estimate = Estimate(sample(effort, 100, 2.0), sample(effort.coarser(2, 2), 50, 2.0, 2), None, None)
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    estimate = Estimate(sample(resolution, 100, 2.0), sample(resolution.coarser(2, 2), 50, 2.0, 2), None, None)
     assert ORDERS[0] < estimate.order["position"] < ORDERS[1]
     assert 1.0 < estimate.errors.largest("total", "position") / 0.03 < 2.0
     assert "time" not in estimate.errors.fields
@@ -152,24 +156,26 @@ def test_without_the_rougher_runs_an_order_in_between_is_taken():
 def test_judging_and_refining():
     errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
                      "total": {"position": np.full((2, 3), 0.4), "end_force_end": np.full(2, 1.0)}})  # fmt: skip
-    effort = Effort(1.0, 0.1, 1e-3, 1e-3)
-    run = RunSample(effort, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
-    verdict = judge(Asked(0.1, None, None), errors, run)
+    resolution = Resolution(1.0, 0.1, 1e-3, 1e-3)
+    run = RunSample(resolution, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
+    verdict = judge(RequestedAccuracy(0.1, None, None), errors, run)
     assert (verdict.ratio, verdict.mesh, verdict.time) == pytest.approx((4.0, 3.0, 1.0))
-    better = refined(effort, verdict, Free(True, True, False))
+    better = refined(resolution, verdict, Free(True, True, False))
     assert better is not None and better.fineness > 1.5 and better.local < 1e-3
-    assert refined(effort, verdict, Free(False, False, False)) is None
-    assert refined(effort, verdict, Free(False, True, False)) is None  # the mesh alone is wrong by more than is asked
-    only_steps = refined(effort, Verdict(1.5, 0.4, 1.1, 0.0, ""), Free(False, True, False))
+    assert refined(resolution, verdict, Free(False, False, False)) is None
+    assert (
+        refined(resolution, verdict, Free(False, True, False)) is None
+    )  # the mesh alone is wrong by more than is asked
+    only_steps = refined(resolution, Verdict(1.5, 0.4, 1.1, 0.0, ""), Free(False, True, False))
     assert only_steps is not None and only_steps.fineness == 1.0 and only_steps.local < 1e-3
-    assert judge(Asked(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
+    assert judge(RequestedAccuracy(None, None, 0.1), errors, run).ratio == pytest.approx(1.0 / (0.1 * np.sqrt(300.0)))
 
 
 def test_the_model_is_made_better_when_it_is_what_is_wrong():
-    better = refined(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, True))
+    better = refined(Resolution(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, True))
     assert better is not None and better.zones < 0.5e-3
     assert better.fineness < 1.5  # cells and steps are not to blame
-    assert refined(Effort(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, False)) is None
+    assert refined(Resolution(1.0, 0.1, 1e-3, 1e-3), Verdict(2.0, 0.05, 0.05, 1.9, ""), Free(True, True, False)) is None
 
 
 # --- cells ---------------------------------------------------------------------------------------
@@ -310,9 +316,9 @@ def test_steps_see_what_a_motion_file_does(tmp_path):
         "end": {"kind": "pinned", "position": [1.5, 0, 0], "motion": {"file": str(tmp_path / "pulse.csv")}},
     }
     scene = swinging(ends=ends, time={"duration": 100.0}, output={"every": 10.0}, accuracy="1%")
-    assert first_effort(scene).step < 0.2
+    assert first_resolution(scene).step < 0.2
     slow = swinging()
-    assert first_effort(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
+    assert first_resolution(slow).step == pytest.approx(2.0 / 12)  # a twelfth of the period of the heave
 
 
 def test_a_finer_run_is_no_other_result(tmp_path):
@@ -334,12 +340,12 @@ def test_a_finer_run_that_fails_costs_nothing(tmp_path, monkeypatch):
 
     record, count = Case.record, []
 
-    def failing(self, effort, target, control):
-        count.append(effort)
+    def failing(self, resolution, target, control):
+        count.append(resolution)
         if len(count) > 1:
             target.with_suffix(".snapshot.npz").write_bytes(b"as a motion that fails leaves one")
             raise ComputationError(Outcome.NOT_CONVERGED, 1.0, 0.5, "made up")
-        return record(self, effort, target, control)
+        return record(self, resolution, target, control)
 
     monkeypatch.setattr(Case, "record", failing)
     result = hybrid.run(swinging(accuracy="0.01 N"), tmp_path / "run.h5")
@@ -396,11 +402,11 @@ def test_a_finer_run_that_is_stopped_costs_nothing(tmp_path, monkeypatch):
 
     record, count = Case.record, []
 
-    def stopping(self, effort, target, control):
-        count.append(effort)
+    def stopping(self, resolution, target, control):
+        count.append(resolution)
         if len(count) > 1:
             raise KeyboardInterrupt
-        return record(self, effort, target, control)
+        return record(self, resolution, target, control)
 
     monkeypatch.setattr(Case, "record", stopping)
     with pytest.raises(KeyboardInterrupt):
@@ -426,9 +432,18 @@ def made_up(notes=(), model=(), bound=0.0, fineness=1.0, steps=100):
     """A run that says something of itself, whose position is off by 1/fineness."""
     position = np.full((9, 4, 3), 0.01 / fineness**2)
     model_error = {"position": np.full((9, 4), model)} if model else {}
-    effort = Effort(fineness, 0.1, 1e-6, 1e-3)
+    resolution = Resolution(fineness, 0.1, 1e-6, 1e-3)
     return RunSample(
-        effort, {"position": position}, round(100 * fineness), steps, 0.0, 1, False, model_error, bound, tuple(notes)
+        resolution,
+        {"position": position},
+        round(100 * fineness),
+        steps,
+        0.0,
+        1,
+        False,
+        model_error,
+        bound,
+        tuple(notes),
     )
 
 
@@ -439,9 +454,13 @@ def test_notes_and_model_error_are_of_the_runs_that_count():
     after = made_up((), 0.0005, 0.1, 4.5, 450)
     comparisons = iter([before, made_up(fineness=0.5, steps=25), made_up(fineness=0.25, steps=25), after])
     control = ErrorController(
-        Asked(0.005, None, None), Free(True, True, True), True, lambda _: next(comparisons), lambda _: next(said)
+        RequestedAccuracy(0.005, None, None),
+        Free(True, True, True),
+        True,
+        lambda _: next(comparisons),
+        lambda _: next(said),
     )
-    final, errors = control.start(Effort(1.0, 0.1, 1e-6, 1e-3))
+    final, errors = control.start(Resolution(1.0, 0.1, 1e-6, 1e-3))
     assert final.cells == 900 and len(control.runs) == 6
     assert errors.largest("model", "position") == 0.0005
     assert control.notes == ()

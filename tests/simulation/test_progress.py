@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 import hybrid
-from hybrid.model.resolution import Effort
+from hybrid.model.resolution import Resolution
 from hybrid.simulation import progress as module
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
 
@@ -50,26 +50,26 @@ def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress]) -> Non
     assert "run 1" not in heard[0].text
 
 
-def reporter(listener: Any) -> tuple[ProgressReporter, Effort]:
-    made, effort = ProgressReporter(listener, 10.0), Effort(1.0, 0.1, None, 1e-3)
-    return made, effort
+def reporter(listener: Any) -> tuple[ProgressReporter, Resolution]:
+    made, resolution = ProgressReporter(listener, 10.0), Resolution(1.0, 0.1, None, 1e-3)
+    return made, resolution
 
 
 def test_passes_that_did_not_take_place_are_dropped(heard: list[Progress]) -> None:
-    made, effort = reporter(heard.append)
-    made.expect([(ESTIMATION, effort.coarser(2, 2))] * 3 + [(RESULT, effort)], effort)
-    made.begin(ESTIMATION, effort.coarser(2, 2))  # it fails, and the others are not tried
-    made.begin(RESULT, effort)
+    made, resolution = reporter(heard.append)
+    made.expect([(ESTIMATION, resolution.coarser(2, 2))] * 3 + [(RESULT, resolution)], resolution)
+    made.begin(ESTIMATION, resolution.coarser(2, 2))  # it fails, and the others are not tried
+    made.begin(RESULT, resolution)
     made(5.0, 1, 1, ())
     assert (heard[-1].run, heard[-1].runs, heard[-1].name) == (2, 2, RESULT)
 
 
 def test_a_refinement_is_added_when_it_begins(heard: list[Progress]) -> None:
-    made, effort = reporter(heard.append)
-    made.expect([(RESULT, effort)], effort)
-    made.begin(RESULT, effort)
+    made, resolution = reporter(heard.append)
+    made.expect([(RESULT, resolution)], resolution)
+    made.begin(RESULT, resolution)
     made(10.0, 100, 1, (), finished=True)
-    made.begin(REFINEMENT, effort.coarser(1.0, 0.5))
+    made.begin(REFINEMENT, resolution.coarser(1.0, 0.5))
     made(0.0, 1, 1, ())
     assert (heard[-1].run, heard[-1].runs) == (2, 2)
     assert heard[0].fraction == 1.0 and heard[-1].fraction == pytest.approx(1 / 3)
@@ -79,8 +79,8 @@ def test_a_refinement_is_added_when_it_begins(heard: list[Progress]) -> None:
 def test_reports_come_about_ten_times_a_second(monkeypatch: pytest.MonkeyPatch) -> None:
     now, heard = [0.0], []
     monkeypatch.setattr(module.clock, "perf_counter", lambda: now[0])
-    made, effort = reporter(heard.append)
-    made.begin(RESULT, effort)
+    made, resolution = reporter(heard.append)
+    made.begin(RESULT, resolution)
     for k in range(1, 101):
         now[0] = 0.01 * k
         made(0.05 * k, k, 2, ())
