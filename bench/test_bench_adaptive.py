@@ -75,14 +75,14 @@ def changes(result: hybrid.Result) -> list[Any]:
 def test_adaptive_random(monkeypatch: pytest.MonkeyPatch) -> None:
     """200 seeds: all finish, no step with a catenary without tension, and the distance to all rod over the tolerance."""
     lowest = [np.inf]
-    settle = zoning.Zoning.settle
+    settle = zoning.ZoneSwitching.book_step
 
-    def watched(zones: zoning.Zoning, *what: Any) -> Any:
+    def watched(zones: zoning.ZoneSwitching, *what: Any) -> Any:
         state, line = what[4], zones.model.line
         lowest[0] = min(lowest[0], float(np.min(state.T, where=line.spin == 0, initial=np.inf)))
         return settle(zones, *what)
 
-    monkeypatch.setattr(zoning.Zoning, "settle", watched)  # every accepted step goes through it
+    monkeypatch.setattr(zoning.ZoneSwitching, "book_step", watched)  # every accepted step goes through it
     ratios, ratio_cpu, worst = [], [], []
     for seed in range(200):
         kind, text = random_scene(seed)
@@ -142,9 +142,9 @@ class Watched:
 
     def __init__(self, monkeypatch: pytest.MonkeyPatch) -> None:
         self.rows: list[tuple[float, float, float, float]] = []
-        switch = zoning.Zoning.switch
+        switch = zoning.ZoneSwitching.switch
 
-        def watched(manager: zoning.Zoning, *what: Any) -> Any:
+        def watched(manager: zoning.ZoneSwitching, *what: Any) -> Any:
             line, state = manager.model.line, what[3]
             m, p = line.mass.sum(), line.mass @ state.v
             speed = line.mass @ np.linalg.norm(state.v, axis=1)
@@ -155,7 +155,7 @@ class Watched:
             self.rows.append((true, float(abs(new.line.mass.sum() - m)) / m, moved, booked))
             return out
 
-        monkeypatch.setattr(zoning.Zoning, "switch", watched)
+        monkeypatch.setattr(zoning.ZoneSwitching, "switch", watched)
 
 
 SWITCHING = ("s_tether", "touchdown", "laying", "slack_on_seabed", "irregular_sea")
@@ -232,7 +232,7 @@ def test_adaptive_share(monkeypatch: pytest.MonkeyPatch) -> None:
     calls = dict.fromkeys(spent, 0)
 
     def timed(name: str, part: str) -> None:
-        inner = getattr(zoning.Zoning, name)
+        inner = getattr(zoning.ZoneSwitching, name)
 
         def outer(*what: Any) -> Any:
             begin = time.process_time()
@@ -240,11 +240,11 @@ def test_adaptive_share(monkeypatch: pytest.MonkeyPatch) -> None:
                 return inner(*what)
             finally:
                 spent[part] += time.process_time() - begin
-                calls[part] += name != "prepare"
+                calls[part] += name != "prepare_step"
 
-        monkeypatch.setattr(zoning.Zoning, name, outer)
+        monkeypatch.setattr(zoning.ZoneSwitching, name, outer)
 
-    for name, part in (("prepare", "watch"), ("weigh", "watch"), ("settle", "plan"), ("switch", "remap")):
+    for name, part in (("prepare_step", "watch"), ("weigh", "watch"), ("book_step", "plan"), ("switch", "remap")):
         timed(name, part)
     print(
         "\npart of the CPU time of the loop    watching   planning, blending   remapping   together; us a step, a step, a switch; a whole step"

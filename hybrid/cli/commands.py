@@ -91,12 +91,12 @@ def resume(
 ) -> None:  # fmt: skip
     """Go on with a run that was stopped, beyond its end, or with other loads."""
     with session(as_json, quiet) as console:
-        from hybrid.simulation.restart import remainder
+        from hybrid.simulation.restart import remaining_run
 
         console.source = str(result)
         target, changed = console.will_write(output or result), settings or []
         picture = picture_beside(target, plot)
-        left = remainder(result.resolve(), until, changed, start)
+        left = remaining_run(result.resolve(), until, changed, start)
         cold = console.compiling(_kernels(left.scene))
         begin = clock.perf_counter()
         with console.progress() as tell:

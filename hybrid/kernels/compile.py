@@ -30,7 +30,9 @@ class _Kernel(CPUDispatcher):
 class _Inner(_Kernel):
     def __call__(self, *args: Any, **named: Any) -> Any:
         """There is no entry for Python: numba would jump to address 0."""
-        raise TypeError(f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python")
+        raise TypeError(
+            f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python"
+        )
 
 
 def kernel(function: Callable[..., Any]) -> Any:

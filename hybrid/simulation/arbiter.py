@@ -19,7 +19,7 @@ from hybrid.outputs.probes import PROBES, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.shooting import ShootingState, simulate, static
-from hybrid.simulation.snapshot import write_snapshot
+from hybrid.simulation.failure import write_snapshot
 from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder

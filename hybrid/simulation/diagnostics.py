@@ -16,9 +16,8 @@ from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.newton import lowest, sharpest
 from hybrid.kernels.state import Ends, Floats, State
 from hybrid.model.build import Model
+from hybrid.simulation.events import EventLog
 from hybrid.solve.statics import Equilibrium, is_stable
-from hybrid.store.memory_recorder import Notebook
-from hybrid.store.writer import Recorder
 
 # A rod that bends or twists by more than this (rad) from one cell to the next is not resolved by its mesh.
 UNRESOLVED = 1.0
@@ -69,11 +68,11 @@ REMEMBERED = (
 Stop = tuple[Outcome, int] | None
 
 
-class Watch:
-    """The watches of one run or one static solve."""
+class Diagnostics:
+    """What is watched in one run or one static solve."""
 
-    def __init__(self, recorder: Recorder | Notebook, model: Model) -> None:
-        self.recorder, self._model = recorder, model
+    def __init__(self, model: Model, events: EventLog) -> None:
+        self.events, self._model = events, model
         self._bend = self._twist = UNRESOLVED
         self._strain = STRETCHED
         self._slack = model.slack_floor
@@ -92,7 +91,7 @@ class Watch:
         """Note what the ledger says of the scene."""
         for entry in self._model.ledger:
             if entry.event:
-                self.recorder.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
+                self.events.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
 
     def checkpoint(self) -> dict[str, Any]:
         """What has been noted so far, and what `finish` will judge by."""
@@ -117,7 +116,7 @@ class Watch:
 
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
-        self.recorder.event(t, s, s, kind, text)
+        self.events.event(t, s, s, kind, text)
 
     def equilibrium(self, found: Equilibrium) -> None:
         """What a static solution leaves open."""
@@ -128,7 +127,7 @@ class Watch:
         if self._model.line.bits & FRICTION and not found.rubbed:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
-            self.recorder.event(0.0, 0.0, self._model.length, "static friction neglected", where)
+            self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
         model = self._model
         line, sea, ends = model.line, model.sea.values, model.ends.values
         if line.bits & PLANAR and not is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
@@ -141,7 +140,7 @@ class Watch:
                 else "an end moment is not conservative"
             )
             text = f"the stability of this equilibrium is not judged, because {why}"
-            self.recorder.event(0.0, 0.0, self._model.length, "stability not judged", text)
+            self.events.event(0.0, 0.0, self._model.length, "stability not judged", text)
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""
@@ -180,6 +179,12 @@ class Watch:
             how = f"the bend at the end s = {s:g} m is sharper than the mesh"
         ask = "`ratio` grades them" if self._model.layout is None else "`model.rod_cell`"
         return f"{how}: curvature and moment are wrong there; cells of {finer:.2g} m would do ({ask})"
+
+    def scheme(self, rho: float) -> None:
+        """A time scheme that damps nothing."""
+        if rho == 1.0 and not self._model.line.ck.all():
+            text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
+            self.events.event(0.0, 0.0, self._model.length, "undamped", text)
 
     def step(self, t: float, dt: float, rho: float, before: State, state: State) -> None:
         """Remember the steps that leave the most out of the motion, and how far the line has moved."""
@@ -227,7 +232,7 @@ class Watch:
                 f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
                 f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
             )
-            self.recorder.event(t, s, s, "coarse step", text)
+            self.events.event(t, s, s, "coarse step", text)
 
     def torque(self, t: float, turn: float, torque: float) -> None:
         """A torque that zones which move do not carry, because a catenary lies between the ends."""
@@ -236,7 +241,7 @@ class Watch:
                 f"one end is turned by {np.degrees(turn):.3g} deg against the other, and a catenary lies between them: "
                 f"the result has no torque ({torque:.3g} N m of a rod); for it, take model: rod"
             )
-            self.recorder.event(t, 0.0, self._model.length, "torque neglected", text)
+            self.events.event(t, 0.0, self._model.length, "torque neglected", text)
             self._left_out = True
 
     def strain(self, t: float, state: State) -> None:

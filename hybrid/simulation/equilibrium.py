@@ -1,18 +1,15 @@
-"""Equilibria of a scene: found at once, or from a coarser mesh, and with zones where these move."""
+"""Equilibria of a scene: found at once, or from a coarser mesh."""
 
 from __future__ import annotations
 
 from dataclasses import replace
 
-from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ComputationError
 from hybrid.kernels.forces import FRICTION
-from hybrid.model.build import Model, given_zones
+from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
-from hybrid.model.resolution import Resolution
-from hybrid.scene.schema import AdaptiveModel, Scene
-from hybrid.simulation.zone_switching import Zoning, first_zones, manager_for, zones_of_start
+from hybrid.scene.schema import Scene
 from hybrid.solve.statics import Equilibrium, solve_statics
 
 
@@ -65,20 +62,3 @@ def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
         return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
     except ComputationError:
         return None
-
-
-def zones_and_rest(
-    scene: Scene, model: Model, resolution: Resolution, t: float, criterion: UserCriterion | None, at_rest: bool = False
-) -> tuple[Model, Equilibrium | None, Zoning]:
-    """Zones, equilibrium if one is asked for, and what will move the zones."""
-    wanted = scene.model
-    assert isinstance(wanted, AdaptiveModel) and model.layout is not None
-    given = given_zones(scene, model.layout)
-    step = resolution.step if resolution.local is None else 0.0
-    manager = manager_for(model, resolution.zones, wanted.hold_time, given, step, criterion)
-    equilibrium = None
-    if at_rest or scene.initial.kind == "equilibrium":
-        model, equilibrium = first_zones(model, manager, t, equilibrium_of(scene, model, t))
-    else:
-        model = zones_of_start(model, manager)
-    return model, equilibrium, Zoning(model, manager, loaded=wanted.joint == "curvature")

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.outputs.probes import output_points
 from hybrid.scene.schema import Scene
@@ -33,6 +34,9 @@ BELIEVED = 30.0
 COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end")
 # Of reactions, the magnitude is reported, under these names.
 END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
+
+# What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
+MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
 
 Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind and text
 
@@ -81,6 +85,11 @@ class Errors:
         return float(np.max(found, initial=0.0)) if found is not None else 0.0
 
 
+def compared_cells(model: Model) -> int:
+    """Cells by which meshes of one scene are compared: of zones that move, their base cells."""
+    return model.cells if model.layout is None else int(model.layout.rod.size)
+
+
 class Estimate:
     """Errors of the last of several runs, by what finer cells and steps have changed.
 
@@ -120,7 +129,7 @@ class Estimate:
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
         doubtful = _implausible(coarse)
-        self.notes: Notes = (*coarse.notes, *((("model error not estimated", doubtful),) if doubtful else ()))
+        self.notes: Notes = (*coarse.notes, *(((NOT_ESTIMATED, doubtful),) if doubtful else ()))
         count = len(next(iter(self.run.values.values())))
         found = coarse.model_error if not doubtful else {}
         self._model = {name: _at_all_outputs(x, count, coarse.every) for name, x in found.items() if len(x)}

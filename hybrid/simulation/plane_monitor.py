@@ -12,14 +12,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.errors import Outcome
 from hybrid.kernels.report import PUSH_ENERGY, WRONG_PIVOTS
-from hybrid.kernels.state import State
+from hybrid.kernels.state import Floats, State
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, planar, untwist
 from hybrid.scene.schema import Scene
 from hybrid.solve.plane_stability import GROWN, Push
-from hybrid.solve.stepper import Stepper, Taken
+from hybrid.solve.stepper import Stepper
 
 # Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance), and how far
 # the push displaces a cable that goes on in space (a hundred times that, and nothing that anybody would see).
@@ -28,8 +27,8 @@ IN_PLANE, HANDED_ON = 1e-8, 1e-6
 Note = Callable[[int, str, str], None]
 
 
-class Flat:
-    """The plane of a motion, for as long as there is one."""
+class PlaneMonitor:
+    """Watches a motion in a plane, for as long as it is in one."""
 
     def __init__(self, scene: Scene) -> None:
         self.insists = scene.dimension == 2
@@ -53,15 +52,15 @@ class Flat:
         self.push = Push(model.line, model.length, model.time_scale)
         return model
 
-    def carry(self, stepper: Stepper) -> None:
-        """Let the push go along with the steps of a (new) stepper."""
+    def attach(self, stepper: Stepper) -> None:
+        """Carry the push along with the steps of a (new) stepper."""
         if self.push is not None:
             self.push.on(stepper.line.s)
         stepper.push = self.push
 
-    def left(self, taken: Taken, stepper: Stepper, note: Note) -> bool:
+    def must_leave(self, stepper: Stepper, note: Note) -> bool:
         """Whether, after an accepted step, the motion has to go on in space."""
-        if self.push is None or taken.outcome != Outcome.OK:
+        if self.push is None:
             return False
         grown = self.push.judge(*stepper.told[PUSH_ENERGY : WRONG_PIVOTS + 1])
         if grown < GROWN:
@@ -76,7 +75,7 @@ class Flat:
         note(where, "out of plane", f"{text}; it goes on in space, pushed by {HANDED_ON:g} of its length")
         return True
 
-    def rise(self, model: Model, state: State) -> Model:
+    def leave(self, model: Model, state: State) -> Model:
         """The model in space; the state gets the push."""
         assert self.push is not None and model.plane is not None
         n, x = model.plane[2], self.push.last(HANDED_ON * model.length)
@@ -91,3 +90,8 @@ class Flat:
         state.a1[:] = np.where(size > 0.0, a / np.where(size > 0.0, size, 1.0), state.a1)
         self.push = None
         return replace(model, line=in_space(model.line), plane=None)
+
+
+def same_plane(a: Floats | None, b: Floats | None) -> bool:
+    """Whether two planes (3, 3) have the same normal, of either sense."""
+    return a is not None and b is not None and bool(abs(abs(float(a[2] @ b[2])) - 1.0) < 1e-12)

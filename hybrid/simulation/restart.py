@@ -34,7 +34,7 @@ SAME_PLACE, SAME_SPEED = 1e-6, 1e-3
 
 
 @dataclass(frozen=True)
-class Phase:
+class LoadChange:
     """From time t (s) on, this scene holds."""
 
     t: float
@@ -42,7 +42,7 @@ class Phase:
 
 
 @dataclass(frozen=True)
-class Remainder:
+class RemainingRun:
     """What is to be done: a scene, what changes later, and where to begin.
 
     before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
@@ -50,16 +50,16 @@ class Remainder:
     """
 
     scene: Scene
-    changes: tuple[Phase, ...]
+    changes: tuple[LoadChange, ...]
     resolution: Resolution
     before: Tree
     anew: bool
     reached: float
 
 
-def remainder(
+def remaining_run(
     path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
-) -> Remainder:
+) -> RemainingRun:
     """What a result leaves to be done, if it is to go on until then, with these settings from `start` (s) on.
 
     ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
@@ -73,13 +73,13 @@ def remainder(
         if status == "complete" and not before:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return Remainder(scene, changes, resolution, before, False, point.t)
+        return RemainingRun(scene, changes, resolution, before, False, point.t)
     if until is not None:
         scene, changes = _longer(scene, changes, until, point.t)
     anew = False
     if settings:
         begin = point.t if start is None else start
-        last = changes[-1] if changes else Phase(0.0, scene)
+        last = changes[-1] if changes else LoadChange(0.0, scene)
         changed = parse_scene(scene_text(last.scene), overrides=settings)
         end = changed.require_time().duration
         if until is not None and end != until:
@@ -87,16 +87,16 @@ def remainder(
         _check(last, changed, resolution, begin, end)
         if end != scene.require_time().duration:
             scene, changes = _longer(scene, changes, end, point.t)
-        changes, anew = (*changes, Phase(begin, changed)), begin < point.t
-    return Remainder(scene, changes, resolution, {}, anew, 0.0 if anew else point.t)
+        changes, anew = (*changes, LoadChange(begin, changed)), begin < point.t
+    return RemainingRun(scene, changes, resolution, {}, anew, 0.0 if anew else point.t)
 
 
-def changes_text(changes: Sequence[Phase]) -> str:
+def changes_text(changes: Sequence[LoadChange]) -> str:
     """Phases as JSON, for the file; empty if there are none."""
     return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
 
 
-def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, Tree, Checkpoint]:
+def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkpoint]:
     with opened(path) as file:
         before, point = read_before(file), read_checkpoint(file)
         with open_result(path) as result:
@@ -104,14 +104,16 @@ def _found(path: Path) -> tuple[Scene, tuple[Phase, ...], str, Tree, Checkpoint]
             status = result.status
             try:
                 told = json.loads(result.changes_text or "[]")
-                changes = tuple(Phase(float(x["t"]), parse_scene(x["scene"])) for x in told)
+                changes = tuple(LoadChange(float(x["t"]), parse_scene(x["scene"])) for x in told)
             except (ValueError, TypeError, KeyError) as error:
                 advice = f"    detail:   {error}\n    try:      run its scene again"
                 raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
     return scene, changes, status, before, point
 
 
-def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float) -> tuple[Scene, tuple[Phase, ...]]:
+def _longer(
+    scene: Scene, changes: Sequence[LoadChange], until: float, reached: float
+) -> tuple[Scene, tuple[LoadChange, ...]]:
     """The same until another time, with outputs as often as before."""
     if not (until >= reached and math.isfinite(until)):
         fix = "the file holds everything before: hybrid.open(path).at(t=...)"
@@ -128,10 +130,10 @@ def _longer(scene: Scene, changes: Sequence[Phase], until: float, reached: float
         data.setdefault("output", {})["every"] = every
         return parse_scene(scene_text(Scene.model_validate(data)))
 
-    return other(scene), tuple(Phase(x.t, other(x.scene)) for x in changes)
+    return other(scene), tuple(LoadChange(x.t, other(x.scene)) for x in changes)
 
 
-def _check(last: Phase, changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
+def _check(last: LoadChange, changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
     """Refuse what cannot be other from `begin` on, and prescribed motions that would jump then."""
     if not last.t <= begin < end:
         fix = "a later end as well, --until T" if begin == end else ""

@@ -20,7 +20,7 @@ import numpy as np
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.cache import kernel_hash
-from hybrid.model.build import MOST_PARTS, Model, build, given_zones
+from hybrid.model.build import MOST_PARTS, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
@@ -28,7 +28,8 @@ from hybrid.model.plane import in_space, planar
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.zone_switching import Zoning, manager_for, on_layout
+from hybrid.simulation.initial_zones import manager_for
+from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.store.named_arrays import Tree, matched
 
 # Rooms that have a part in the numbers of a file.
@@ -137,26 +138,23 @@ def _check_nodes(s: np.ndarray, scene: Scene) -> None:
 
 def restored_parts(
     scenes: Sequence[Scene], resolution: Resolution, saved: Mapping[str, Any], criterion: UserCriterion | None
-) -> tuple[Model, Zoning | None, Correction | None]:
-    """What a motion consists of, as new: its model, what moves its zones, what follows its model error.
+) -> tuple[Model, ZoneSwitching | None, Correction | None]:
+    """What a run consists of, as new: its model, what moves its zones, what follows its model error.
 
     scenes: that of the start, and those of the changes; the one that holds is saved["changes"].
     """
     changes = matched(saved["changes"], 0, "changes")
     if not 0 <= changes < len(scenes):
         raise ValueError(f"change {changes} of {len(scenes) - 1}")
-    scene, zoning = scenes[changes], None
+    scene, switching = scenes[changes], None
     first, model = restored_model(scene, resolution, saved)
-    wanted = scene.model
-    if isinstance(wanted, AdaptiveModel):
+    if isinstance(scene.model, AdaptiveModel):
         assert first.layout is not None and model.layout is not None
         # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
         start = first if not changes else build(scenes[0], resolution, first.layout)
-        step = resolution.step if resolution.local is None else 0.0
-        given = given_zones(scene, first.layout)
-        manager = manager_for(start, resolution.zones, wanted.hold_time, given, step, criterion)
+        manager = manager_for(scene, start, resolution, criterion)
         manager.moments = model.ends.moments
         manager.loaded = bool(manager.moments.any())
         manager.follow(model.layout)
-        zoning = Zoning(model, manager, loaded=wanted.joint == "curvature")
-    return model, zoning, Correction(model, zoning) if model.follows_error else None
+        switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+    return model, switching, Correction(model, switching) if model.follows_error else None

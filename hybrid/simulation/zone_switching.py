@@ -8,40 +8,30 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.manager import HARD, Change, DomainManager, UserCriterion
+from hybrid.adapt.manager import HARD, Change, DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.adapt.state_transfer import Clamp, Remapped, balance, remap
-from hybrid.errors import ComputationError, Outcome
+from hybrid.errors import Outcome
 from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import freed, soften, still_lacking
 from hybrid.kernels.zone_criteria import twist_of_rods
-from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model
-from hybrid.model.coarsen import picked
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.plane import planar, untwist
-from hybrid.simulation.bending_correction import Correction
-from hybrid.solve.statics import Equilibrium, solve_statics
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.stepper import Stepper, Taken
 from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
 LETTING_GO = 1.0
-# Dwell of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
-DWELL, LEAST_DWELL = 0.25, 20
-# Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
-SLOWEST, FASTEST = 2.0, 10
 # Times the tension floor above which tension, not bending, says where new nodes are in balance.
 TAUT = 2.0
 NONE, NO_STRAIN = np.zeros(0, int), np.zeros((0, 3))
-# Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
-STRICTER = (1.0, 0.5, 0.25)
-# Rounds of zones and equilibrium at the start: each only adds rod, so they end.
-MOST_ROUNDS = 10
+# Repetitions of one step with more rod.
+MOST_RESCUES = 20
 
 
 @dataclass
@@ -64,34 +54,6 @@ class Relaxing:
         return np.asarray(self.lack * value / duration + self.rate * slope)
 
 
-def manager_for(
-    model: Model,
-    tolerance: float,
-    dwell: float | None,
-    given: np.ndarray,
-    step: float,
-    user: UserCriterion | None = None,
-) -> DomainManager:
-    """The domain manager of a model; tolerance as a part of the length, step: time step, s."""
-    assert model.layout is not None
-    pace = max(DWELL * model.time_scale, LEAST_DWELL * step)
-    wait = dwell if dwell is not None else pace
-    manager = DomainManager(
-        model.cable,
-        model.layout,
-        tolerance * model.length,
-        wait,
-        given,
-        model.tension_scale,
-        user,
-        min(max(wait, FASTEST * step), SLOWEST * pace),
-        LEFT if model.corrected else 1.0,
-    )
-    manager.moments = model.ends.moments
-    manager.loaded = bool(manager.moments.any())
-    return manager
-
-
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     more = model.line.bits & (SEABED | FRICTION)
@@ -101,103 +63,7 @@ def on_layout(model: Model, layout: Layout) -> Model:
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
-def first_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:
-    """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
-
-    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than
-    the tolerance (criteria are estimates, and slack has many equilibria) criteria become stricter, for all of the run;
-    where that does not help, zones stay rod.
-    """
-    assert model.layout is not None
-    most, equilibrium = model, found
-    free = manager.given >= 0
-    if not free.all():  # the most rod that the scene lets it have
-        most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.rubbed)
-    assert most.layout is not None
-    allowed = manager.tolerance
-    try:
-        for part in STRICTER:
-            manager.follow(model.layout)
-            manager.tolerance = part * allowed
-            answer = _zones_within(model, found, manager, t)
-            if answer is None:
-                break
-            if _apart(equilibrium.state, most.layout, answer, t) <= allowed:
-                return answer
-        else:
-            manager.held = True
-    except ComputationError:
-        manager.held = True
-    if manager.held:
-        manager.tolerance = allowed
-    manager.follow(most.layout)
-    return most, equilibrium
-
-
-def zones_of_start(model: Model, manager: DomainManager) -> Model:
-    """A start that is no equilibrium is rod, but for what the scene wants to be catenary."""
-    assert model.layout is not None
-    free = manager.given >= 0
-    if free.all():
-        return model
-    new = on_layout(model, model.layout._replace(rod=free))
-    manager.follow(model.layout._replace(rod=free))
-    return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
-
-
-def _zones_within(
-    model: Model, found: Equilibrium, manager: DomainManager, t: float
-) -> tuple[Model, Equilibrium] | None:
-    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
-    assert model.layout is not None
-    full = found.state
-    manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
-    rod = manager.first(full)
-    for _ in range(MOST_ROUNDS):
-        if rod[manager.given >= 0].all():
-            return None
-        layout = model.layout._replace(rod=rod)
-        new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.rubbed)
-        manager.follow(layout)
-        manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
-        more = rod | manager.first(answer.state)
-        if (more == rod).all():
-            return new, answer
-        rod = more
-    return None
-
-
-def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
-    """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
-    model, found = answer
-    assert model.layout is not None
-    r = found.state.r
-    if model.corrected:
-        correction = Correction(model)
-        correction.begin(model.ends.at(t), found.state, at_rest=True, rubbed=found.rubbed)
-        r = r + correction.corrector.position
-    return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
-
-
-def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
-    """rubbed: whether friction took part in what it is compared with."""
-    return solve_statics(
-        model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
-        shape=model.start_shape, settle=rubbed,
-    )  # fmt: skip
-
-
-def _on_fewer(state: State, s: Floats, line: Line) -> State:
-    """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
-    found = picked(state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
-    if found is None:
-        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
-    return found
-
-
-class Zoning:
+class ZoneSwitching:
     """The zones of one motion."""
 
     def __init__(self, model: Model, manager: DomainManager, loaded: bool = False) -> None:
@@ -246,7 +112,7 @@ class Zoning:
         self.manager.begin()
         self.weigh(0.0, 0.0, ends, state)
 
-    def prepare(self, end: float, dt: float, state: State) -> None:
+    def prepare_step(self, end: float, dt: float, state: State) -> None:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
         line = self.model.line
         if self.relaxing is not None:
@@ -264,7 +130,35 @@ class Zoning:
         loudest = self.manager.weigh(self.model.line, self.model.sea.values, ends, state, dt, t)
         return self.manager.catenary_beyond if loudest > HARD else NONE
 
-    def settle(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
+    def rescue(self, taken: Taken, end: float, dt: float, tried: State, rescues: int) -> Change | None:
+        """More rod for a step of dt to `end` that failed or took a catenary too far; None: as it is.
+
+        tried: the state that the step led to; rescues: of this step, so far.
+        """
+        line, most = self.model.line, MOST_RESCUES
+        if taken.outcome == Outcome.OK:
+            cells = self.weigh(end, dt, self.model.ends.values, tried)
+            why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
+        elif taken.outcome == Outcome.SLACK:
+            cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))
+            why = "a step would have left it a catenary without tension; the step is repeated"
+        else:
+            cells = self.manager.near_asking(min(max(taken.where, 0), self.model.cells - 1))
+            why = f"a step failed here ({taken.outcome.cause}); it is repeated"
+            most = 1  # after that, a smaller step
+        return self._force_rod(cells, why) if rescues < most and cells.size else None
+
+    def all_rod(self, taken: Taken) -> Change | None:
+        """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
+        why = f"steps fail here, however small ({taken.outcome.cause}); repeated with rods everywhere"
+        return self._force_rod(np.arange(self.model.cells), why)
+
+    def _force_rod(self, cells: np.ndarray, why: str) -> Change | None:
+        """Cells to be rod, with all of their stiffness; None: they are."""
+        change = self.manager.insist(cells, why)
+        return None if (change.rod == self.manager.layout.rod).all() and not change.stiff.any() else change
+
+    def book_step(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
         """After an accepted step: energy (J) that lengths, bending and joints put in, and what should change."""
         manager, line = self.manager, self.model.line
         booked = 0.0
@@ -335,7 +229,7 @@ class Zoning:
             self.joints = self.joints.on(target)
         return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
 
-    def settle_joints(self, state: State) -> None:
+    def release_joints(self, state: State) -> None:
         """Take what joints carry off the line, for another line to be put in its place."""
         if self.joints is not None:
             self.joints.unload(self.model.line, np.zeros_like(state.r))

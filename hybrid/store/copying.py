@@ -20,7 +20,7 @@ def copied(
     whole = [(name, data) for name, data in _datasets(old) if name not in left]
     scales = [name for name, data in whole if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
     kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
-    with h5py.File(path, "w", libver=libver, locking="best-resolution") as new:
+    with h5py.File(path, "w", libver=libver, locking="best-effort") as new:
         _annotations(old, new)
         for name, data in whole:
             _copied_dataset(data, new, name, kept)

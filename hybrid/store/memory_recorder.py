@@ -10,7 +10,7 @@ import numpy as np
 from hybrid.errors import ResultError
 
 
-class Notebook:
+class MemoryRecorder:
     """Stands in for a `Recorder` where only arrays are wanted; keeps outputs and events, no step log."""
 
     def __init__(self) -> None:

@@ -453,7 +453,7 @@ def _open_file(source: Path | io.BytesIO) -> h5py.File:
     while True:
         try:
             # SWMR (single writer, multiple readers) for files with a writer, alive or killed, and for no other.
-            return h5py.File(source, "r", swmr=being_written(source), locking="best-resolution")
+            return h5py.File(source, "r", swmr=being_written(source), locking="best-effort")
         except OSError as error:
             problem: Exception = error
         except ResultError as error:  # perhaps a writer has not come to the end of the first 48 bytes

@@ -267,7 +267,7 @@ def is_export(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(2 + len(MARK)) == f"# {MARK}".encode():
             return True
-    with suppress(OSError), h5py.File(path, "r", locking="best-resolution") as file:
+    with suppress(OSError), h5py.File(path, "r", locking="best-effort") as file:
         mark = file.attrs.get("format", "")
         return (mark.decode() if isinstance(mark, bytes) else str(mark)) == MARK
     return False

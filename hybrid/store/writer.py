@@ -186,7 +186,7 @@ class Recorder:
         def fill(new: Path) -> None:
             ask_for_room(new, Path(source.filename).stat().st_size, "")
             copied(source, new, _LIBVER, at.rows, later)
-            with h5py.File(new, "r+", libver=_LIBVER, locking="best-resolution") as file:
+            with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
                 set_status(file, "running", "")
                 write_texts(file, texts)
                 write_before(file, before)
@@ -378,9 +378,9 @@ def amend(
         if isinstance(where, Path):  # beside it, and then in its place: somebody may be reading
             new = where.with_name(f".{where.name}.{os.getpid()}.new")
             ask_for_room(where, where.stat().st_size, "")
-            with h5py.File(where, "r", locking="best-resolution") as old:
+            with h5py.File(where, "r", locking="best-effort") as old:
                 copied(old, new, _LIBVER, None, without={BEFORE} if done else ())
-        with h5py.File(new, "r+", libver=_LIBVER, locking="best-resolution") as file:
+        with h5py.File(new, "r+", libver=_LIBVER, locking="best-effort") as file:
             for name, value in attributes.items():
                 file.attrs[name] = value
             for field, values in fields:
@@ -430,10 +430,10 @@ def _created(
         if make is not None:
             make(new)
         if fill is not None:
-            with h5py.File(new, "w", libver=_LIBVER, locking="best-resolution") as file:
+            with h5py.File(new, "w", libver=_LIBVER, locking="best-effort") as file:
                 fill(file)
         os.replace(new, path)
-        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-resolution", rdcc_nbytes=CACHE)
+        file = h5py.File(path, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE)
         file.swmr_mode = True
     except OSError as error:
         advice = "a folder you may write to, with free space; close programs that hold the file"

@@ -1,4 +1,4 @@
-"""Whether the outputs are too far apart: end forces are known at every step, their errors at outputs only."""
+"""What is checked of a result when it is complete: outputs too far apart for its end forces, vibrations damped out."""
 
 from __future__ import annotations
 
@@ -14,6 +14,11 @@ from hybrid.store.reader import Result
 TIMES_THE_ERROR, PART = 2.0, 0.02
 # Outputs after a change of zones within which a shake is laid to it.
 SOON = 2.0
+# Energy lost to the scheme that is worth a word, as a part of the largest kinetic energy, and of tension scale times
+# length: below, it is what Newton's tolerance leaves.
+NOTHING_LOST = 1e-6
+# The same as a part of all work done: what the books miss when steps are long.
+IN_BOOKS = 0.01
 
 
 def undersampled_end_forces(result: Result, errors: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
@@ -45,3 +50,21 @@ def undersampled_end_forces(result: Result, errors: Mapping[str, np.ndarray]) ->
                 text += f"; zones that change (t = {shaken[-1]:.4g} s) may have shaken it: model: rod has none"
             out.append(("end force between outputs", text))
     return out
+
+
+def damped_vibrations(result: Result) -> tuple[tuple[str, str], ...]:
+    """Events (kind, text): where the time scheme has dissipated more energy than the cable ever stored by straining."""
+    names = [x for x in ("energy/stretch", "energy/bending", "energy/torsion") if x in result]
+    strained = sum(np.array(result[x]) for x in names)
+    lost = -float(np.min(result["work/scheme"]))
+    peak = float(np.ptp(strained)) if np.ndim(strained) else 0.0
+    books = IN_BOOKS * sum(float(np.abs(result.work[x]).max()) for x in result.work if x != "scheme")
+    least = NOTHING_LOST * float(result.attributes["tension_scale"]) * float(result.attributes["length"])
+    if not lost > max(peak, NOTHING_LOST * float(np.max(result.energy["kinetic"])), least, books):
+        return ()
+    text = (
+        f"steps follow the motion in metres: vibrations of less are damped out ({lost:.2g} J, where at most "
+        f"{peak:.2g} J are stored by strain), and with them their moments and reactions, which the error figure "
+        f"does not see; for those give a time.step that follows them"
+    )
+    return (("vibrations damped", text),)

@@ -1,0 +1,68 @@
+"""Writes into a result how wrong it may be, how finely it was computed, and what that took."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.error_control import ErrorController
+from hybrid.simulation.error_estimate import Errors, RunSample, summary
+from hybrid.simulation.result_checks import undersampled_end_forces
+from hybrid.store.format import Field
+from hybrid.store.reader import open_result
+from hybrid.store.writer import amend
+
+UNITS = {
+    "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
+    "end_force_start": "N", "end_force_end": "N",
+}  # fmt: skip
+CAUSES = {
+    "mesh": "error by the mesh", "time": "error by the time step", "model": "error by neglected bending",
+    "total": "error by all causes",
+}  # fmt: skip
+
+
+def write_errors(
+    target: Path | io.BytesIO, scene: Scene, control: ErrorController, result: RunSample, errors: Errors | None,
+    cpu: float, done: bool = True,
+) -> None:  # fmt: skip
+    """Add errors (None: they could not be estimated), attributes and events to a complete result.
+
+    cpu: s, of all passes; done: nothing is left to be refined; else the file keeps what a refinement is resumed from.
+    """
+    resolution = result.resolution
+    attributes: dict[str, str | float | int] = {
+        "effort_fineness": resolution.fineness, "effort_runs": len(control.runs),
+        "effort_cpu": cpu, "effort_step": resolution.step,
+    }  # fmt: skip
+    if resolution.local is not None:
+        attributes["effort_step_error"] = resolution.local
+    if isinstance(scene.model, AdaptiveModel):
+        attributes["effort_zones"] = resolution.zones
+    if control.asked is not None:
+        attributes["accuracy_asked"] = control.asked.text
+    fields = _error_fields(result, errors) if errors is not None else []
+    attributes |= summary(errors) if errors is not None else {}
+    with open_result(target) as file:
+        total = errors.fields.get("total", {}) if errors is not None and control.moves else {}
+        undersampled = undersampled_end_forces(file, total)
+    amend(target, fields, attributes, [*dict(reversed(control.notes)).items(), *undersampled], done)
+
+
+def _error_fields(result: RunSample, errors: Errors) -> list[tuple[Field, np.ndarray]]:
+    """Errors by cause and quantity; those by neglected bending only where the run has not written them itself."""
+    return [
+        (
+            Field(
+                f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {name.replace('_', ' ')}, estimated",
+                values.shape[1:], ("s",) if values.ndim == 2 else (),
+            ),
+            values,
+        )
+        for cause, quantities in errors.fields.items()
+        if not (cause == "model" and result.model_error)
+        for name, values in quantities.items()
+    ]  # fmt: skip

@@ -1,0 +1,35 @@
+"""Events of a run on their way to its file: what computes notes them, what writes fetches them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import nan
+from typing import Any, Protocol
+
+
+class Sink(Protocol):
+    """What events are written to."""
+
+    @property
+    def event(self) -> Callable[..., None]: ...
+
+
+class EventLog:
+    """Events in the order in which they happened, until they are written."""
+
+    def __init__(self) -> None:
+        self._waiting: list[tuple[tuple[float, float, float, str, str], dict[str, Any]]] = []
+
+    def event(
+        self, t: float, s_a: float, s_b: float, kind: str, text: str, *, criterion: str = "", value: float = nan,
+        threshold: float = nan, energy: float = nan,
+    ) -> None:  # fmt: skip
+        """Something happened at time t (s) on s_a <= s <= s_b (m); the rest: as of `Recorder.event`."""
+        more = {"criterion": criterion, "value": value, "threshold": threshold, "energy": energy}
+        self._waiting.append(((t, s_a, s_b, kind, text), more))
+
+    def write_to(self, sink: Sink) -> None:
+        """Write all that wait."""
+        for event, more in self._waiting:
+            sink.event(*event, **more)
+        self._waiting.clear()

@@ -1,0 +1,156 @@
+"""Zones that move, as they are at the start: those of the equilibrium, or all rod."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hybrid.adapt.manager import DomainManager, UserCriterion
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.state import Floats, Line, State
+from hybrid.model.bending_reference import LEFT
+from hybrid.model.build import Model, given_zones
+from hybrid.model.coarsen import picked
+from hybrid.model.layout import Layout
+from hybrid.model.resolution import Resolution
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.equilibrium import equilibrium_of
+from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
+from hybrid.solve.statics import Equilibrium, solve_statics
+
+# Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
+HOLD, LEAST_STEPS_HELD = 0.25, 20
+# Bending comes and goes no slower than in so many times that, and no faster than in so many steps, whatever is asked.
+SLOWEST, FASTEST = 2.0, 10
+# Parts of the tolerance at which zones for an equilibrium are sought, before all becomes rod.
+STRICTER = (1.0, 0.5, 0.25)
+# Rounds of zones and equilibrium at the start: each only adds rod, so they end.
+MOST_ROUNDS = 10
+
+
+def zones_at_start(
+    scene: Scene, model: Model, resolution: Resolution, t: float, criterion: UserCriterion | None, at_rest: bool = False
+) -> tuple[Model, Equilibrium | None, ZoneSwitching]:
+    """Zones, equilibrium if one is asked for, and what will move the zones."""
+    assert isinstance(scene.model, AdaptiveModel)
+    manager, equilibrium = manager_for(scene, model, resolution, criterion), None
+    if at_rest or scene.initial.kind == "equilibrium":
+        model, equilibrium = equilibrium_zones(model, manager, t, equilibrium_of(scene, model, t))
+    else:
+        model = zones_without_equilibrium(model, manager)
+    return model, equilibrium, ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
+
+
+def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: UserCriterion | None) -> DomainManager:
+    """The domain manager of a model that is rod wherever it may be."""
+    wanted = scene.model
+    assert isinstance(wanted, AdaptiveModel) and model.layout is not None
+    step = resolution.step if resolution.local is None else 0.0
+    pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
+    hold = wanted.hold_time if wanted.hold_time is not None else pace
+    manager = DomainManager(
+        model.cable, model.layout, resolution.zones * model.length, hold, given_zones(scene, model.layout),
+        model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
+        LEFT if model.corrected else 1.0,
+    )  # fmt: skip
+    manager.moments = model.ends.moments
+    manager.loaded = bool(manager.moments.any())
+    return manager
+
+
+def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:
+    """Zones for an equilibrium, and the equilibrium: rod only where the criteria ask for it.
+
+    found: the equilibrium of the model, which is all rod.  The two are compared: where they are further apart than
+    the tolerance (criteria are estimates, and slack has many equilibria) criteria become stricter, for all of the run;
+    where that does not help, zones stay rod.
+    """
+    assert model.layout is not None
+    most, equilibrium = model, found
+    free = manager.given >= 0
+    if not free.all():  # the most rod that the scene lets it have
+        most = on_layout(model, model.layout._replace(rod=free))
+        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.rubbed)
+    assert most.layout is not None
+    allowed = manager.tolerance
+    try:
+        for part in STRICTER:
+            manager.follow(model.layout)
+            manager.tolerance = part * allowed
+            answer = _zones_within(model, found, manager, t)
+            if answer is None:
+                break
+            if _apart(equilibrium.state, most.layout, answer, t) <= allowed:
+                return answer
+        else:
+            manager.held = True
+    except ComputationError:
+        manager.held = True
+    if manager.held:
+        manager.tolerance = allowed
+    manager.follow(most.layout)
+    return most, equilibrium
+
+
+def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
+    """A start that is no equilibrium is rod, but for what the scene wants to be catenary."""
+    assert model.layout is not None
+    free = manager.given >= 0
+    if free.all():
+        return model
+    new = on_layout(model, model.layout._replace(rod=free))
+    manager.follow(model.layout._replace(rod=free))
+    return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
+
+
+def _zones_within(
+    model: Model, found: Equilibrium, manager: DomainManager, t: float
+) -> tuple[Model, Equilibrium] | None:
+    """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
+    assert model.layout is not None
+    full = found.state
+    manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
+    rod = manager.first(full)
+    for _ in range(MOST_ROUNDS):
+        if rod[manager.given >= 0].all():
+            return None
+        layout = model.layout._replace(rod=rod)
+        new = on_layout(model, layout)
+        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.rubbed)
+        manager.follow(layout)
+        manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
+        more = rod | manager.first(answer.state)
+        if (more == rod).all():
+            return new, answer
+        rod = more
+    return None
+
+
+def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
+    """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
+    model, found = answer
+    assert model.layout is not None
+    r = found.state.r
+    if model.corrected:
+        correction = Correction(model)
+        correction.begin(model.ends.at(t), found.state, at_rest=True, rubbed=found.rubbed)
+        r = r + correction.corrector.position
+    return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
+
+
+def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
+    """rubbed: whether friction took part in what it is compared with."""
+    return solve_statics(
+        model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
+        shape=model.start_shape, settle=rubbed,
+    )  # fmt: skip
+
+
+def _on_fewer(state: State, s: Floats, line: Line) -> State:
+    """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
+    found = picked(state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
+    if found is None:
+        raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
+    return found

@@ -1,0 +1,133 @@
+"""The file of a result: its fields, what is known before the first step, and events on bending that is neglected."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.kernels.forces import SEABED, SURFACE
+from hybrid.model.build import Model
+from hybrid.model.sections import allowed_radius, weakest_bending
+from hybrid.outputs.probes import Observer
+from hybrid.scene.schema import Scene
+from hybrid.solve.statics import Equilibrium
+from hybrid.store.format import Field
+from hybrid.store.named_arrays import Tree
+from hybrid.store.writer import Recorder
+
+STEP_FIELDS = (
+    Field("t", "s", "time at the end of the step"),
+    Field("dt", "s", "length of the step"),
+    Field("iterations", "", "Newton iterations, repeats included", dtype="int64"),
+    Field(
+        "correction", "", "next Newton correction as predicted (turn of a chord in rad, or tension over the largest)"
+    ),
+    Field("residual", "N", "largest residual force at a node before the last correction"),
+    Field("repeats", "", "how often the step was repeated with smaller parts", dtype="int64"),
+    Field("error", "m", "local error of position that the step makes, by the change of acceleration in it"),
+    Field("end_force_start", "N", "magnitude of the force that holds (or loads) the start, at every step"),
+    Field("end_force_end", "N", "the same at the end; of an end body: tension of the last cell"),
+    Field("cpu", "s", "processor time since the start of the run"),
+)
+
+
+def result_recorder(
+    scene: Scene,
+    model: Model,
+    observer: Observer,
+    target: Path | io.BytesIO,
+    texts: Mapping[str, str],
+    found: Equilibrium | None,
+    outputs: int = 0,
+    before: Tree | None = None,
+) -> Recorder:
+    """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
+
+    found: the equilibrium at the start; outputs: after the first, 0 of an equilibrium; before: as of `Recorder`.
+    """
+    attributes: dict[str, str | float | int] = {
+        "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
+    }  # fmt: skip
+    if found is not None:
+        attributes |= {"static_path": found.summary, "static_residual": found.residual}
+    fixed = [*_surroundings(model), *_limits(scene, observer)]
+    if scene.output.history:
+        points = np.array(scene.output.history)
+        fixed.append(
+            (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
+        )
+    recorder = Recorder(
+        target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
+        attributes=attributes, texts=texts, fixed=fixed, outputs=outputs + 1, overwrite=True, before=before,
+    )  # fmt: skip
+    if model.layout is not None:
+        _note_neglected_bending(scene, model, recorder)
+    return recorder
+
+
+def _note_neglected_bending(scene: Scene, model: Model, recorder: Recorder) -> None:
+    """Clamps and point loads in catenary zones: who wants their moment has to ask for it."""
+    for s, text in _neglected_clamps(scene, model):
+        recorder.event(0.0, s, s, "bending at clamp neglected", text)
+    neglected = [s for s in model.attached if not _bends(model, s)]
+    if neglected:
+        which = ", ".join(f"{s:.5g}" for s in neglected[:5]) + ", .." * (len(neglected) > 5)
+        text = (
+            f"bends at the point loads at s = {which} m shift the cable by less than the tolerance: they have no "
+            "moment; for it, say force_rod around them"
+        )
+        recorder.event(0.0, neglected[0], neglected[-1], "bending at point load neglected", text)
+
+
+def _bends(model: Model, s: float) -> bool:
+    """Whether an inner node at s has an element; the ends have their own say."""
+    node = int(np.argmin(np.abs(model.line.s - s)))
+    return bool(model.line.element[node]) or not 0 < node < model.line.h.size
+
+
+def _neglected_clamps(scene: Scene, model: Model) -> Iterator[tuple[float, str]]:
+    """Clamps that lie in a catenary zone because they hardly shift the cable; who wants their moment has to ask."""
+    line = model.line
+    for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
+        if end.held_tangent is None or line.spin[cell]:
+            continue
+        s, far = float(line.s[cell]), float(line.s[-1])
+        reach = min(4.0 * float(model.cable.bending_length(1e-9 * model.tension_scale / far)[cell]), far)
+        stretch = f"[0, {reach:.3g}]" if cell == 0 else f"[{far - reach:.5g}, {far:.5g}]"
+        text = (
+            f"the clamp at ends.{name} shifts the cable by less than the tolerance: its bending is neglected, and it "
+            "has no moment, as long as a catenary zone ends there; for its moment, and near resonance, say "
+            f"force_rod: [{stretch}]"
+        )
+        yield s, text
+
+
+def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
+    """What reports hold bends and torques against: the bend radius allowed, and of rods the bending stiffness."""
+    s = observer.grid.s
+    out: list[tuple[Field, np.ndarray]] = []
+    if any(x.min_bend_radius for x in scene.cable.sections):
+        field = Field("min_bend_radius", "m", "smallest bend radius allowed; NaN: none", (s.size,), ("s",), nan_ok=True)
+        out.append((field, allowed_radius(scene, s)))
+    if any(field.name == "torque" for field in observer.fields):
+        text = "bending stiffness, the smaller one where there are two"
+        out.append((Field("bending_stiffness", "N m^2", text, (s.size,), ("s",)), weakest_bending(scene, s)))
+    return out
+
+
+def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
+    """What pictures show besides the cable: seabed, still water, what is attached."""
+    line, sea = model.line, model.sea.values
+    out: list[tuple[Field, np.ndarray]] = []
+    if line.bits & SEABED:
+        text = "plane of the seabed: unit normal n and offset c, n . x = c on it"
+        out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), np.append(sea.normal, sea.offset)))
+    if line.bits & SURFACE:
+        out.append((Field("surface", "m", "height of still water"), np.array(sea.surface)))
+    if model.attached:
+        text = "arc lengths of floats, clumps and end bodies"
+        out.append((Field("attached", "m", text, (len(model.attached),), ("attached",)), np.array(model.attached)))
+    return out

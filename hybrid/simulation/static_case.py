@@ -1,0 +1,95 @@
+"""Equilibria of one scene, computed as finely as asked: for a result, or to compare with one."""
+
+from __future__ import annotations
+
+import io
+import time as clock
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from hybrid.errors import ComputationError
+from hybrid.model.build import Model, build
+from hybrid.model.resolution import Resolution, wants_errors
+from hybrid.outputs.probes import Observer, output_points
+from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
+from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.diagnostics import Diagnostics
+from hybrid.simulation.equilibrium import equilibrium_of
+from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, RunSample, compared_cells
+from hybrid.simulation.events import EventLog
+from hybrid.simulation.initial_zones import zones_at_start
+from hybrid.simulation.result_file import result_recorder
+from hybrid.solve.statics import Equilibrium
+from hybrid.solve.stepper import POWERS
+
+
+class StaticCase:
+    """The equilibrium of one scene at t = 0, under loads that have grown to their full size."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.scene = scene
+
+    def record(self, resolution: Resolution, target: Path | io.BytesIO) -> RunSample:
+        """Compute the result into a file, or memory; what is to be compared of it."""
+        begin = clock.process_time()
+        model, found = self._equilibrium(resolution)
+        observer = self._observer(model)
+        texts = {"scene": scene_text(self.scene)}
+        with result_recorder(self.scene, model, observer, target, texts, found) as recorder:
+            ends, events = model.ends.at(np.inf), EventLog()
+            diagnostics = Diagnostics(model, events)
+            diagnostics.begin()
+            diagnostics.equilibrium(found)
+            diagnostics.strain(0.0, found.state)
+            diagnostics.mesh(0.0, found.state)
+            stop = diagnostics.still(ends, found.state)
+            events.write_to(recorder)
+            if stop is not None:
+                raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
+            values = _values(model, found, observer)
+            recorder.save(0.0, values, observer.zone_rows)
+            recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
+        return _sample(resolution, model, values, clock.process_time() - begin)
+
+    def sample(self, resolution: Resolution) -> RunSample:
+        """Compute for comparison only."""
+        begin = clock.process_time()
+        model, found = self._equilibrium(resolution)
+        values = _values(model, found, self._observer(model, COMPARED))
+        return _sample(resolution, model, values, clock.process_time() - begin)
+
+    def _equilibrium(self, resolution: Resolution) -> tuple[Model, Equilibrium]:
+        model = build(self.scene, resolution)
+        if model.layout is None:
+            return model, equilibrium_of(self.scene, model, np.inf)
+        model, found, _ = zones_at_start(self.scene, model, resolution, np.inf, None, at_rest=True)
+        assert found is not None
+        return model, found
+
+    def _observer(self, model: Model, only: Sequence[str] | None = None) -> Observer:
+        s = output_points(self.scene.output.points, model.length)
+        errors = model.follows_error and wants_errors(self.scene)
+        return Observer(
+            model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
+            corrected=model.corrected,
+        )  # fmt: skip
+
+
+def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
+    """All fields of an equilibrium."""
+    ends, shift = model.ends.at(np.inf), None
+    if model.follows_error:
+        model.sea.at(np.inf)
+        correction = Correction(model)
+        correction.begin(ends, found.state, at_rest=True, rubbed=found.rubbed)
+        shift = correction.shift(found.state)
+    return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
+
+
+def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
+    kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
+    left = {k.removeprefix(MODEL_ERRORS): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL_ERRORS)}
+    return RunSample(resolution, kept, compared_cells(model), 1, cpu, 1, False, left)
