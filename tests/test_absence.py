@@ -114,9 +114,9 @@ SCENES = {
     "friction of zero": (scene(BENDS, "rod", **bed(friction=0)), SEABED),
     "clump": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2)), 0),
     "clump with drag": (scene(BARE, **WET, **on_it(kind="clump", at=1.0, mass=0.2, drag_area=0.01)), BODIES),
-    "modules": (scene(BARE, **WET, **on_it(kind="modules", over=[0.5, 1.0], buoyancy=0.1)), 0),
+    "modules": (scene(BARE, **WET, **on_it(kind="modules", range=[0.5, 1.0], buoyancy=0.1)), 0),
     "modules with drag": (
-        scene(BARE, **WET, **on_it(kind="modules", over=[0.5, 1.0], buoyancy=0.1, drag_area=0.01)),
+        scene(BARE, **WET, **on_it(kind="modules", range=[0.5, 1.0], buoyancy=0.1, drag_area=0.01)),
         DRAG,
     ),
     "damping of zero": (scene(BARE | {"damping": {"mass": 0.0, "stiffness": 0.0}}), 0),
@@ -250,7 +250,9 @@ def test_results_kept_in_memory_write_no_file(tmp_path: Any, monkeypatch: pytest
 
 @pytest.mark.parametrize("command", ["schema", "--help", "--version"])
 def test_words_need_no_compiler_and_no_plots(command: str) -> None:
-    code = "import sys\nfrom hybrid.cli import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n"
+    code = (
+        "import sys\nfrom hybrid.cli.commands import main\ntry:\n    main(sys.argv[1:])\nexcept SystemExit as leave:\n"
+    )
     code += "    assert not leave.code\nassert not {'numba', 'matplotlib', 'h5py', 'scipy'} & set(sys.modules)"
     subprocess.run([sys.executable, "-c", code, command], check=True, capture_output=True)
 

@@ -44,7 +44,7 @@ def start() -> subprocess.Popen[str]:
         [*COMMAND, "--json"], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1
     )
     assert process.stdout is not None
-    while json.loads(process.stdout.readline())["event"] != "progress":
+    while json.loads(process.stdout.readline()).get("t", 0.0) < 0.2:  # two outputs
         pass
     return process
 

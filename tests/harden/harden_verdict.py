@@ -199,16 +199,16 @@ def failed(text: str, scene: Path, static: bool, faults: list[str]) -> Verdict:
     cause = text.strip().splitlines()[0] if text.strip() else "nothing said"
     if not re.search(r"^    try:      \S", text, re.M):
         faults.append(f"no try: {text!r}")
-    if not re.search(r" at (t = \S+ s( and s = )?|s = \S+ m)", cause):
+    if not re.search(r" \((t = \S+ s(, s = \S+ m)?|s = \S+ m)\)$", cause):
         faults.append(f"no place: {cause}")
-    if " at t = " in cause:
+    if " (t = " in cause:
         snapshot = re.search(r"^    snapshot: (.*)", text, re.M)
         if not (snapshot and Path(snapshot[1]).is_file()):
             faults.append(f"no snapshot: {text!r}")
         with hybrid.open(scene.with_suffix(".h5")) as result:
             if result.status != "failed":
                 faults.append(f"the file says {result.status}")
-    return Verdict("failed", cause.split(" at ")[0], faults, text)
+    return Verdict("failed", cause.split(" (")[0], faults, text)
 
 
 def not_whole(path: Path) -> Iterator[str]:

@@ -40,7 +40,7 @@ def test_submerged_weight_is_the_same_with_and_without_a_surface(surface):
 
 
 def test_modules_weigh_where_they_are():
-    modules = {"kind": "modules", "over": [20, 40], "mass": 5.0, "volume": 0.004}
+    modules = {"kind": "modules", "range": [20, 40], "mass": 5.0, "volume": 0.004}
     found = cable({"density": 1025, "surface": 100.0}, [modules])
     more = 9.81 * (5.0 - 1025 * 0.004)
     assert found.submerged_weight == pytest.approx([SUBMERGED, SUBMERGED + more, SUBMERGED], rel=1e-12)

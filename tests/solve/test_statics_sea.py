@@ -95,7 +95,7 @@ def test_random_variants_converge_or_are_refused_with_a_true_reason():
             refused.append(seed)
             continue
         found += 1
-        out_of_balance = float(result.message.split("out of balance ")[1].split()[0])
+        out_of_balance = float(result.message.split("residual force ")[1].split()[0])
         assert out_of_balance <= 1e-6 * np.abs(result.tension).max() + 1e-6, seed
     print(f"\n{found} of {len(SEEDS)} found; refused with a reason: {refused}")
     assert len(refused) <= 0.1 * len(SEEDS)

@@ -510,8 +510,8 @@ def test_touchdown_converges(amplitude, report):
 # --- the same said in other ways -----------------------------------------------------------------------
 
 TELLINGS = {
-    "turned by 73 deg": {"veer": 73.0},
-    "turned by 180 deg": {"veer": 180.0},
+    "turned by 73 deg": {"turn": 73.0},
+    "turned by 180 deg": {"turn": 180.0},
     "1 km away": {"away": 1000.0},
     "from the other end": {"swapped": True},
     "in four sections": {"split": True},
