@@ -204,7 +204,19 @@ def collected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     here = os.environ | {
         "PYTHONPATH": f"{folder}{os.pathsep}{ROOT}", "QUOTED": json.dumps(commands), "FOUND": str(folder / "found.json"),
     }  # fmt: skip
-    command = [sys.executable, "-m", "pytest", "-p", "select_quoted", "--collect-only", "-qq", "-m", "", "tests"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "select_quoted",
+        "--collect-only",
+        "-qq",
+        "-m",
+        "",
+        "tests",
+        "bench",
+    ]
     done = subprocess.run(command, cwd=ROOT, env=here, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-2000:]
     found: dict[str, Any] = json.loads((folder / "found.json").read_text(encoding="utf-8"))
