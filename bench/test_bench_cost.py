@@ -18,8 +18,8 @@ from scipy.linalg import solve_banded
 
 import hybrid
 from hybrid.kernels import compile as compiled
-from hybrid.kernels.assembly import march
 from hybrid.kernels.block_elimination import SIZE, WIDTH, eliminate_wide, substitute
+from hybrid.kernels.entry import assembly, block_rows
 from hybrid.model.build import build
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
@@ -100,11 +100,9 @@ def eliminate(rows, W, X):
 def test_elimination_against_lapack():
     """Elimination and substitution against solve_banded, on the same system of 1000 rod cells."""
     model, stepper, state = moving([("rod", 2.0, 1000)])
-    rows = np.zeros((1001, SIZE * WIDTH))
-    march(
-        model.line, model.sea.at(np.inf), model.ends.at(np.inf), state.e, stepper.u, state.r, state.v, state.vd, state.T, state.a1, state.w,
-        state.wd, 200.0, 4e4, stepper.gaps, stepper.W, stepper.X, stepper.report, rows,
-    )  # fmt: skip
+    rows = block_rows(model.line)
+    assembly(model.line, model.sea.at(np.inf), model.ends.at(np.inf), state, 200.0, 4e4, stepper.work._replace(rows=rows))
+    W, X, x = stepper.work.W, stepper.work.X, stepper.work.x
     blocks = rows.reshape(1001, SIZE, WIDTH)
     low, up = 14, 13
     ab, i = np.zeros((low + up + 1, SIZE * 1001)), np.arange(1001)
@@ -114,12 +112,12 @@ def test_elimination_against_lapack():
             inside = (column >= 0) & (column < SIZE * 1001) & (blocks[:, k, c] != 0)
             ab[up + row[inside] - column[inside], column[inside]] += blocks[inside, k, c]
     rhs = blocks[:, :, -1].ravel()
-    assert eliminate(rows, stepper.W, stepper.X)
+    assert eliminate(rows, W, X)
     ours, lapack = [], []
     for _ in range(50):
         begin = time.process_time()
-        eliminate(rows, stepper.W, stepper.X)
-        substitute(stepper.X, stepper.x)
+        eliminate(rows, W, X)
+        substitute(X, x)
         ours.append(time.process_time() - begin)
         begin = time.process_time()
         solve_banded((low, up), ab, rhs, check_finite=False)

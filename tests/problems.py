@@ -33,7 +33,9 @@ from scipy.special import ellipe, ellipeinc, ellipk, ellipkinc, j0
 
 from hybrid import Scene
 from hybrid.errors import Outcome
-from hybrid.kernels.assembly import SIZE, WIDTH, march, workspace
+from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.entry import assembly, block_rows, workspace
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.state import Ends, State
 from hybrid.model.build import Model, build
 from hybrid.solve.statics import solve_statics
@@ -155,13 +157,9 @@ def stiffness(model: Model, ends: Ends, state: State) -> Floats:
     A block of rows holds the length of the cell before the node, the balance of the node, and the spin of the cell
     after it; its unknowns are in that order, and its columns begin two blocks before its own.
     """
-    line, n = model.line, model.line.s.size
-    W, X_, _, report, _, gaps = workspace(n - 1)
-    rows = np.zeros((n, SIZE * WIDTH))
-    march(
-        line, model.sea.at(0.0), ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T,
-        state.a1, state.w, state.wd, 0.0, 0.0, gaps, W, X_, report, rows,
-    )  # fmt: skip
+    line, n = model.line._replace(bits=model.line.bits & ~PLANAR), model.line.s.size
+    rows = block_rows(line)
+    assembly(line, model.sea.at(0.0), ends, state, 0.0, 0.0, workspace(n - 1)._replace(rows=rows))
     J = np.zeros((SIZE * n, SIZE * (n + 5)))
     for i, row in enumerate(rows.reshape(n, SIZE, WIDTH)):
         J[SIZE * i : SIZE * (i + 1), SIZE * i : SIZE * (i + 4)] = row[:, : 4 * SIZE]

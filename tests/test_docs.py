@@ -169,7 +169,7 @@ CONSTANTS = (
     ("kernels.newton", "ROUND_OFF", 1e-6, "10⁻⁶"),
     ("kernels.newton", "LOW_TENSION", 1e-3, "10⁻³ of the scale"),
     ("kernels.newton", "LARGEST_TURN", 0.7, "0.7 rad"),
-    ("kernels.newton", "LARGEST_STEP_TURN", 1.0, "1 rad"),
+    ("kernels.step", "LARGEST_STEP_TURN", 1.0, "1 rad"),
     ("solve.stepper", "REACH", 0.1, "0.1 L"),
     ("solve.statics", "REACH", 0.1, "0.1 L"),
     ("solve.stepper", "MOST_ITERATIONS", 20, "20 in motion"),

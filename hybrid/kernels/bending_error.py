@@ -18,6 +18,7 @@ import math
 from typing import NamedTuple
 
 from hybrid.kernels.block_elimination import again
+from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.generalized_alpha import Scheme, scheme
@@ -65,7 +66,7 @@ class History(NamedTuple):
 
 
 @inner
-def seabed_rates(line, sea, i, state, u, left, right, history):
+def seabed_rates(line, sea, i, state, u, history):
     """What history adds to the force of the seabed on node i, and contact at r + e to its linearisation there."""
     v, e, y, ahead, out = state.v, state.e, history.y, history.ahead, history.travel
     n = (sea.normal[0], sea.normal[1], sea.normal[2])
@@ -74,8 +75,8 @@ def seabed_rates(line, sea, i, state, u, left, right, history):
     yi, q = -dot(n, get3(y, i)), -dot(n, get3(ahead, i))
     k, c, o = sea.stiffness, sea.damping, sea.onset
     for side in (-1, 1):
-        if (side < 0 and left) or (side > 0 and right):
-            j = i + side
+        j = i + side
+        if 0 <= j <= line.h.shape[0]:
             cell = i - 1 if side < 0 else i
             po = p + dot(n, get3(e, cell)) if side < 0 else p - dot(n, get3(e, cell))
             qo = -dot(n, get3(ahead, j))
@@ -112,7 +113,7 @@ def seabed_rates(line, sea, i, state, u, left, right, history):
 
 
 @inner
-def rates(line, sea, i, state, u, dl, ll, ill, dr, lr, ilr, left, right, history):
+def rates(line, sea, i, state, u, before, after, history):
     """Force that history adds on node i: d(force)/d(v) y + d(force)/d(vd) z, and the seabed's (`seabed_rates`).
 
     The derivative of the loads by position is affine in the weights of the march, D = K + cv C + ca M, so three of them
@@ -127,42 +128,43 @@ def rates(line, sea, i, state, u, dl, ll, ill, dr, lr, ilr, left, right, history
         elif k == 2:
             ca, x = 1.0, zi
         _, D, _, _ = inertia_and_water(
-            line, sea, i, state.r[i, 2], v, vd, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, history.powers
+            line, sea, i, state.r[i, 2], v, vd, before, after, cv, ca, history.powers
         )
         F = add(F, mat_vec(D, x))
     if line.bits & SEABED:
-        F = add(F, seabed_rates(line, sea, i, state, u, left, right, history))
+        F = add(F, seabed_rates(line, sea, i, state, u, history))
     return F
 
 
 @inner
-def damped_moment(line, i, n, d_before, il_before, d, il, y):
+def damped_moment(line, i, n, before, after, y):
     """What history adds to the moment of a damped element, to first order in its bend."""
     a, b, along_a, along_b = Z3, Z3, 0.0, 0.0
     tau = line.tau[min(i, n - 1)]
     if i > 0:
-        a = scale(il_before, cross(d_before, sub(get3(y, i), get3(y, i - 1))))
+        a = scale(before.il, cross(before.d, sub(get3(y, i), get3(y, i - 1))))
         along_a = y[i - 1, 3]
         tau = line.tau[i - 1] if i == n else 0.5 * (tau + line.tau[i - 1])
     if i < n:
-        b = scale(il, cross(d, sub(get3(y, i + 1), get3(y, i))))
+        b = scale(after.il, cross(after.d, sub(get3(y, i + 1), get3(y, i))))
         along_b = y[i, 3]
     m = scale(0.5 * tau * (line.kb[i, 0] + line.kb[i, 1]), sub(b, a))
-    return add(m, scale(tau * line.kb[i, 2], sub(scale(along_b, d), scale(along_a, d_before))))
+    return add(m, scale(tau * line.kb[i, 2], sub(scale(along_b, after.d), scale(along_a, before.d))))
 
 
 @inner
-def node_moment(line, M, i, n, damped, d_before, il_before, d, il, y):
+def node_moment(line, M, i, n, damped, before, after, y):
     """M of node i and, in a damped element, what history adds to it."""
     m = get3(M, i)
     if damped and line.element[i]:
-        m = add(m, damped_moment(line, i, n, d_before, il_before, d, il, y))
+        m = add(m, damped_moment(line, i, n, before, after, y))
     return m
 
 
 @inner
-def cell_force(line, i, d, il, Q, moving, history):
+def cell_force(line, i, chord, Q, moving, history):
     """Force of cell i that balances the difference Q of the moments at its ends, and the right-hand side of its spin."""
+    d, _, il = chord
     force = scale(il, cross(d, Q))
     spin = 0.0
     if line.spin[i]:
@@ -184,29 +186,28 @@ def right_hand_side(line, sea, ends, chords, state, u, M, moving, history, b):
     n = state.e.shape[0]
     y = history.y
     damped = moving and line.bits & STIFFNESS_DAMPING
-    d_before, l_before, il_before, force_before = Z3, 0.0, 0.0, Z3
-    d, l, il = chord_of(chords, 0)
-    m = node_moment(line, M, 0, n, damped, Z3, 0.0, d, il, y)
+    before, force_before = Chord(Z3, 0.0, 0.0), Z3
+    chord = chord_of(chords, 0)
+    m = node_moment(line, M, 0, n, damped, before, chord, y)
     gap = 0.0
     for i in range(n + 1):
-        cell = i < n
-        dn, ln, iln, mn = Z3, 0.0, 0.0, Z3
+        after, mn = Chord(Z3, 0.0, 0.0), Z3
         force, spin, next_gap = Z3, 0.0, 0.0
-        if cell:
+        if i < n:
             if i + 1 < n:
-                dn, ln, iln = chord_of(chords, i + 1)
+                after = chord_of(chords, i + 1)
             if damped and line.ck[i] > 0.0:
-                next_gap = -line.tau[i] * dot(d, sub(get3(y, i + 1), get3(y, i)))
-            mn = node_moment(line, M, i + 1, n, damped, d, il, dn, iln, y)
-            force, spin = cell_force(line, i, d, il, sub(mn, m), moving, history)
+                next_gap = -line.tau[i] * dot(chord.d, sub(get3(y, i + 1), get3(y, i)))
+            mn = node_moment(line, M, i + 1, n, damped, chord, after, y)
+            force, spin = cell_force(line, i, chord, sub(mn, m), moving, history)
         F = sub(force, force_before)
         if moving:
-            F = add(F, rates(line, sea, i, state, u, d_before, l_before, il_before, d, l, il, i > 0, cell, history))
+            F = add(F, rates(line, sea, i, state, u, before, chord, history))
         if (i == 0 and ends.held[0]) or (i == n and ends.held[1]):
             F = Z3
         b[i, 0], b[i, 1], b[i, 2], b[i, 3], b[i, 4] = gap, -F[0], -F[1], -F[2], spin
-        d_before, l_before, il_before, force_before, gap = d, l, il, force, next_gap
-        d, l, il, m = dn, ln, iln, mn
+        before, force_before, gap = chord, force, next_gap
+        chord, m = after, mn
 
 
 @inner

@@ -19,9 +19,18 @@ Every function returns the quantity and its exact derivative with respect to e.
 from __future__ import annotations
 
 import math
+from typing import Any, NamedTuple
 
 from hybrid.kernels.compile import inner
 from hybrid.kernels.rotations import dot, madd, mat_mat, mscale, msub, outer, project, scale, sub
+
+
+class Chord(NamedTuple):
+    """Direction, length and 1/length of a chord, in space or in a plane."""
+
+    d: Any
+    l: float
+    il: float
 
 
 @inner

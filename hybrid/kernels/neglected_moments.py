@@ -16,7 +16,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.cell import chord
+from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.node_forces import Z3, get3
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
@@ -43,7 +43,7 @@ class Bending(NamedTuple):
 @inner
 def chord_of(chords, i):
     """Direction, length and its inverse, as of `tabulate_chords`."""
-    return (chords[i, 0], chords[i, 1], chords[i, 2]), chords[i, 3], chords[i, 4]
+    return Chord((chords[i, 0], chords[i, 1], chords[i, 2]), chords[i, 3], chords[i, 4])
 
 
 @kernel

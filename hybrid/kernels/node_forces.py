@@ -26,12 +26,13 @@ def get3(A, i):
 
 
 @inner
-def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, d, l, il, cv, ca, report):
+def half_cell_water(line, c, side, z, eta, u, U1, vi, b, af, chord, cv, ca, report):
     """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord).
 
     z: height of the node; u: velocity relative to the water; b: acceleration relative to it; af: of the water.
     """
     bits = line.bits
+    d, l, il = chord
     f, D, L = Z3, Z9, Z9
     if bits & DRAG:
         f, B, L = half_cell_drag(u, d, il, line.drag_n[c], line.drag_t[c])
@@ -102,27 +103,24 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
 
 
 @inner
-def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
+def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     """Contact and friction at node i: F, D, GL, GR."""
     n = (sea.normal[0], sea.normal[1], sea.normal[2])
     p, vi = sea.offset + 0.5 * sea.onset - dot(n, x), get3(v, i)
     pd = -dot(n, vi)
     N = DN = NL = NR = 0.0  # force along n; its derivatives by the penetration of node i, and by those beside it
-    touched = 0.0
-    if left:
+    if i > 0:
         po = p + dot(n, get3(e, i - 1))
         if p > 0.0 or po > 0.0:
             h = line.h[i - 1]
             f, f0, f1, g0, g1 = contact(p, po, pd, -dot(n, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
             N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
-            touched += h
-    if right:
+    if i < line.h.shape[0]:
         po = p - dot(n, get3(e, i))
         if p > 0.0 or po > 0.0:
             h = line.h[i]
             f, f0, f1, g0, g1 = contact(p, po, pd, -dot(n, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset)
             N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
-            touched += h
     if line.footing[i] > 0.0 and p > 0.0:
         f, f0, g0 = pressure(0.0, p, p, pd, pd, sea.stiffness, sea.damping, sea.onset)
         N, DN = N + line.footing[i] * f, DN + line.footing[i] * (f0 + cv * g0)
@@ -146,8 +144,11 @@ def seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report):
 
 
 @inner
-def inertia_and_water(line, sea, i, z, vi, vdi, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
-    """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords)."""
+def inertia_and_water(line, sea, i, z, vi, vdi, before, after, cv, ca, report):
+    """Weight, inertia, damping and water on node i at height z: F, and its derivatives D (dr_i), GL, GR (chords).
+
+    before, after: the chords beside the node.
+    """
     m = line.mass[i]
     F = sub(get3(line.force, i), scale(m, vdi))
     c = -ca * m
@@ -171,11 +172,11 @@ def inertia_and_water(line, sea, i, z, vi, vdi, dl, ll, ill, dr, lr, ilr, left, 
             w, af = sub(w, get3(sea.flow, i)), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
             b = sub(b, af)
             eta += sea.flow[i, 6]
-        if left:
-            f, Df, GL = half_cell_water(line, i - 1, -1.0, z, eta, w, U1, vi, b, af, dl, ll, ill, cv, ca, report)
+        if i > 0:
+            f, Df, GL = half_cell_water(line, i - 1, -1.0, z, eta, w, U1, vi, b, af, before, cv, ca, report)
             F, D = add(F, f), madd(D, Df)
-        if right:
-            f, Df, GR = half_cell_water(line, i, 1.0, z, eta, w, U1, vi, b, af, dr, lr, ilr, cv, ca, report)
+        if i < line.h.shape[0]:
+            f, Df, GR = half_cell_water(line, i, 1.0, z, eta, w, U1, vi, b, af, after, cv, ca, report)
             F, D = add(F, f), madd(D, Df)
         if bits & BODIES:
             f, Df = body_water(line, i, z, eta, w, U1, vi, b, af, cv, ca, report)
@@ -184,13 +185,14 @@ def inertia_and_water(line, sea, i, z, vi, vdi, dl, ll, ill, dr, lr, ilr, left, 
 
 
 @inner
-def node_loads(line, sea, i, r, u, e, v, vd, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
+def node_loads(line, sea, i, r, u, state, before, after, cv, ca, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
+    v = state.v
     F, D, GL, GR = inertia_and_water(
-        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(vd, i), dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report
+        line, sea, i, r[i, 2] + u[i, 2], get3(v, i), get3(state.vd, i), before, after, cv, ca, report
     )
     if line.bits & SEABED:
         x = (r[i, 0] + u[i, 0], r[i, 1] + u[i, 1], r[i, 2] + u[i, 2])
-        f, Df, L, R = seabed_forces(line, sea, i, x, u, v, e, left, right, cv, report)
+        f, Df, L, R = seabed_forces(line, sea, i, x, u, v, state.e, cv, report)
         F, D, GL, GR = add(F, f), madd(D, Df), madd(GL, L), madd(GR, R)
     return F, D, GL, GR

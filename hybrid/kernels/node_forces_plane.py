@@ -13,6 +13,7 @@ from hybrid.kernels.plane import (
     dot2,
     drag2,
     friction2,
+    inside2,
     madd2,
     mscale2,
     msub2,
@@ -30,9 +31,10 @@ Z4 = (0.0, 0.0, 0.0, 0.0)
 
 
 @inner
-def half_cell_water2(line, c, side, up, z, eta, u, U1, vi, b, af, d, l, il, cv, ca, report):
+def half_cell_water2(line, c, side, up, z, eta, u, U1, vi, b, af, chord, cv, ca, report):
     """Force of the water on the half cell c before (side -1) or after (+1) a node: f, D (dr_i), L (chord)."""
     bits = line.bits
+    d, l, il = chord
     f, D, L = Z2, Z4, Z4
     if bits & DRAG:
         f, B, L = drag2(u, d, il, line.drag_n[c], line.drag_t[c])
@@ -103,25 +105,22 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
 
 
 @inner
-def seabed2(line, sea, i, r, u, v, e, left, right, cv, report):
+def seabed2(line, sea, i, r, u, v, e, cv, report):
     """Contact and friction at node i: F, D, GL, GR.  The bed's normal lies in the plane."""
     plane = line.plane
-    n = (
-        plane[0, 0] * sea.normal[0] + plane[0, 1] * sea.normal[1] + plane[0, 2] * sea.normal[2],
-        plane[1, 0] * sea.normal[0] + plane[1, 1] * sea.normal[1] + plane[1, 2] * sea.normal[2],
-    )
+    n = inside2(plane, sea.normal)
     p = sea.offset + 0.5 * sea.onset
     for k in range(3):
         p -= sea.normal[k] * (r[i, k] + u[i, k])
     pd = -dot2(n, part2(plane, v, i))
     N = DN = NL = NR = 0.0
-    if left:
+    if i > 0:
         po = p + dot2(n, part2(plane, e, i - 1))
         if p > 0.0 or po > 0.0:
             vo, h = -dot2(n, part2(plane, v, i - 1)), line.h[i - 1]
             f, f0, f1, g0, g1 = contact(p, po, pd, vo, h, sea.stiffness, sea.damping, sea.onset)
             N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
-    if right:
+    if i < line.h.shape[0]:
         po = p - dot2(n, part2(plane, e, i))
         if p > 0.0 or po > 0.0:
             vo, h = -dot2(n, part2(plane, v, i + 1)), line.h[i]
@@ -146,9 +145,10 @@ def seabed2(line, sea, i, r, u, v, e, left, right, cv, report):
 
 
 @inner
-def loads2(line, sea, i, r, u, e, v, vi, vdi, dl, ll, ill, dr, lr, ilr, left, right, cv, ca, report):
+def loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
     bits, plane = line.bits, line.plane
+    vi, vdi = part2(plane, state.v, i), part2(plane, state.vd, i)
     m = line.mass[i]
     F = part2(plane, line.force, i)
     F = (F[0] - m * vdi[0], F[1] - m * vdi[1])
@@ -169,28 +169,22 @@ def loads2(line, sea, i, r, u, e, v, vi, vdi, dl, ll, ill, dr, lr, ilr, left, ri
                 w[0] - plane[0, 0] * U[0] - plane[0, 1] * U[1] - plane[0, 2] * U[2],
                 w[1] - plane[1, 0] * U[0] - plane[1, 1] * U[1] - plane[1, 2] * U[2],
             )
-            U1 = (
-                plane[0, 0] * S[0] + plane[0, 1] * S[1] + plane[0, 2] * S[2],
-                plane[1, 0] * S[0] + plane[1, 1] * S[1] + plane[1, 2] * S[2],
-            )
+            U1 = inside2(plane, S)
         if bits & WAVES:
-            U, A = part2(plane, sea.flow, i), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
-            af = (
-                plane[0, 0] * A[0] + plane[0, 1] * A[1] + plane[0, 2] * A[2],
-                plane[1, 0] * A[0] + plane[1, 1] * A[1] + plane[1, 2] * A[2],
-            )
+            U = part2(plane, sea.flow, i)
+            af = inside2(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
             w, b = (w[0] - U[0], w[1] - U[1]), (b[0] - af[0], b[1] - af[1])
             eta += sea.flow[i, 6]
-        if left:
-            f, Df, GL = half_cell_water2(line, i - 1, -1.0, up, z, eta, w, U1, vi, b, af, dl, ll, ill, cv, ca, report)
+        if i > 0:
+            f, Df, GL = half_cell_water2(line, i - 1, -1.0, up, z, eta, w, U1, vi, b, af, before, cv, ca, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
-        if right:
-            f, Df, GR = half_cell_water2(line, i, 1.0, up, z, eta, w, U1, vi, b, af, dr, lr, ilr, cv, ca, report)
+        if i < line.h.shape[0]:
+            f, Df, GR = half_cell_water2(line, i, 1.0, up, z, eta, w, U1, vi, b, af, after, cv, ca, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
         if bits & BODIES:
             f, Df = body_water2(line, i, up, z, eta, w, U1, vi, b, af, cv, ca, report)
             F, D = (F[0] + f[0], F[1] + f[1]), madd2(D, Df)
     if bits & SEABED:
-        f, Df, L, R = seabed2(line, sea, i, r, u, v, e, left, right, cv, report)
+        f, Df, L, R = seabed2(line, sea, i, r, u, state.v, state.e, cv, report)
         F, D, GL, GR = (F[0] + f[0], F[1] + f[1]), madd2(D, Df), madd2(GL, L), madd2(GR, R)
     return F, D, GL, GR

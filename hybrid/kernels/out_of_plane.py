@@ -22,11 +22,11 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hybrid.kernels.assembly_plane import end_chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.generalized_alpha import scheme
-from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, part2
+from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
+from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, end_chord, inside2, part2
 from hybrid.kernels.rotations import jacobian_functions
 from hybrid.kernels.water import current_at
 
@@ -93,47 +93,39 @@ def loads_out_of_plane(line, sea, i, state):
         u, b = part2(plane, state.v, i), part2(plane, state.vd, i)
         z, eta = state.r[i, 2], sea.surface
         if bits & FLOW:
-            U, _ = current_at(sea.z, sea.current, sea.now[1], z)
-            u = (
-                u[0] - plane[0, 0] * U[0] - plane[0, 1] * U[1] - plane[0, 2] * U[2],
-                u[1] - plane[1, 0] * U[0] - plane[1, 1] * U[1] - plane[1, 2] * U[2],
-            )
-        if bits & WAVES:
-            U, A = part2(plane, sea.flow, i), (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])
+            U = inside2(plane, current_at(sea.z, sea.current, sea.now[1], z)[0])
             u = (u[0] - U[0], u[1] - U[1])
-            b = (
-                b[0] - plane[0, 0] * A[0] - plane[0, 1] * A[1] - plane[0, 2] * A[2],
-                b[1] - plane[1, 0] * A[0] - plane[1, 1] * A[1] - plane[1, 2] * A[2],
-            )
+        if bits & WAVES:
+            U, A = part2(plane, sea.flow, i), inside2(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
+            u, b = (u[0] - U[0], u[1] - U[1]), (b[0] - A[0], b[1] - A[1])
             eta += sea.flow[i, 6]
         if not (bits & SURFACE and z > eta):
+            # in the axes of the plane: the laws of space, of which what acts along the third axis is taken
+            u3, b3 = (u[0], u[1], 0.0), (b[0], b[1], 0.0)
             for side in range(2):
                 c = i - 1 + side
                 if c < 0 or c >= e.shape[0]:
                     continue
                 d, _, _ = chord2(part2(plane, e, c))
-                m = (-d[1], d[0])
-                tilt = 0.0
+                d3, tilt = (d[0], d[1], 0.0), 0.0
                 if bits & DRAG:
-                    ut, un = dot2(u, d), abs(dot2(u, m))
-                    rate += line.drag_n[c] * un
-                    tilt += (line.drag_n[c] * un - line.drag_t[c] * abs(ut)) * ut
+                    _, B, L = half_cell_drag(u3, d3, 1.0, line.drag_n[c], line.drag_t[c])
+                    rate -= B[8]
+                    tilt += L[8]
                 if bits & ADDED_MASS:
-                    inert += line.added_n[c]
-                    tilt += (line.added_n[c] - line.added_t[c]) * dot2(b, d)
+                    _, D, L = half_cell_added_mass(b3, d3, 1.0, line.added_n[c], line.added_t[c], 1.0)
+                    inert -= D[8]
+                    tilt += L[8]
                 if side == 0:
                     before = tilt
                 else:
                     after = tilt
             if bits & BODIES:
-                rate += line.point_drag[i] * math.sqrt(dot2(u, u))
+                _, B = body_drag(u3, line.point_drag[i])
+                rate -= B[8]
                 inert += line.point_added[i]
     if bits & SEABED and bits & FRICTION:  # a small push does not slide
-        f = part2(plane, sea.bed, i)
-        n = (
-            plane[0, 0] * sea.normal[0] + plane[0, 1] * sea.normal[1] + plane[0, 2] * sea.normal[2],
-            plane[1, 0] * sea.normal[0] + plane[1, 1] * sea.normal[1] + plane[1, 2] * sea.normal[2],
-        )
+        f, n = part2(plane, sea.bed, i), inside2(plane, sea.normal)
         stiff += sea.friction[1] * max(dot2(f, n), 0.0) / sea.slip_length
     return stiff, rate, inert, before, after
 
@@ -241,6 +233,14 @@ def held(ends, i, n):
 
 
 @inner
+def hold_node(A, o):
+    """A held node does not move: the equation at o says so."""
+    for j in range(-REACH, REACH + 1):
+        A[o + j] = 0.0
+    A[o] = -1.0
+
+
+@inner
 def assemble_nodes(line, sea, ends, state, s, was, now, A):
     """Loads on the nodes into their balances in A; the push as predicted into `now`."""
     plane, n = line.plane, state.e.shape[0]
@@ -253,9 +253,7 @@ def assemble_nodes(line, sea, ends, state, s, was, now, A):
         vdp = (am * ai - af * was[i, 3]) / (1.0 - af) + ca * be * dt * dt * ai
         now[i, 0], now[i, 1], now[i, 3] = wp, vp, vdp
         if held(ends, i, n):
-            for j in range(-REACH, REACH + 1):
-                A[o + j] = 0.0
-            A[o] = -1.0
+            hold_node(A, o)
             continue
         stiff, rate, inert, before, after = loads_out_of_plane(line, sea, i, state)
         A[o] -= stiff + cv * rate + ca * inert
@@ -333,3 +331,24 @@ def step_out_of_plane(line, sea, ends, state, dt, before, rho, was, now, A):
     assemble_nodes(line, sea, ends, state, s, was, now, A)
     wrong = eliminate(A, rows)
     return substitute_push(line, ends, s, was, now, A), wrong
+
+
+@kernel
+def wrong_pivots_at_rest(line, sea, ends, state, soft, A):
+    """How many pivots of a line at rest have the wrong sign, with springs of `soft` (1/s2) times the mass.
+
+    None: its stiffness across the plane is positive definite.  A: as of `step_out_of_plane`; cleared here.
+    """
+    n = state.e.shape[0]
+    rows = 2 * (n + 1)
+    for j in range((rows + REACH) * BAND):
+        A[j] = 0.0
+    assemble_cells(line, ends, state.e, state.T, state.a1, A)
+    for i in range(n + 1):
+        o = 2 * i * BAND + REACH
+        if held(ends, i, n):
+            hold_node(A, o)
+        else:
+            stiff, _, inert, _, _ = loads_out_of_plane(line, sea, i, state)
+            A[o] -= stiff + soft * inert
+    return eliminate(A, rows)

@@ -58,6 +58,15 @@ def part2(plane, A, i):
 
 
 @inner
+def inside2(plane, a):
+    """The two components of a vector of space that lie in the plane."""
+    return (
+        plane[0, 0] * a[0] + plane[0, 1] * a[1] + plane[0, 2] * a[2],
+        plane[1, 0] * a[0] + plane[1, 1] * a[1] + plane[1, 2] * a[2],
+    )
+
+
+@inner
 def across2(plane, A, i):
     """The component of row i of A along the normal."""
     return plane[2, 0] * A[i, 0] + plane[2, 1] * A[i, 1] + plane[2, 2] * A[i, 2]
@@ -79,6 +88,26 @@ def chord2(e):
     l = math.sqrt(e[0] * e[0] + e[1] * e[1])
     il = 1.0 / l
     return (il * e[0], il * e[1]), l, il
+
+
+@inner
+def end_chord(plane, frame, k):
+    """The direction that the frame of end k prescribes, in the plane."""
+    x, y, z = frame[k, 2], frame[k, 5], frame[k, 8]
+    return (
+        plane[0, 0] * x + plane[0, 1] * y + plane[0, 2] * z,
+        plane[1, 0] * x + plane[1, 1] * y + plane[1, 2] * z,
+    )
+
+
+@inner
+def carried(plane, a, d, dn):
+    """Director a (normal to the chord d of space) when the chord turns within the plane to dn, in the plane."""
+    x = plane[2, 0] * a[0] + plane[2, 1] * a[1] + plane[2, 2] * a[2]
+    m = spread2(plane, (-d[1], d[0]))
+    y = a[0] * m[0] + a[1] * m[1] + a[2] * m[2]
+    m = spread2(plane, (-dn[1], dn[0]))
+    return (x * plane[2, 0] + y * m[0], x * plane[2, 1] + y * m[1], x * plane[2, 2] + y * m[2])
 
 
 @inner

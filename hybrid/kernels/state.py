@@ -1,7 +1,6 @@
-"""The arrays a solver works on: the line (what does not move), its ends, the sea around it, and its state.
+"""The arrays a solver works on: the line (what does not move), its ends, the sea around it, its state, its work.
 
-All four are NamedTuples of contiguous arrays with fixed types, so that one compiled
-signature serves every scene.  N cells, N+1 nodes; SI units; inertial frame unless said.
+All are NamedTuples of contiguous arrays with fixed types, so that one compiled signature serves every scene.  N cells, N+1 nodes; SI units; inertial frame unless said.
 """
 
 from __future__ import annotations
@@ -111,6 +110,18 @@ class State(NamedTuple):
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
+
+
+class Work(NamedTuple):
+    """Arrays that a solver works in; kernels.entry.workspace makes them."""
+
+    u: Floats  # (N+1, 3) m, displacement of the nodes since the start of the step
+    x: Floats  # (N+1, 5) Newton's correction: dT of the cell before (N), dr of the node (m), dpsi of the cell after (rad)
+    W: Floats  # one block row
+    X: Floats  # the eliminated block rows, and what another right-hand side needs of them where there is room for it
+    report: Floats  # (REPORT_SIZE,) named in kernels.report
+    gaps: Floats  # (N,) m, change of length asked of inextensible cells; empty: their law of length
+    rows: Floats  # (N+1, ...) the block rows before their elimination; empty: they are not kept
 
 
 def blank_state(n_cells: int) -> State:

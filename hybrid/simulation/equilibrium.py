@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.forces import FRICTION
+from hybrid.kernels.forces import FRICTION, PLANAR
+from hybrid.kernels.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
+from hybrid.model.plane import planar, untwist
 from hybrid.scene.schema import Scene
+from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium, solve_statics
 
 
@@ -29,12 +33,35 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
         raise ComputationError(failed.outcome, None, failed.s, because) from None
 
 
-def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
+def solve_model(
+    model: Model, t: float, start: State, settle: bool, quick: bool = False, take_slack: bool = False,
+    others: Sequence[tuple[str, State]] = (),
+) -> Equilibrium:  # fmt: skip
+    """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space.
+
+    settle, quick, take_slack, others: as of `solve_statics`.
+    """
+    sea, ends = model.sea.at(t), model.ends.at(t)
+    rest = model.length, model.tension_scale, model.slack_floor
+    if model.plane is not None and not model.line.bits & PLANAR:
+        line, flat = planar(model.line, model.plane), start.copy()
+        untwist(line, model.ends.values, model.cable.held_tangent, flat)
+        try:
+            found = solve_statics(line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True)
+            if is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
+                return found
+        except ComputationError:  # there are more ways in space
+            pass
     return solve_statics(
-        model.line, model.sea.at(t), model.ends.at(t), model.start, model.length, model.tension_scale,
-        model.slack_floor, take_slack=model.slack == "warn" and not quick, shape=model.start_shape,
-        others=model.other_starts, settle=getattr(scene.initial, "friction", "") == "settled", quick=quick,
+        model.line, sea, ends, start, *rest, take_slack=take_slack, shape=model.start_shape, settle=settle,
+        others=others, quick=quick,
     )  # fmt: skip
+
+
+def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
+    settle = getattr(scene.initial, "friction", "") == "settled"
+    slack = model.slack == "warn" and not quick
+    return solve_model(model, t, model.start, settle, quick, slack, model.other_starts)
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:

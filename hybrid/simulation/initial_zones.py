@@ -16,9 +16,9 @@ from hybrid.model.layout import Layout
 from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.equilibrium import equilibrium_of
+from hybrid.simulation.equilibrium import equilibrium_of, solve_model
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.solve.statics import Equilibrium, solve_statics
+from hybrid.solve.statics import Equilibrium
 
 # Hold time of a scene that does not say: a part of the time of a transverse wave along the line, and some time steps.
 HOLD, LEAST_STEPS_HELD = 0.25, 20
@@ -142,10 +142,7 @@ def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: fl
 
 def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
     """rubbed: whether friction took part in what it is compared with."""
-    return solve_statics(
-        model.line, model.sea.at(t), model.ends.at(t), start, model.length, model.tension_scale, model.slack_floor,
-        shape=model.start_shape, settle=rubbed,
-    )  # fmt: skip
+    return solve_model(model, t, start, settle=rubbed)
 
 
 def _on_fewer(state: State, s: Floats, line: Line) -> State:

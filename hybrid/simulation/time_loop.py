@@ -129,7 +129,7 @@ class TimeLoop:
         ends, work = model.ends.at(run.t), np.array(run.work)
         ratios = switching.manager.told if switching is not None else None
         shift = run.correction.shift(run.state) if run.correction is not None else None
-        values = self.observer.values(ends, run.state, run.stepper.report, work, ratios, shift)
+        values = self.observer.values(ends, run.state, run.stepper.work.report, work, ratios, shift)
         self.recorder.save(run.t, values, self.observer.zone_rows)
         if self.target is None:
             return

@@ -10,15 +10,16 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.assembly import march, workspace
+from hybrid.kernels import entry
 from hybrid.kernels.bending_error import ErrorArrays, Step, advance_error
 from hybrid.kernels.energies import observe
+from hybrid.kernels.entry import workspace
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
-from hybrid.kernels.newton import lay
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, no_sea
+from hybrid.kernels.step import lay
 from hybrid.solve.stepper import Stepper
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
@@ -164,22 +165,20 @@ class Corrector:
         line = self.line._replace(bits=self.line.bits & ~(WAVES if rubbed else FRICTION | WAVES))
         if line.bits & FRICTION:
             lay(sea, state.e, state.slip)
-        W, X, _, report, rows, gaps = workspace(line.h.size, keep=True)
+        work = workspace(line.h.size, keep=True)
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
-        still = np.zeros_like(state.r)
-        march(
-            line, sea, ends, state.e, still, state.r, still, still, state.T, state.a1, np.zeros_like(state.w),
-            np.zeros_like(state.w), 0.0, ca, gaps, W, X, report, rows,
-        )  # fmt: skip
+        still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)
+        entry.assembly(line, sea, ends, state._replace(v=still, vd=still, w=no_spin, wd=no_spin), 0.0, ca, work)
         self.slid[:] = 0.0
-        self._advance(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), X, W)
+        self._advance(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), work.X, work.W)
 
     def step(
         self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, before: float, rho: float,
         torque: float = 0.0,
     ) -> None:  # fmt: skip
         """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
-        self._advance(self.line, sea, ends, state, Step(stepper.u, dt, before, rho, torque), stepper.X, stepper.W)
+        work = stepper.work
+        self._advance(self.line, sea, ends, state, Step(work.u, dt, before, rho, torque), work.X, work.W)
 
     def _advance(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, X: Floats, W: Floats) -> None:
         self.sea = sea

@@ -7,22 +7,20 @@ from dataclasses import dataclass
 from itertools import islice
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.forces import DRAG, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
-from hybrid.kernels.newton import lay, lowest, newton
+from hybrid.kernels import entry
+from hybrid.kernels.entry import Limits, workspace
+from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.step import lay
+from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 
 MOST_ITERATIONS = 40  # of Newton from a poor shape: 6 to 12 are usual, beyond 40 it wanders
 REACH = 0.1  # of the length: largest shift of a node in one iteration
-# What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
-# length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
-ANCHOR, NEUTRAL = 1e-12, 1e-9
 # An equilibrium is out of balance by at most this part of its largest tension and of the scale; so many tries.
 BALANCED, BALANCING = 1e-6, 4
 # A line that has gone this many lengths from its start has drifted; one that lies this part of its length, and this
@@ -32,13 +30,6 @@ MOST_TURNING = 200  # of Newton with turning chords, which goes half a radian at
 LOAD_STEPS = (1, 8, 64)  # ladders of end loads tried when Newton does not get there in one go
 NEARLY_STIFF = 1e-6  # strain at the tension scale at which hardening ends; the last part of the way is Newton's
 HARDENING = 8  # parts of the way from a soft, short line to the real one; a part that fails is halved
-CHECKED_COMPLIANCE = (
-    1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
-)
-# What the factor of the stiffness loses of a node's bending stiffness (some fifty rounded operations a row), and the
-# part of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
-LOST, HIDDEN = 1e-14, 0.1
-NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
 LEAST_TENSION = 1e-3  # of the slack floor of a motion, with the opposite sign
 PUSH, TURN = 1e-2, 0.1  # the push off an unstable equilibrium: of the length per time scale, and rad about the chord
 RELAXING_STEPS = 2000  # of the pseudo-transient, at most
@@ -70,113 +61,13 @@ class Equilibrium:
         return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
 
 
-def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None) -> bool:
-    """True when the stiffness in `rows` (N+1, 5 x 24) of the march, made symmetric, is positive definite.
-
-    Tensions are eliminated through the stiffness `axial` (N, 3, 3), d d^T/(h ck), of each
-    cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q, normal, where the line may
-    move in that plane only.
-    """
-    n = rows.shape[0]
-    J = -rows.reshape(n, SIZE, WIDTH)
-    # blocks (r, psi) of the stiffness: K[i, j] couples block i with block i - 2 + j
-    K = np.zeros((n, 5, 4, 4))
-    for j, first in enumerate((1, 6, 11, 16)):
-        K[:, j] = J[:, 1:5, first : first + 4]
-    K[:, 4, :, :3] = J[:, 1:5, 20:23]
-    for a, b in ((0, 0), (1, 1)):
-        K[a : n - 1 + b, 2, :3, :3] += axial
-    K[:-1, 3, :3, :3] -= axial
-    K[1:, 1, :3, :3] -= axial
-    if plane is not None:
-        K[..., :3, :3] = plane @ K[..., :3, :3] @ plane.T
-    free = np.ones((n, 4), bool)
-    free[0, :3], free[-1, :3] = not ends.held[0], not ends.held[1]
-    free[:-1, 3], free[-1, 3] = spin != 0, False
-    if plane is not None:
-        free[:, 2:] = False
-    held = ~free.ravel()
-    reach = 11
-    band = np.zeros((reach + 1, 4 * n))
-    for offset in range(3):  # blocks on and right of the diagonal, averaged with their mirrors
-        upper = K[: n - offset, 2 + offset]
-        mirror = K[offset:, 2 - offset].transpose(0, 2, 1)
-        mean = 0.5 * (upper + mirror)
-        for k in range(4):
-            for m in range(4):
-                j = 4 * offset + m - k
-                if 0 <= j <= reach:
-                    band[j, k : 4 * (n - offset) : 4] = mean[:, k, m]
-    for j in range(reach + 1):
-        band[j, : 4 * n - j] *= ~(held[: 4 * n - j] | held[j:])
-    band[0, held] = 1.0
-    try:
-        cholesky_banded(band, lower=True, check_finite=False)
-    except LinAlgError:
-        return False
-    return True
-
-
-def is_judged(line: Line, ends: Ends, length: float) -> bool:
-    """Whether the test of stability can speak: there is a rod, and no end moment to speak of.
-
-    A moment that keeps its direction in space is not conservative; positive definiteness says nothing then.
-    """
-    bending = float((line.kb * line.hn[:, None]).max(initial=0.0)) / length
-    return bool(line.element.any()) and float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
-
-
-def is_stable(line: Line, sea: Sea, ends: Ends, state: State, length: float, scale: float) -> bool:
-    """True when the static stiffness of a state in space is positive definite, or cannot be judged."""
-    line = line._replace(bits=line.bits & ~PLANAR)
-    return not is_judged(line, ends, length) or _Solver(line, sea, length, scale, -np.inf).stable(ends, state)
-
-
 class _Solver:
     def __init__(self, line: Line, sea: Sea, length: float, scale: float, floor: float) -> None:
-        n = line.h.size
         self.line, self.sea, self.length, self.scale, self.floor = line, sea, length, scale, floor
-        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n)
-        self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)
+        self.work = workspace(line.h.size)
+        self.stability = Stability(line, sea, length, scale)
+        self.anchor = self.stability.anchor
         self.total = 0
-        self.blurred = False  # whether round-off had the last word on stability
-
-    def stable(self, ends: Ends, state: State) -> bool:
-        """True when the stiffness of the line is positive definite, or when round-off hides whether it is.
-
-        Short cells are so stiff in bending that the last digits of that may outweigh a slight tension: what fails
-        by no more than they are worth is no buckling.
-        """
-        mass, h = self.line.mass, np.append(self.line.h, self.line.h[-1])
-        soft = NEUTRAL / ANCHOR * self.anchor
-        self.blurred = False
-        if self._definite(ends, state, soft):
-            return True
-        bending = self.line.kb[:, :2].max(axis=1) * self.line.element
-        lost = LOST * float((bending / (h * h * mass)).max())
-        if lost <= soft or not self._definite(ends, state, lost):
-            return False
-        EI = (bending * self.line.hn)[self.line.element == 1].min()
-        self.blurred = bool(lost * float(mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
-        return True
-
-    def _definite(self, ends: Ends, state: State, soft: float) -> bool:
-        """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass.
-
-        Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
-        and at its real size its round-off would hide the softest modes of a long line.
-        """
-        # drag counts as a load that keeps its direction: how it turns with the cable is not conservative
-        line, n = self.line._replace(bits=self.line.bits & ~DRAG), self.line.h.size
-        rows = np.zeros((n + 1, SIZE * WIDTH))
-        march(
-            line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
-            state.w, state.wd, 0.0, soft, self.gaps, self.W, self.X, self.report, rows,
-        )  # fmt: skip
-        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-        stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
-        plane = line.plane if line.bits & PLANAR else None
-        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin, plane)
 
     def newton(
         self, line: Line, ends: Ends, start: State, turning: bool = False, sea: Sea | None = None
@@ -189,18 +80,16 @@ class _Solver:
         new = start.copy()
         for still in (new.v, new.a, new.vd, new.w, new.wa, new.wd):
             still[:] = 0.0
-        most = MOST_TURNING if turning else MOST_ITERATIONS
+        limits = Limits(REACH * self.length, self.scale, MOST_TURNING if turning else MOST_ITERATIONS)
         for _ in range(BALANCING):
-            u = np.zeros_like(new.r)
+            self.work.u[:] = 0.0
             if line.bits & FRICTION:
                 lay(self.sea, new.e, new.slip)
-            outcome, iterations, _, where = newton(
-                line, sea or self.sea, ends, new.r, u, new.e, new.v, new.vd, new.T, new.a1, new.w, new.wd,
-                0.0, self.anchor, REACH * self.length, self.scale, most, turning, self.gaps, self.W, self.X, self.x,
-                self.report, self.rows,
-            )  # fmt: skip
+            outcome, iterations, _, where = entry.equilibrium(
+                line, sea or self.sea, ends, new, self.anchor, limits, turning, self.work
+            )
             self.total += iterations
-            new.r[:] += u
+            new.r[:] += self.work.u
             new.vd[:], new.wd[:] = 0.0, 0.0  # of the anchor's springs
             new.slip[:] = self.sea.slid if line.bits & FRICTION else 0.0
             if outcome != Outcome.OK or line is not self.line or sea is not None:
@@ -208,7 +97,7 @@ class _Solver:
             # Newton stops by turns and tensions; a very stiff seabed makes much force of little way
             if self.prove(ends, new) <= BALANCED * (float(np.abs(new.T).max()) + self.scale):
                 break
-            outcome, where = Outcome.NOT_CONVERGED, int(self.report[RESIDUAL_NODE])
+            outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
         if outcome == Outcome.OK:
             tension, cell = lowest(line, new.T)
             if not tension > self.floor:
@@ -222,7 +111,7 @@ class _Solver:
                 if deep.max() > max(BURIED * self.length, BURIED_ONSETS * self.sea.onset):
                     outcome, where = Outcome.BURIED, int(np.argmax(deep))
         judged = line is self.line and sea is None and is_judged(line, ends, self.length)
-        if outcome == Outcome.OK and judged and not self.stable(ends, new):
+        if outcome == Outcome.OK and judged and not self.stability.holds(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
 
@@ -230,11 +119,9 @@ class _Solver:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
         if self.line.bits & FRICTION:
             lay(self.sea, state.e, state.slip)
-        bad = march(
-            self.line, self.sea, ends, state.e, np.zeros_like(state.r), state.r, state.v, state.vd, state.T, state.a1,
-            state.w, state.wd, 0.0, self.anchor, self.gaps, self.W, self.X, self.report, self.rows,
-        )  # fmt: skip
-        return float(self.report[RESIDUAL]) if bad < 0 else float("inf")
+        self.work.u[:] = 0.0
+        bad = entry.assembly(self.line, self.sea, ends, state, 0.0, self.anchor, self.work)
+        return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")
 
 
 def _loaded(solver: _Solver, ends: Ends, start: State) -> Iterator[tuple[str, Outcome, int, State]]:
@@ -463,7 +350,7 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
     rubbed = bool(solver.line.bits & FRICTION)
-    judged = (is_judged(solver.line, ends, solver.length) and not solver.blurred) or not solver.line.element.any()
+    judged = (is_judged(solver.line, ends, solver.length) and not solver.stability.blurred) or not solver.line.element.any()
     return Equilibrium(
-        state, tuple(path), solver.total, residual, solver.report.copy(), int(slack), rubbed, judged, solver.blurred
+        state, tuple(path), solver.total, residual, solver.work.report.copy(), int(slack), rubbed, judged, solver.stability.blurred
     )

@@ -10,13 +10,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels import entry
+from hybrid.kernels.entry import Limits, block_rows, out_of_balance, workspace
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
-from hybrid.kernels.newton import advance, lay
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.step import lay
 from hybrid.kernels.water import stir
 from hybrid.solve.plane_stability import NOTHING, Push
 
@@ -75,13 +75,11 @@ class Stepper:
     ) -> None:
         """keep: whether the factors of the last matrix stay for another right-hand side (solve.bending_corrector)."""
         self.line = line
-        self.reach, self.scale = REACH * length, tension_scale
+        self.limits = Limits(REACH * length, tension_scale, MOST_ITERATIONS)
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        n = line.h.size
-        self.W, self.X, self.x, self.report, self.rows, self.gaps = workspace(n, keep)
-        self.u = np.zeros((n + 1, 3))
+        self.work = workspace(line.h.size, keep)
         self.push: Push | None = None  # out of the plane, of a planar motion that is watched
-        self.told: list[float] = self.report.tolist()  # the report of the last step or start, as plain numbers
+        self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
         """From `old` to `new` (overwritten) over dt with the end conditions and the sea of the new time.
@@ -89,11 +87,10 @@ class Stepper:
         before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
         """
         was, now = self.push.pair(old, new) if self.push is not None else (NOTHING, NOTHING)
-        outcome, iterations, left, where = advance(
-            self.line, sea, ends, old, new, self.u, dt, before, rho, self.reach, self.scale, MOST_ITERATIONS,
-            self.gaps, self.W, self.X, self.x, self.report, self.rows, was, now,
-        )  # fmt: skip
-        self.told = told = self.report.tolist()
+        outcome, iterations, left, where = entry.step(
+            self.line, sea, ends, old, new, dt, before, rho, self.limits, was, now, self.work
+        )
+        self.told = told = self.work.report.tolist()
         if outcome == OK and not told[SLACKEST] > self.floor:
             outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])
         return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR])
@@ -102,19 +99,17 @@ class Stepper:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
         if not self.line.bits & FRICTION:
             return
-        n = self.line.s.size
-        rows = np.zeros((n, SIZE * WIDTH))
         state.slip[:] = 0.0
         still = np.zeros_like(state.r)
         stretch = np.linalg.norm(state.e, axis=1) / self.line.h - 1.0
         tension = np.divide(stretch, self.line.ck, out=np.zeros_like(stretch), where=self.line.ck > 0.0)
         line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
-        march(
-            line, sea, ends, state.e, still, state.r, state.v, still, tension, state.a1, state.w, state.wd,
-            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
-        )  # fmt: skip
-        force = -rows.reshape(n, SIZE, WIDTH)[:, 1:4, -1]
-        force[np.flatnonzero(ends.held) * (n - 1)] = 0.0
+        rows = block_rows(line)
+        self.work.u[:] = 0.0
+        at_rest = state._replace(vd=still, T=tension)
+        entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
+        force = out_of_balance(line, rows)
+        force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
         lay(sea, state.e, state.slip)
         state.slip[:] = travel_that_holds(self.line, sea, state.r, force)
 
@@ -132,64 +127,54 @@ class Stepper:
         e1 = np.diff(state.v, axis=0)
         across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
         gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
-        self.u[:], self.X[:] = 0.0, 0.0  # steps in a plane leave in X what the march in space takes for nought
-        self.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
+        work = self.work
+        work.u[:], work.X[:] = 0.0, 0.0
+        work.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
         held = ends._replace(position=state.r[[0, -1]])
         if self.line.bits & WAVES:
-            stir(sea, state.r, self.u)
+            stir(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
             lay(sea, state.e, state.slip)
-        bad = march(
-            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
-            0.0, HEAVY, gaps, self.W, self.X, self.report, self.rows,
-        )  # fmt: skip
-        if bad >= 0 or not substitute(self.X, self.x):
-            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(self.report[RESIDUAL]))
-        state.vd[:] = HEAVY * self.x[:, 1:4]
-        if self.line.bits & PLANAR:  # round-off across the plane would stay there
-            state.vd[:] -= np.outer(state.vd @ self.line.plane[2], self.line.plane[2])
+        bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
+        if bad >= 0:
+            return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
+        state.vd[:] = HEAVY * work.x[:, 1:4]
         state.a[:] = state.vd
-        state.T[:] += self.x[1:, 0]
+        state.T[:] += work.x[1:, 0]
         turning = (
             (self.line.spin == 1) & (self.line.polar > 0) & (not self.line.bits & PLANAR)
         )  # a spin without inertia has no acceleration
-        state.wd[turning] = HEAVY * self.x[:-1, 4][turning]
+        state.wd[turning] = HEAVY * work.x[:-1, 4][turning]
         state.wa[:] = state.wd
-        self.u[:] = 0.0
-        march(  # once more for the forces that go with them
-            self.line, sea, held, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
-            0.0, HEAVY, self.gaps, self.W, self.X, self.report, self.rows,
-        )  # fmt: skip
+        work.u[:] = 0.0
+        entry.assembly(self.line, sea, held, state, 0.0, HEAVY, work)  # once more for the forces that go with them
         if self.line.bits & SEABED:
-            self.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
+            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed
-        self.told = self.report.tolist()
+        self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
     def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
         """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
-        rows = np.zeros((self.line.s.size, SIZE * WIDTH))
+        rows = block_rows(self.line)
         self._march_as_it_is(sea, ends, state, rows)
-        return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+        return out_of_balance(self.line, rows)
 
     def feel(self, sea: Sea, ends: Ends, state: State) -> None:
         """The forces and the report of a state as it is, for the books of the step that follows."""
-        self._march_as_it_is(sea, ends, state, self.rows)
+        self._march_as_it_is(sea, ends, state, self.work.rows)
         if self.line.bits & SEABED:
-            self.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
+            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed
-        self.told = self.report.tolist()
+        self.told = self.work.report.tolist()
 
     def _march_as_it_is(self, sea: Sea, ends: Ends, state: State, rows: Floats) -> None:
-        self.u[:] = 0.0
+        self.work.u[:] = 0.0
         if self.line.bits & WAVES:
-            stir(sea, state.r, self.u)
+            stir(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
             lay(sea, state.e, state.slip)
-        march(
-            self.line, sea, ends, state.e, self.u, state.r, state.v, state.vd, state.T, state.a1, state.w, state.wd,
-            0.0, HEAVY, self.gaps, self.W, self.X, self.report, rows,
-        )  # fmt: skip
+        entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work._replace(rows=rows))
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""

@@ -9,9 +9,9 @@ import pytest
 from test_jacobian import BITS, CA, CV, ZONES, N, assembled, random_case
 
 import hybrid
-from hybrid.kernels.assembly import march, workspace
 from hybrid.kernels.bending_error import History, right_hand_side
 from hybrid.kernels.block_elimination import again
+from hybrid.kernels.entry import assembly, workspace
 from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.neglected_moments import Bending, neglected_moments, tabulate_chords
 from hybrid.kernels.report import REPORT_SIZE
@@ -30,8 +30,8 @@ def test_kept_factors_solve_any_right_hand_side(name, held):
     line, sea, ends, st = random_case(3, ZONES[name], 2047, held)
     u = np.zeros_like(st.r)
     J, _ = assembled(line, sea, ends, st, u)
-    W, X, _, report, rows, gaps = workspace(N, keep=True)
-    march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows)
+    work = workspace(N, keep=True)
+    assembly(line, sea, ends, st, CV, CA, work)
     b = np.random.default_rng(8).normal(size=(N + 1, 5))
     b[0, 0] = 0.0  # there is no cell before the start
     b[:-1, 4] *= line.spin
@@ -40,7 +40,7 @@ def test_kept_factors_solve_any_right_hand_side(name, held):
         if held[k]:
             b[node, 1:4] = 0.0
     x = np.zeros((N + 1, 5))
-    assert again(X, W, b, x)
+    assert again(work.X, work.W, b, x)
     expected = np.linalg.solve(J, b.ravel()).reshape(N + 1, 5)
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 
@@ -50,12 +50,9 @@ def test_keeping_factors_changes_nothing():
     line, sea, ends, st = random_case(5, ZONES["three"], 2047)
     found = []
     for keep in (False, True):
-        W, X, _, report, rows, gaps = workspace(N, keep)
-        march(
-            line, sea, ends, st.e, np.zeros_like(st.r), st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X,
-            report, rows,
-        )  # fmt: skip
-        found.append((X[: (N + 1) * 45].copy(), report.copy()))
+        work = workspace(N, keep)
+        assembly(line, sea, ends, st, CV, CA, work)
+        found.append((work.X[: (N + 1) * 45].copy(), work.report.copy()))
     np.testing.assert_array_equal(found[0][0], found[1][0])
     np.testing.assert_array_equal(found[0][1], found[1][1])
 
@@ -351,7 +348,7 @@ def test_nothing_left_out_is_absent_and_says_why(model, bending, why):
 
 def test_a_stepper_keeps_factors_only_when_asked():
     line, _, _, _ = random_case(1, ZONES["catenary"], 0)
-    assert Stepper(line, 1.0, 1.0).X.size * 109 == Stepper(line, 1.0, 1.0, keep=True).X.size * 45
+    assert Stepper(line, 1.0, 1.0).work.X.size * 109 == Stepper(line, 1.0, 1.0, keep=True).work.X.size * 45
 
 
 @pytest.mark.parametrize(

@@ -10,8 +10,8 @@ import itertools
 import numpy as np
 import pytest
 
-from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.forces import (
     ADDED_MASS,
     BODIES,
@@ -25,7 +25,7 @@ from hybrid.kernels.forces import (
     SURFACE,
     WAVES,
 )
-from hybrid.kernels.newton import update
+from hybrid.kernels.configuration import update
 from hybrid.kernels.state import Ends, Line, Sea, blank_state
 
 N = 7
@@ -103,9 +103,8 @@ def random_sea(g):
 def assembled(line, sea, ends, st, u, cv=CV, ca=CA):
     """Dense Jacobian and right-hand side of the rows that the march eliminates."""
     n = st.e.shape[0] + 1
-    W, X, _, report, _, gaps = workspace(n - 1)
-    rows = np.zeros((n, SIZE * WIDTH))
-    march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
+    rows = block_rows(line)
+    assembly(line, sea, ends, st, cv, ca, workspace(n - 1)._replace(rows=rows, u=u))
     J, b = np.zeros((5 * n, 5 * n + 25)), np.zeros(5 * n)
     for i in range(n):
         block = rows[i].reshape(SIZE, WIDTH)
@@ -117,9 +116,9 @@ def assembled(line, sea, ends, st, u, cv=CV, ca=CA):
 
 def residual_at(line, sea, ends, st, x):
     """Right-hand side after the configuration is moved by x (shape (N+1, 5))."""
-    s, u = st.copy(), np.zeros_like(st.r)
-    update(line, s.e, u, s.v, s.vd, s.T, s.a1, s.w, s.wd, np.ascontiguousarray(x), CV, CA, 1.0, False)
-    return assembled(line, sea, ends, s, u)[1]
+    s, work = st.copy(), workspace(N)._replace(x=np.ascontiguousarray(x))
+    update(None, line, s, CV, CA, 1.0, False, work)
+    return assembled(line, sea, ends, s, work.u)[1]
 
 
 @pytest.mark.parametrize(("zones", "bits"), list(itertools.product(ZONES, BITS)))
@@ -153,10 +152,7 @@ def test_elimination_equals_a_dense_solve(zones, held, inextensible):
         line = line._replace(ck=np.zeros(N))
     u = np.zeros_like(st.r)
     J, b = assembled(line, sea, ends, st, u)
-    W, X, x, report, rows, gaps = workspace(N)
-    assert (
-        march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, CV, CA, gaps, W, X, report, rows)
-        == -1
-    )
-    assert substitute(X, x)
+    work = workspace(N)
+    assert correction(line, sea, ends, st, CV, CA, work) == -1
+    x = work.x
     assert np.abs(x.ravel() - np.linalg.solve(J, b)).max() < 1e-14 * np.linalg.cond(J) * np.abs(x).max()

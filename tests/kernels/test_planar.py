@@ -11,10 +11,11 @@ import pytest
 from test_jacobian import BITS, CA, CV, ZONES, random_case
 
 from hybrid.kernels import forces
-from hybrid.kernels.assembly import march, workspace
-from hybrid.kernels.assembly_plane import WIDE, march_planar, substitute_planar, update_planar
-from hybrid.kernels.block_elimination import SIZE, WIDTH, substitute
+from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.block_elimination_plane import WIDE
+from hybrid.kernels.entry import block_rows, correction, workspace
 from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.configuration import update
 from hybrid.kernels.out_of_plane import BAND, step_out_of_plane
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import State
@@ -90,19 +91,19 @@ def flat_case(seed, element, bits, held=(0, 0), anisotropic=False):
     return line, sea, ends, st
 
 
-def in_space(line, sea, ends, st, u, cv=CV, ca=CA):
-    """Rows, correction and report of the march in space."""
-    W, X, x, report, _, gaps = workspace(N)
-    rows = np.zeros((N + 1, SIZE * WIDTH))
-    bad = march(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, st.w, st.wd, cv, ca, gaps, W, X, report, rows)
-    return rows, x if bad < 0 and substitute(X, x) else None, report
+def solved(line, sea, ends, st, u, cv=CV, ca=CA):
+    """Rows, correction (None where a block is singular) and report of the march."""
+    work = workspace(N)._replace(rows=block_rows(line), u=u)
+    good = correction(line, sea, ends, st, cv, ca, work) < 0
+    return work.rows, work.x if good else None, work.report
 
 
-def in_plane(line, sea, ends, st, u):
-    _, X, x, report, _, _ = workspace(N)
-    rows = np.zeros((N + 1, 3 * WIDE))
-    bad = march_planar(line, sea, ends, st.e, u, st.r, st.v, st.vd, st.T, st.a1, CV, CA, X, report, rows)
-    return rows, x if bad < 0 and substitute_planar(line.plane, X, x) else None, report
+def in_space(line, *rest):
+    return solved(line._replace(bits=line.bits & ~PLANAR), *rest)
+
+
+def in_plane(line, *rest):
+    return solved(line, *rest)
 
 
 @pytest.mark.parametrize("seed", range(3))
@@ -147,9 +148,9 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
         x[j // 3, 0] = way if j % 3 == 0 else 0.0
         if j % 3:
             x[j // 3, 1:4] = way * line.plane[j % 3 - 1]
-        s, u = st.copy(), np.zeros_like(st.r)
-        update_planar(line, s.e, u, s.v, s.vd, s.T, s.a1, x, CV, CA, 1.0)
-        return dense(in_plane(line, sea, ends, s, u)[0])[1]
+        s, work = st.copy(), workspace(N)._replace(x=x)
+        update(line.plane, line, s, CV, CA, 1.0, False, work)
+        return dense(in_plane(line, sea, ends, s, work.u)[0])[1]
 
     for j in range(3 * N + 3):
         f = [residual(j, k * t) for k in (-2, -1, 1, 2)]
@@ -207,5 +208,5 @@ def _assembled(line, sea, ends, st, cv, ca):
 
 
 def test_band_of_the_push_fits_its_work_array():
-    assert workspace(N)[1].size >= (2 * (N + 1) + 4) * BAND
-    assert workspace(1)[1].size >= (2 * 2 + 4) * BAND
+    assert workspace(N).X.size >= (2 * (N + 1) + 4) * BAND
+    assert workspace(1).X.size >= (2 * 2 + 4) * BAND

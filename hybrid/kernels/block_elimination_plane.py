@@ -1,0 +1,163 @@
+"""Block rows of a cable in a plane: their elimination and the solve back, with three unknowns per node instead of five.
+
+Block i has the tension of the cell before node i (dT_{i-1}) and the node's two components in the plane; its rows are
+the length of that cell and the balance of the node.  After elimination
+
+    x_i = X_i[5] - X_i[0..2] x_{i+1} - X_i[3..4] dr_{i+2}
+
+with X_i in three rows of six numbers.  In space: kernels.block_elimination.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.block_elimination import first_gone, fourth_gone, second_gone, third_gone
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.plane import spread2
+
+COLUMNS = 6  # of a row of X_i
+TRIPLE = 3 * COLUMNS  # numbers of X_i
+WIDE = 13  # of a block row before elimination (kernels.assembly_plane)
+
+
+@inner
+def less2(l, t, X, p):
+    """(l, t) . (dr, dT rows of the block of X at p): what it takes from dT, dr, the next dr, the right-hand side."""
+    a, b, c = p + COLUMNS, p + 2 * COLUMNS, p
+    return (
+        l[0] * X[a] + l[1] * X[b] + t * X[c],
+        l[0] * X[a + 1] + l[1] * X[b + 1] + t * X[c + 1],
+        l[0] * X[a + 2] + l[1] * X[b + 2] + t * X[c + 2],
+        l[0] * X[a + 3] + l[1] * X[b + 3] + t * X[c + 3],
+        l[0] * X[a + 4] + l[1] * X[b + 4] + t * X[c + 4],
+        l[0] * X[a + 5] + l[1] * X[b + 5] + t * X[c + 5],
+    )
+
+
+@inner
+def back_by_two(l, X, p):
+    """l . (dr rows of the block of X at p), as `less2` without its tension."""
+    a, b = p + COLUMNS, p + 2 * COLUMNS
+    return (
+        l[0] * X[a] + l[1] * X[b],
+        l[0] * X[a + 1] + l[1] * X[b + 1],
+        l[0] * X[a + 2] + l[1] * X[b + 2],
+        l[0] * X[a + 3] + l[1] * X[b + 3],
+        l[0] * X[a + 4] + l[1] * X[b + 4],
+        l[0] * X[a + 5] + l[1] * X[b + 5],
+    )
+
+
+@inner
+def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
+    """Eliminate the block of node i; False when it is singular.
+
+    length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
+    balance  K dr_{i-2} + L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} + V dr_{i+2} = b
+    """
+    t1, t2 = 0.0, 0.0
+    L1, L2, D1, D2, b1, b2 = (L[0], L[1]), (L[2], L[3]), (D[0], D[1]), (D[2], D[3]), b[0], b[1]
+    if i >= 2:
+        p = (i - 2) * TRIPLE
+        x, y = back_by_two((K[0], K[1]), X, p), back_by_two((K[2], K[3]), X, p)
+        t1, L1, D1, b1 = -x[0], (L1[0] - x[1], L1[1] - x[2]), (D1[0] - x[3], D1[1] - x[4]), b1 - x[5]
+        t2, L2, D2, b2 = -y[0], (L2[0] - y[1], L2[1] - y[2]), (D2[0] - y[3], D2[1] - y[4]), b2 - y[5]
+    x = y = z = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if i >= 1:
+        p = (i - 1) * TRIPLE
+        x, y, z = less2((-row[0], -row[1]), 0.0, X, p), less2(L1, t1, X, p), less2(L2, t2, X, p)
+    # rows of dT_{i-1}, dr_i | dT_i, dr_{i+1}, dr_{i+2} | right-hand side
+    B0 = (-hck - x[0], row[0] - x[1], row[1] - x[2], 0.0, -x[3], -x[4], 0.0, 0.0, gap - x[5])
+    B1 = (back[0] - y[0], D1[0] - y[1], D1[1] - y[2], ahead[0], U[0] - y[3], U[1] - y[4], V[0], V[1], b1 - y[5])
+    B2 = (back[1] - z[0], D2[0] - z[1], D2[1] - z[2], ahead[1], U[2] - z[3], U[3] - z[4], V[2], V[3], b2 - z[5])
+    # Gauss-Jordan in registers; a pivot of zero makes everything infinite or NaN, which is seen at the end
+    if abs(B1[0]) > abs(B0[0]):
+        B0, B1 = B1, B0
+    if abs(B2[0]) > abs(B0[0]):
+        B0, B2 = B2, B0
+    f = 1.0 / B0[0]
+    C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6], f * B0[7], f * B0[8])
+    C1, C2 = first_gone(B1, C0), first_gone(B2, C0)
+    if abs(C2[0]) > abs(C1[0]):
+        C1, C2 = C2, C1
+    f = 1.0 / C1[0]
+    E1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5], f * C1[6], f * C1[7])
+    E0, E2 = second_gone(C0, E1), second_gone(C2, E1)
+    f = 1.0 / E2[0]
+    F2 = (f * E2[1], f * E2[2], f * E2[3], f * E2[4], f * E2[5], f * E2[6])
+    F0, F1 = third_gone(E0, F2), third_gone(E1, F2)
+    o = i * TRIPLE
+    for k in range(COLUMNS):
+        X[o + k], X[o + COLUMNS + k], X[o + 2 * COLUMNS + k] = F0[k], F1[k], F2[k]
+    return abs(F0[5]) + abs(F1[5]) + abs(F2[5]) < math.inf
+
+
+@inner
+def less_chain(A, m, X, p, q):
+    """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
+    return (
+        A[0] - m[0] * X[p] - m[1] * X[q],
+        A[1] - m[0] * X[p + 1] - m[1] * X[q + 1],
+        A[2] - m[0] * X[p + 2] - m[1] * X[q + 2],
+        A[3] - m[0] * X[p + 5] - m[1] * X[q + 5],
+    )
+
+
+@inner
+def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
+    """As `eliminate2` where nothing bends: X_i keeps zeros for dr_{i+2}."""
+    B0 = (-hck, row[0], row[1], gap)
+    B1 = (back[0], D[0], D[1], b[0])
+    B2 = (back[1], D[2], D[3], b[1])
+    if i >= 1:
+        p = (i - 1) * TRIPLE + COLUMNS
+        q = p + COLUMNS
+        B0 = less_chain(B0, (-row[0], -row[1]), X, p, q)
+        B1 = less_chain(B1, (L[0], L[1]), X, p, q)
+        B2 = less_chain(B2, (L[2], L[3]), X, p, q)
+    G0 = (B0[0], B0[1], B0[2], 0.0, 0.0, 0.0, B0[3])
+    G1 = (B1[0], B1[1], B1[2], ahead[0], U[0], U[1], B1[3])
+    G2 = (B2[0], B2[1], B2[2], ahead[1], U[2], U[3], B2[3])
+    if abs(G1[0]) > abs(G0[0]):
+        G0, G1 = G1, G0
+    if abs(G2[0]) > abs(G0[0]):
+        G0, G2 = G2, G0
+    f = 1.0 / G0[0]
+    C0 = (f * G0[1], f * G0[2], f * G0[3], f * G0[4], f * G0[5], f * G0[6])
+    C1, C2 = third_gone(G1, C0), third_gone(G2, C0)
+    if abs(C2[0]) > abs(C1[0]):
+        C1, C2 = C2, C1
+    f = 1.0 / C1[0]
+    E1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5])
+    E0, E2 = fourth_gone(C0, E1), fourth_gone(C2, E1)
+    f = 1.0 / E2[0]
+    F2 = (f * E2[1], f * E2[2], f * E2[3], f * E2[4])
+    a, c = E0[0], E1[0]
+    F0 = (E0[1] - a * F2[0], E0[2] - a * F2[1], E0[3] - a * F2[2], E0[4] - a * F2[3])
+    F1 = (E1[1] - c * F2[0], E1[2] - c * F2[1], E1[3] - c * F2[2], E1[4] - c * F2[3])
+    o = i * TRIPLE
+    for F in (F0, F1, F2):
+        X[o], X[o + 1], X[o + 2], X[o + 3], X[o + 4], X[o + 5] = F[0], F[1], F[2], 0.0, 0.0, F[3]
+        o += COLUMNS
+    return abs(F0[3]) + abs(F1[3]) + abs(F2[3]) < math.inf
+
+
+@kernel
+def substitute_planar(plane, X, x):
+    """Solve back from the end: x (N+1, 5) receives dT, dr (in space) and no spin; False if one is not finite."""
+    n = x.shape[0] - 1
+    y = (0.0, 0.0, 0.0)
+    z = (0.0, 0.0)
+    total = 0.0
+    for i in range(n, -1, -1):
+        p = i * TRIPLE
+        q, s = p + COLUMNS, p + 2 * COLUMNS
+        t = X[p + 5] - X[p] * y[0] - X[p + 1] * y[1] - X[p + 2] * y[2] - X[p + 3] * z[0] - X[p + 4] * z[1]
+        a = X[q + 5] - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * z[0] - X[q + 4] * z[1]
+        b = X[s + 5] - X[s] * y[0] - X[s + 1] * y[1] - X[s + 2] * y[2] - X[s + 3] * z[0] - X[s + 4] * z[1]
+        total += abs(t) + abs(a) + abs(b)
+        x[i, 0], x[i, 4] = t, 0.0
+        x[i, 1], x[i, 2], x[i, 3] = spread2(plane, (a, b))
+        y, z = (t, a, b), (y[1], y[2])
+    return total < math.inf

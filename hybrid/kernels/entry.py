@@ -1,0 +1,79 @@
+"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.newton.solve)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
+from hybrid.kernels.block_elimination_plane import WIDE
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task, solve
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
+
+NO_PUSH: Floats = np.zeros((0, 4))
+ONE_MARCH = Limits(1.0, 1.0, 1)
+
+
+def plane_of(line: Line) -> Floats | None:
+    """The plane that tells `solve` for which kind of line it is."""
+    return line.plane if line.bits & PLANAR else None
+
+
+def workspace(n_cells: int, keep: bool = False) -> Work:
+    """Arrays for a line of `n_cells` cells; keep: with room for the factors that another right-hand side needs."""
+    return Work(
+        u=np.zeros((n_cells + 1, 3)),
+        x=np.zeros((n_cells + 1, SIZE)),
+        W=np.zeros(SIZE * WIDTH),
+        X=np.zeros((n_cells + 1) * (ROW + KEPT if keep else ROW)),
+        report=np.zeros(REPORT_SIZE),
+        gaps=np.zeros(0),
+        rows=np.zeros((0, SIZE * WIDTH)),
+    )
+
+
+def block_rows(line: Line) -> Floats:
+    """Room for the block rows of a line, for `work.rows`."""
+    n = line.s.size
+    return np.zeros((n, 3 * WIDE if line.bits & PLANAR else SIZE * WIDTH))
+
+
+def out_of_balance(line: Line, rows: Floats) -> Floats:
+    """Force (N+1, 3) N left over at every node of which the block rows are known."""
+    if line.bits & PLANAR:
+        return np.asarray(-rows.reshape(-1, 3, WIDE)[:, 1:, -1] @ line.plane[:2])
+    return np.asarray(-rows.reshape(-1, SIZE, WIDTH)[:, 1:4, -1])
+
+
+def step(
+    line: Line, sea: Sea, ends: Ends, old: State, new: State, dt: float, before: float, rho: float, limits: Limits,
+    was: Floats, now: Floats, work: Work,
+) -> tuple[int, int, float, int]:  # fmt: skip
+    """One step in time from `old` to `new` (overwritten)."""
+    task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits)
+    return solve(plane_of(line), task, line, sea, ends, old, new, was, now, work)
+
+
+def equilibrium(
+    line: Line, sea: Sea, ends: Ends, state: State, ca: float, limits: Limits, turning: bool, work: Work
+) -> tuple[int, int, float, int]:
+    """One static solve from state.r + work.u; ca: 1/s2, of springs of that times the mass."""
+    task = Task(EQUILIBRIUM, ca=ca, turning=turning, limits=limits)
+    return solve(plane_of(line), task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+
+
+def assembly(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    """The block rows and the report of a state (kernels.assembly.march); -1, or a node whose block was singular."""
+    return _one_march(ASSEMBLY, line, sea, ends, state, cv, ca, work)
+
+
+def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    """As `assembly`, and the solution into work.x; -1, or a node whose block was singular."""
+    return _one_march(CORRECTION, line, sea, ends, state, cv, ca, work)
+
+
+def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
+    task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
+    outcome, _, _, where = solve(plane_of(line), task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    return -1 if outcome == OK else max(where, 0)

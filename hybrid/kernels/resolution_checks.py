@@ -1,0 +1,91 @@
+"""What a converged step says of the mesh: bends and twists that it does not resolve, the lowest tension."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.assembly import get9
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.element import relative_rotation
+from hybrid.kernels.plane import angle_between, chord2, end_chord, part2
+from hybrid.kernels.rotations import frame, log_rotation
+
+# At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
+# the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
+CLAMP = 20.0
+
+
+@inner
+def sharpest_planar(plane, line, ends, e, T):
+    """As `sharpest` for a cable in a plane: largest bend and its node; there is no twist."""
+    bend, at = 0.0, -1
+    n = e.shape[0]
+    d, l, _ = chord2(part2(plane, e, 0))
+    for i in range(n + 1):
+        before = d if i > 0 else end_chord(plane, ends.frame, 0)
+        here = l
+        if 0 < i < n:
+            d, l, _ = chord2(part2(plane, e, i))
+        if not line.element[i]:
+            continue
+        x = abs(angle_between(before, d if i < n else end_chord(plane, ends.frame, 1)))
+        if i == 0 or i == n:
+            c = min(i, n - 1)
+            stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+            weight = 2.0
+            if T[c] > 0.0 and here * here * T[c] > stiffness:
+                weight = CLAMP * here * math.sqrt(T[c] / stiffness)
+            x *= weight
+        if not x <= bend:
+            bend, at = x, i
+    return bend, at, 0.0, -1
+
+
+@kernel
+def sharpest(plane, line, ends, e, T, a1):
+    """How far the mesh is from resolving a rod: largest bend and twist of an element, rad, and their nodes (-1: none).
+
+    The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
+    h/lambda where the cell is longer than lambda = sqrt(EI/T), over which a cable leaves its clamp.
+    """
+    if plane is not None:
+        return sharpest_planar(plane, line, ends, e, T)
+    bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
+    n = e.shape[0]
+    for i in range(n + 1):
+        if not line.element[i]:
+            continue
+        c = min(i, n - 1)
+        d, l, _ = chord((e[c, 0], e[c, 1], e[c, 2]))
+        Rb = frame((a1[c, 0], a1[c, 1], a1[c, 2]), d)
+        weight = 1.0
+        if 0 < i < n:
+            d, _, _ = chord((e[i - 1, 0], e[i - 1, 1], e[i - 1, 2]))
+            Ra = frame((a1[i - 1, 0], a1[i - 1, 1], a1[i - 1, 2]), d)
+        else:
+            Ra = get9(ends.frame, 0 if i == 0 else 1)
+            if i == n:
+                Ra, Rb = Rb, Ra
+            stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+            weight = 2.0
+            if T[c] > 0.0 and l * l * T[c] > stiffness:
+                weight = CLAMP * l * math.sqrt(T[c] / stiffness)
+        k = log_rotation(relative_rotation(Ra, Rb))
+        x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
+        y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
+        if not x <= bend:
+            bend, bend_at = x, i
+        if not y <= twist:
+            twist, twist_at = y, i
+    return bend, bend_at, twist, twist_at
+
+
+@kernel
+def lowest(line, T):
+    """Lowest tension of a catenary zone and its cell; infinity and -1 without one."""
+    where, low = -1, math.inf
+    for i in range(T.shape[0]):
+        if not line.spin[i] and not T[i] > low:
+            where, low = i, T[i]
+    return low, where

@@ -1,0 +1,193 @@
+"""What stands before and after Newton in a step of generalized-alpha (docs/theory.md, 2)."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, WAVES
+from hybrid.kernels.generalized_alpha import weights
+from hybrid.kernels.configuration import carry_director
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.out_of_plane import step_out_of_plane
+from hybrid.kernels.report import (
+    BEND,
+    BEND_NODE,
+    CONTACT_WORK,
+    FRICTION_WORK,
+    LOCAL_ERROR,
+    LOCAL_ERROR_NODE,
+    PUSH_ENERGY,
+    SEABED_ENERGY,
+    SLACKEST,
+    SLACKEST_CELL,
+    TWIST,
+    TWIST_NODE,
+    WRONG_PIVOTS,
+)
+from hybrid.kernels.resolution_checks import lowest, sharpest
+from hybrid.kernels.rotations import dot, spin_about
+from hybrid.kernels.seabed import stored
+from hybrid.kernels.water import stir
+
+# A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts.
+LARGEST_STEP_TURN = 1.0
+
+
+@inner
+def widest_turn(e, u):
+    """Largest change of a chord e by the displacements u, as a part of its length (an angle in rad), and its cell."""
+    widest, where = 0.0, -1
+    for i in range(e.shape[0]):
+        x, y, z = u[i + 1, 0] - u[i, 0], u[i + 1, 1] - u[i, 1], u[i + 1, 2] - u[i, 2]
+        part = (x * x + y * y + z * z) / (e[i, 0] * e[i, 0] + e[i, 1] * e[i, 1] + e[i, 2] * e[i, 2])
+        if not part <= widest:
+            widest, where = part, i
+    return math.sqrt(widest), where
+
+
+@kernel
+def lay(sea, e, slip):
+    """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
+    n, last = sea.normal, e.shape[0]
+    for i in range(last + 1):
+        x, y, z = 0.0, 0.0, 0.0
+        for c in range(max(i - 1, 0), min(i + 1, last)):
+            d, _, _ = chord(get3(e, c))
+            x, y, z = x + d[0], y + d[1], z + d[2]
+        w = n[0] * x + n[1] * y + n[2] * z
+        x, y, z = x - w * n[0], y - w * n[1], z - w * n[2]
+        size = math.sqrt(x * x + y * y + z * z)
+        if not size > 1e-9:  # upright or folded: any direction in the plane
+            x, y, z = 1.0 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]
+            size = math.sqrt(x * x + y * y + z * z)
+        sea.axis[i, 0], sea.axis[i, 1], sea.axis[i, 2] = x / size, y / size, z / size
+        sea.slip[i, 0], sea.slip[i, 1], sea.slip[i, 2] = slip[i, 0], slip[i, 1], slip[i, 2]
+
+
+@inner
+def unrest(old, new):
+    """Largest change of the algorithmic acceleration in a step, m/s2, and its node."""
+    worst, where = 0.0, 0
+    for i in range(old.a.shape[0]):
+        x, y, z = new.a[i, 0] - old.a[i, 0], new.a[i, 1] - old.a[i, 1], new.a[i, 2] - old.a[i, 2]
+        size = x * x + y * y + z * z
+        if not size <= worst:
+            worst, where = size, i
+    return math.sqrt(worst), where
+
+
+@inner
+def predict_nodes(old, new, u, s):
+    """Displacement, velocity and acceleration with the algorithmic acceleration kept."""
+    dt, am, af, _, be, _, ca = s
+    for i in range(u.shape[0]):
+        for k in range(3):
+            ai = old.a[i, k]
+            # with a' = a the increment is dt v + dt^2 a/2, and what remains is be dt^2 (a' - a) = 0
+            u[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * ai
+            new.v[i, k] = old.v[i, k] + dt * ai
+            new.vd[i, k] = (am * ai - af * old.vd[i, k]) / (1.0 - af) + ca * be * dt * dt * ai
+
+
+@inner
+def predict_cells(plane, line, old, new, u, s):
+    """Chords, tensions, directors and spins that go with it."""
+    dt, am, af, _, be, cv, ca = s
+    for i in range(old.e.shape[0]):
+        ei = get3(old.e, i)
+        en = (ei[0] + u[i + 1, 0] - u[i, 0], ei[1] + u[i + 1, 1] - u[i, 1], ei[2] + u[i + 1, 2] - u[i, 2])
+        new.e[i, 0], new.e[i, 1], new.e[i, 2] = en
+        new.T[i] = old.T[i]
+        new.w[i], new.wd[i] = 0.0, 0.0
+        a = get3(old.a1, i)
+        if line.spin[i]:
+            a = carry_director(plane, a, ei, en)
+            if plane is None:
+                dpsi = dt * old.w[i] + 0.5 * dt * dt * old.wa[i]
+                new.w[i] = old.w[i] + dt * old.wa[i]
+                new.wd[i] = (am * old.wa[i] - af * old.wd[i]) / (1.0 - af) + ca * be * dt * dt * old.wa[i]
+                if line.bits & ROTARY:
+                    dn, _, _ = chord(en)
+                    a = spin_about(a, dn, dpsi)
+                else:
+                    # without inertia twist is a balance, sought from where it was: a spin that goes on by itself would
+                    # pass through that balance turn after turn
+                    new.w[i] -= cv * dpsi
+                    new.wd[i] -= ca * dpsi
+        new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
+
+
+@inner
+def find_rates(plane, line, sea, old, new, u, s):
+    """Positions, algorithmic accelerations and elastic travel after the step.
+
+    a' = (r' - rp)/(be dt^2) with rp = r + dt v + dt^2 (1/2 - be) a; likewise for the spin, through w'.
+    """
+    dt, _, _, ga, be, _, _ = s
+    for i in range(u.shape[0]):
+        for k in range(3):
+            rp = dt * old.v[i, k] + dt * dt * (0.5 - be) * old.a[i, k]
+            new.a[i, k] = (u[i, k] - rp) / (be * dt * dt)
+            new.r[i, k] = old.r[i, k] + u[i, k]
+            if line.bits & FRICTION:
+                new.slip[i, k] = sea.slid[i, k]
+    for i in range(old.e.shape[0]):
+        new.wa[i] = 0.0
+        if plane is None:
+            if line.spin[i]:
+                new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
+
+
+@inner
+def book_seabed(line, sea, old, new, u, report):
+    """Work of the seabed in the step, and what it stores."""
+    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
+    for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
+        b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
+             0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
+        ui = get3(u, i)
+        along = dot(normal, ui) * dot(normal, b)
+        report[CONTACT_WORK] += along
+        report[FRICTION_WORK] += dot(b, ui) - along
+        new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+    report[SEABED_ENERGY] = stored(line, sea, new.r)
+
+
+@inner
+def begin_step(plane, line, sea, old, new, u, s):
+    """Predict the end of a step from `old` into `new`, with the algorithmic acceleration kept.
+
+    Returns the largest turn of a chord (rad) and its cell; beyond LARGEST_STEP_TURN the step is not begun.
+    """
+    predict_nodes(old, new, u, s)
+    turn, cell = widest_turn(old.e, u)
+    if turn < LARGEST_STEP_TURN:
+        predict_cells(plane, line, old, new, u, s)
+        if line.bits & WAVES:  # at the predicted positions, which are right to third order
+            stir(sea, old.r, u)
+        if line.bits & FRICTION:
+            lay(sea, old.e, old.slip)
+    return turn, cell
+
+
+@inner
+def end_step(plane, line, sea, ends, old, new, s, task, was, now, work):
+    """Report of a step that Newton has solved.  Returns its largest turn of a chord, rad, and its cell."""
+    u, report, dt = work.u, work.report, s.dt
+    report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest(
+        plane, line, ends, new.e, new.T, new.a1
+    )
+    report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
+    change, place = unrest(old, new)
+    _, _, _, _, slip = weights(task.rho, task.before / dt)
+    report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place
+    if line.bits & SEABED:
+        book_seabed(line, sea, old, new, u, report)
+    if plane is not None:
+        if was.shape[0] > 0:
+            report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
+                line, sea, ends, new, dt, task.before, task.rho, was, now, work.X
+            )
+    return widest_turn(old.e, u)

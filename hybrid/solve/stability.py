@@ -1,0 +1,162 @@
+"""Whether an equilibrium would stay: its stiffness is positive definite, or round-off hides whether it is.
+
+In a plane the stiffness falls apart in two, within the plane and across it.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy.linalg import LinAlgError, cholesky_banded
+
+from hybrid.kernels import entry
+from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.block_elimination_plane import WIDE
+from hybrid.kernels.entry import block_rows, workspace
+from hybrid.kernels.forces import DRAG, PLANAR
+from hybrid.kernels.out_of_plane import BAND, REACH, wrong_pivots_at_rest
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+
+# What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
+# length in all: an error far below Newton's tolerance.  The check of stability lets modes as soft as NEUTRAL pass.
+ANCHOR, NEUTRAL = 1e-12, 1e-9
+CHECKED_COMPLIANCE = (
+    1e-5  # strain at the tension scale, for the check of stability: 100 times the round-off at 10^4 cells
+)
+# What the factor of the stiffness loses of a node's bending stiffness (some fifty rounded operations a row), and the
+# part of the softest bending of the whole line, 3 EI/L^3, beyond which that hides whether it buckles.
+LOST, HIDDEN = 1e-14, 0.1
+NO_MOMENT = 1e-3  # of EI/L: an end moment below this does not disturb the judgement of stability
+
+
+def _stiffness(rows: Floats, axial: Floats, plane: Floats | None) -> Floats:
+    """Stiffness (N+1, 5, m, m) of the block rows of the march: K[i, j] couples block i with block i - 2 + j.
+
+    m = 4, (r, psi), in space; 2 in a plane.  Tensions are eliminated through the stiffness `axial` (N, 3, 3),
+    d d^T/(h ck), of each cell.
+    """
+    n = rows.shape[0]
+    if plane is None:
+        J = -rows.reshape(n, SIZE, WIDTH)
+        K, size = np.zeros((n, 5, 4, 4)), 3
+        for j, first in enumerate((1, 6, 11, 16)):
+            K[:, j] = J[:, 1:5, first : first + 4]
+        K[:, 4, :, :3] = J[:, 1:5, 20:23]
+    else:
+        J = -rows.reshape(n, 3, WIDE)
+        K, size = np.zeros((n, 5, 2, 2)), 2
+        for j, first in enumerate((0, 2, 5, 8, 10)):
+            K[:, j] = J[:, 1:, first : first + 2]
+        axial = plane[:2] @ axial @ plane[:2].T
+    for a, b in ((0, 0), (1, 1)):
+        K[a : n - 1 + b, 2, :size, :size] += axial
+    K[:-1, 3, :size, :size] -= axial
+    K[1:, 1, :size, :size] -= axial
+    return K
+
+
+def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray, plane: Floats | None = None) -> bool:
+    """True when the stiffness in the block rows of the march, made symmetric, is positive definite.
+
+    axial: (N, 3, 3) N/m, of each cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q,
+    normal, where the rows are those of a line in that plane.
+    """
+    K = _stiffness(rows, axial, plane)
+    n, _, m, _ = K.shape
+    free = np.ones((n, m), bool)
+    free[0], free[-1] = not ends.held[0], not ends.held[1]
+    if plane is None:
+        free[:-1, 3], free[-1, 3] = spin != 0, False
+    held = ~free.ravel()
+    reach = 3 * m - 1
+    band = np.zeros((reach + 1, m * n))
+    for offset in range(3):  # blocks on and right of the diagonal, averaged with their mirrors
+        upper = K[: n - offset, 2 + offset]
+        mirror = K[offset:, 2 - offset].transpose(0, 2, 1)
+        mean = 0.5 * (upper + mirror)
+        for k in range(m):
+            for c in range(m):
+                j = m * offset + c - k
+                if 0 <= j <= reach:
+                    band[j, k : m * (n - offset) : m] = mean[:, k, c]
+    for j in range(reach + 1):
+        band[j, : m * n - j] *= ~(held[: m * n - j] | held[j:])
+    band[0, held] = 1.0
+    try:
+        cholesky_banded(band, lower=True, check_finite=False)
+    except LinAlgError:
+        return False
+    return True
+
+
+def is_judged(line: Line, ends: Ends, length: float) -> bool:
+    """Whether the test of stability can speak: there is a rod, and no end moment to speak of.
+
+    A moment that keeps its direction in space is not conservative; positive definiteness says nothing then.
+    """
+    bending = float((line.kb * line.hn[:, None]).max(initial=0.0)) / length
+    return bool(line.element.any()) and float(np.abs(ends.moment).max()) <= NO_MOMENT * bending
+
+
+class Stability:
+    """Judges equilibria of one line."""
+
+    def __init__(self, line: Line, sea: Sea, length: float, scale: float) -> None:
+        """length: m; scale: the tension scale, N."""
+        # drag counts as a load that keeps its direction: how it turns with the cable is not conservative
+        self.line, self.sea = line._replace(bits=line.bits & ~DRAG), sea
+        self.length, self.scale = length, scale
+        self.anchor = ANCHOR * scale / (float(line.mass.sum()) * length)  # 1/s2
+        self.blurred = False  # whether round-off had the last word on stability
+
+    def holds(self, ends: Ends, state: State, across: bool = False) -> bool:
+        """True when the stiffness of the line is positive definite, or when round-off hides whether it is.
+
+        Short cells are so stiff in bending that the last digits of that may outweigh a slight tension: what fails
+        by no more than they are worth is no buckling.  across: of a line in a plane, judge what leaves the plane
+        instead of what stays in it.
+        """
+        definite = self._definite_across if across else self._definite
+        mass, h = self.line.mass, np.append(self.line.h, self.line.h[-1])
+        soft = NEUTRAL / ANCHOR * self.anchor
+        self.blurred = False
+        if definite(ends, state, soft):
+            return True
+        bending = self.line.kb[:, :2].max(axis=1) * self.line.element
+        lost = LOST * float((bending / (h * h * mass)).max())
+        if lost <= soft or not definite(ends, state, lost):
+            return False
+        EI = (bending * self.line.hn)[self.line.element == 1].min()
+        self.blurred = bool(lost * float(mass.sum()) > HIDDEN * 3.0 * EI / self.length**3)
+        return True
+
+    def _definite(self, ends: Ends, state: State, soft: float) -> bool:
+        """Whether a Cholesky factor of the stiffness exists, with springs of `soft` (1/s^2) times the mass.
+
+        Axial stiffness is lowered to CHECKED_COMPLIANCE for this: it has no part in buckling,
+        and at its real size its round-off would hide the softest modes of a long line.
+        """
+        line = self.line
+        rows = block_rows(line)
+        entry.assembly(line, self.sea, ends, state, 0.0, soft, workspace(line.h.size)._replace(rows=rows))
+        d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        stiff = 1.0 / (line.h * np.maximum(line.ck, CHECKED_COMPLIANCE / self.scale))
+        plane = line.plane if line.bits & PLANAR else None
+        return positive_definite(rows, stiff[:, None, None] * d[:, :, None] * d[:, None, :], ends, line.spin, plane)
+
+    def _definite_across(self, ends: Ends, state: State, soft: float) -> bool:
+        """Whether all pivots of the stiffness across the plane are positive, with springs as of `_definite`."""
+        room = np.zeros((2 * (self.line.h.size + 1) + REACH) * BAND)
+        return wrong_pivots_at_rest(self.line, self.sea, ends, state, soft, room) == 0
+
+
+def is_stable(line: Line, sea: Sea, ends: Ends, state: State, length: float, scale: float) -> bool:
+    """True when an equilibrium would stay in space, whether or not the line is computed in a plane.
+
+    True too where that cannot be judged.
+    """
+    if not is_judged(line, ends, length):
+        return True
+    stability = Stability(line, sea, length, scale)
+    return stability.holds(ends, state) and (
+        not line.bits & PLANAR or stability.holds(ends, state, across=True)
+    )
