@@ -40,6 +40,7 @@ class Material:
     mass: Floats  # (K,) kg/m, with modules
     weight: Floats  # (K,) N/m, downwards, less the buoyancy that does not depend on the surface
     ck: Floats  # (K,) 1/N
+    max_strain: Floats  # (K,) strain that is borne; infinite where nothing stretches
     B: Floats  # (K, 3) N m2: two bending stiffnesses, torsion
     kappa: Floats  # (K, 3) 1/m, curvatures and twist without stress
     rotary: Floats  # (K,) kg m
@@ -137,6 +138,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         mass=np.array([x.mass for x in of], float),
         weight=np.array([x.mass * gravity for x in of], float),
         ck=np.array([1.0 / x.axial_stiffness if x.axial_stiffness else 0.0 for x in of]),
+        max_strain=np.array([x.max_strain if x.axial_stiffness else np.inf for x in of]),
         B=np.array([[*bending_stiffness(x), torsional_stiffness(x)] for x in of], float),
         kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
         rotary=np.array([rotary_inertia(x)[0] for x in of]),

@@ -254,7 +254,7 @@ def test_overrides() -> None:
         SUSPENSION,
         overrides=[
             "time.step=0.005",
-            "cable.sections[0].mass=2",
+            "cable.sections[0].mass=2e-3",
             "ends.start.position=[0, 0, 1]",
             "mesh.cells=40",
             "cable.sections[0].damping.stiffness=1e-3",
@@ -264,7 +264,7 @@ def test_overrides() -> None:
         ],
     )
     assert scene.require_time().step == 0.005
-    assert scene.cable.sections[0].mass == 2.0
+    assert scene.cable.sections[0].mass == 2e-3
     assert scene.cable.sections[0].damping == Damping(mass=2.0, stiffness=1e-3)
     assert scene.mesh is not None and scene.mesh.cells == 40
     assert scene.model == RodModel() and scene.title == "a-b"
