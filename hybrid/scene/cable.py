@@ -115,7 +115,7 @@ OneOrTwo = Annotated[
 ]
 
 
-# Mean densities of a section, kg/m^3: nothing that is laid or moored is lighter than foam, and a studless chain comes to
+# Mean densities of a section, kg/m^3: nothing that is laid or moored is lighter than foam, and a studless chain is
 # 28 000 by the diameter of its bar.  USUAL_DENSITIES: what a corrected unit should lead to.
 SECTION_DENSITIES, USUAL_DENSITIES = (15.0, 30_000.0), (300.0, 12_000.0)
 # Slips of units: the key, what its value is divided by, and the unit it was written in.
