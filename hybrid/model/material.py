@@ -205,8 +205,7 @@ def _points(out: Material, scene: Scene) -> None:
     out.at = np.array(at)
     out.lift = np.zeros(len(at))
     out.points = {name: np.zeros(len(at)) for name in POINT}
-    for x, body in everything:
-        i = int(np.argmin(np.abs(out.at - x)))
+    for i, (_, body) in zip(_nearest(out.at, [x for x, _ in everything]), everything, strict=True):
         out.points["point_mass"][i] += body.mass
         out.lift[i] -= gravity * body.mass
         if fluid is None:
@@ -228,3 +227,15 @@ def _points(out: Material, scene: Scene) -> None:
     asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
     if any(out.points[name].any() for name in asked):
         out.bits |= BODIES
+
+
+def _nearest(places: Floats, wanted: list[float]) -> list[int]:
+    """Of `places` (P,), rising, that which is nearest to each of those wanted; the first of two as near."""
+    if not wanted:
+        return []
+    x = np.array(wanted, float)
+    right = np.clip(np.searchsorted(places, x), 0, places.size - 1)
+    left = np.maximum(right - 1, 0)
+    return (
+        [int(i) for i in np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right)] if x.size else []
+    )
