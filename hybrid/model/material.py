@@ -233,9 +233,10 @@ def _nearest(places: Floats, wanted: list[float]) -> list[int]:
     """Of `places` (P,), rising, that which is nearest to each of those wanted; the first of two as near."""
     if not wanted:
         return []
+    if not wanted:
+        return []
     x = np.array(wanted, float)
     right = np.clip(np.searchsorted(places, x), 0, places.size - 1)
     left = np.maximum(right - 1, 0)
-    return (
-        [int(i) for i in np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right)] if x.size else []
-    )
+    found: list[int] = np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right).tolist()
+    return found

@@ -26,8 +26,8 @@ Spot = tuple[int, int]
 # A table or list as written may be long; a complaint shows its beginning.
 SHOWN = 60
 
-# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh, or tens of thousands
-# of attachments, are below, and a few lines of aliases of aliases are far above.
+# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh, or tens of
+# thousands of attachments, are below, and a few lines of aliases of aliases are far above.
 MOST_VALUES = 500_000
 # Characters beyond which ruamel.yaml would take longer than all the rest of reading a scene, a tenth of a second.
 LONG = 10_000

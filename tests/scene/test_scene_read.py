@@ -323,7 +323,7 @@ ODD_TEXTS = [
     "a: &x {b: 1, c: [*, d]}\ne: *x", "a: &x {b: 1}\ne: *x\nf: {<<: *x, g: 2}", "a: &x [*x]", "a: &x 1\nb: &x 2", "a: *x",
     "{mass: 2,5}", "a: |\n  text\n  more\nb: >-\n  folded\n  text\n", "a: !!str 1\nb: !!float x\nc: ! 3", "é: ü # ü\nb: 1",
     "a:\n\t- 1", "a: [1, 2", "a: 1\n--- \nb: 2", "", "# nothing", "? [1]\n: 2", "a: \x01", "a:\r\n  b: 1\r\nc: 2",
-    "[" * 300 + "]" * 300, "a: %b", "%YAML 1.2\n---\na: 1", "a: 'x\n\n  y'", "a: {b: , c}", "a:b: 1", "- 1\n- - 2\n  - x: 3",
+    "[" * 120 + "]" * 120, "a: %b", "%YAML 1.2\n---\na: 1", "a: 'x\n\n  y'", "a: {b: , c}", "a:b: 1", "- 1\n- - 2\n  - x: 3",
 ]  # fmt: skip
 
 
