@@ -108,7 +108,7 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
 
 @contextmanager
 def _without_collection() -> Iterator[None]:
-    """No search for cycles meanwhile: there are none, and among the values of a long scene it takes half of the time."""
+    """No search for cycles meanwhile: there are none, and among all values of a long scene it takes half the time."""
     collects = gc.isenabled()
     gc.disable()
     try:
