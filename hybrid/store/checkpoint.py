@@ -10,6 +10,7 @@ the checkpoint (store.copying), put in its place when it is whole.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -63,9 +64,9 @@ def read_before(file: h5py.File) -> Tree:
     return unpack(file[BEFORE][()].tobytes()) if BEFORE in file else {}
 
 
-def write_slot(file: h5py.File, number: int, data: bytes) -> None:
-    """Write a packed checkpoint over the older of the two."""
-    slot = file[SLOTS[number % 2]]
+def write_slot(slots: Sequence[h5py.Dataset], number: int, data: bytes) -> None:
+    """Write a packed checkpoint over the older of the two; whoever holds the slots open hears of it when that fails."""
+    slot = slots[number % 2]
     if slot.shape[0] < len(data):
         slot.resize(len(data), axis=0)
     slot[: len(data)] = np.frombuffer(data, "u1")

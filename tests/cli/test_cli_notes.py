@@ -11,7 +11,7 @@ import pytest
 import hybrid
 from hybrid.cli.console import KINDS_SHOWN, Console
 from hybrid.errors import EVENTS_BY_WEIGHT, EXPECTED, ZONE_EVENTS, Outcome
-from hybrid.store.reader import Event
+from hybrid.store.records import Event
 
 PACKAGE = Path(hybrid.__file__).parent
 # Calls that write an event take its kind as a text among their arguments.
