@@ -38,40 +38,42 @@ def _tree(parser: Any) -> yaml.Node:
     inside: list[list[yaml.Node]] = []  # of each open table or list what it holds, keys and values in turn
     opened: list[yaml.Node] = []
     top: list[yaml.Node] = []
-    while not isinstance(event := parser.get_event(), yaml.StreamEndEvent):
+    while True:
+        event = parser.get_event()
+        kind = type(event)
         holds = inside[-1] if inside else top
-        if isinstance(event, yaml.AliasEvent):
-            if event.anchor not in anchors:
-                raise _Odd
-            holds.append(anchors[event.anchor])
-        elif isinstance(event, yaml.CollectionEndEvent):
-            node, values = opened.pop(), inside.pop()
-            table = isinstance(node, yaml.MappingNode)
-            node.value[:] = zip(values[::2], values[1::2], strict=True) if table else values
-            node.end_mark = event.end_mark
-        elif isinstance(event, yaml.NodeEvent):
-            node = _node(event)
-            if event.anchor is not None:
-                if event.anchor in anchors:
-                    raise _Odd
-                anchors[event.anchor] = node
+        if kind is yaml.ScalarEvent:
+            node: yaml.Node = yaml.ScalarNode(_tag(event), event.value, event.start_mark, event.end_mark, event.style)
             holds.append(node)
-            if not isinstance(event, yaml.ScalarEvent):
-                opened.append(node)
-                inside.append([])
-                if len(inside) > DEEPEST:
-                    raise _Odd
+        elif kind is yaml.MappingStartEvent or kind is yaml.SequenceStartEvent:
+            new = yaml.MappingNode if kind is yaml.MappingStartEvent else yaml.SequenceNode
+            node = new(event.tag, [], event.start_mark, event.end_mark)
+            holds.append(node)
+            opened.append(node)
+            inside.append([])
+            if len(inside) > DEEPEST:
+                raise _Odd
+        elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
+            values = inside.pop()
+            pairs = zip(values[::2], values[1::2], strict=True)
+            opened.pop().value[:] = pairs if kind is yaml.MappingEndEvent else values
+            continue
+        elif kind is yaml.AliasEvent and event.anchor in anchors:
+            holds.append(anchors[event.anchor])
+            continue
+        elif kind is yaml.AliasEvent:
+            raise _Odd
+        elif kind is yaml.StreamEndEvent:
+            break
+        else:  # begin and end of the text
+            continue
+        if event.anchor is not None:
+            if event.anchor in anchors:
+                raise _Odd
+            anchors[event.anchor] = node
     if len(top) != 1:
         raise _Odd
     return top[0]
-
-
-def _node(event: Any) -> yaml.Node:
-    if isinstance(event, yaml.ScalarEvent):
-        tag = event.tag if event.tag not in (None, "!") else _tag(event.value) if event.implicit[0] else _TAG + "str"
-        return yaml.ScalarNode(tag, event.value, event.start_mark, event.end_mark, style=event.style)
-    kind = yaml.SequenceNode if isinstance(event, yaml.SequenceStartEvent) else yaml.MappingNode
-    return kind(event.tag, [], event.start_mark, event.end_mark)
 
 
 @cache
@@ -85,6 +87,13 @@ def _rules() -> dict[str, list[tuple[str, Any]]]:
     return rules
 
 
-def _tag(word: str) -> str:
-    """The tag of a word without quotes."""
-    return next((tag for tag, pattern in _rules().get(word[:1], ()) if pattern.match(word)), _TAG + "str")
+def _tag(event: Any) -> str:
+    """The tag of a value: as it is written, or by its text, if that has no quotes."""
+    if event.tag not in (None, "!"):
+        return str(event.tag)
+    if event.implicit[0]:
+        word = event.value
+        for tag, pattern in _rules().get(word[:1], ()):
+            if pattern.match(word):
+                return tag
+    return _TAG + "str"
