@@ -32,7 +32,7 @@ def amend(
     done: whether nothing is left to go on with.
     """
     if isinstance(target, io.BytesIO):
-        with in_memory(target.getbuffer()) as file:
+        with in_memory(target.getvalue()) as file:
             _add(file, fields, attributes, events)
             file.flush()
             image = file.id.get_file_image()

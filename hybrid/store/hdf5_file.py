@@ -17,9 +17,11 @@ import h5py
 
 from hybrid.errors import ResultError
 from hybrid.store.format import CACHE, FORMAT, FORMAT_VERSION, plain_text
-from hybrid.store.integrity import being_written
+from hybrid.store.integrity import being_written, unmarked
+from hybrid.store.lock import is_held
 
 _LIBVER = ("v110", "v110")
+_MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
 
 
 # ---- reading --------------------------------------------------------------------------------------
@@ -29,7 +31,7 @@ def open_file(source: Path | io.BytesIO) -> h5py.File:
     """Open a file, or bytes in memory, for reading.  ResultError when it is no HDF5 file or not there."""
     if not isinstance(source, Path):
         try:
-            return h5py.File.in_memory(source.getbuffer())
+            return _Image(h5py.File.in_memory(source.getvalue()).id)
         except OSError as error:
             raise ResultError(f"the bytes in memory are no HDF5 file: {error}") from None
     if not source.exists():
@@ -37,12 +39,16 @@ def open_file(source: Path | io.BytesIO) -> h5py.File:
     if source.is_dir():
         raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
     try:
-        # SWMR for files with a writer, alive or killed, and for no other.
-        return h5py.File(source, "r", swmr=being_written(source), locking="best-effort")
+        if not being_written(source):
+            return h5py.File(source, "r", locking="best-effort")
+        if is_held(source) or source.stat().st_size > _MOST_IN_MEMORY:
+            return h5py.File(source, "r", swmr=True, locking="best-effort")
+        file = _Image(h5py.File.in_memory(unmarked(source)).id)
+        file.filename = str(source)
+        return file
     except OSError as error:
-        raise ResultError(
-            f"{source} cannot be read as a result\n    detail:   {error}\n    expected: an HDF5 file written by hybrid"
-        ) from error
+        advice = "expected: an HDF5 file written by hybrid\n    try:      copy it anew, or run its scene again"
+        raise ResultError(f"{source} cannot be read as a result\n    detail:   {error}\n    {advice}") from error
 
 
 @contextmanager
@@ -70,6 +76,12 @@ def check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
         wrote = plain_text(file.attrs.get("version_hybrid-cable", "?"))
         said = f"{name} has result format {version}; this program reads format {FORMAT_VERSION}"
         raise ResultError(f"{said}\n    try:      read it with hybrid-cable {wrote}, or run its scene again")
+
+
+class _Image(h5py.File):
+    """A file in memory under the name of the one that it was read from."""
+
+    filename = "the file in memory"
 
 
 # ---- writing --------------------------------------------------------------------------------------
@@ -142,8 +154,8 @@ def created(path: Path, make: Callable[[Path], None]) -> h5py.File:
     return file
 
 
-def in_memory(content: bytes | memoryview | None = None) -> h5py.File:
-    """A file in memory; content: of an existing one."""
+def in_memory(content: bytes = b"") -> h5py.File:
+    """A file in memory, to be written; content: of an existing one."""
     return h5py.File.in_memory(content, libver=_LIBVER, rdcc_nbytes=CACHE)
 
 

@@ -84,7 +84,7 @@ class Result:
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
                     name = OLD_NAMES[name]
-                self._dims[name] = tuple(d.label for d in item.dims)
+                self._dims[name] = tuple(plain_text(d.label) for d in item.dims)
                 self.units[name] = plain_text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
                 groups.add(name)

@@ -194,28 +194,38 @@ def test_closed_results_keep_what_was_read(result: Result) -> None:
 # ---- interruption and concurrent reading ----------------------------------------------------------
 
 WRITER = """
-import sys, time
+import os, sys
+from pathlib import Path
 sys.path[:0] = [{root!r}, {here!r}]
+from hybrid.store.lock import locked
 from test_result_file import recorder, values, ONE, TWO
-r = recorder({path!r})
-for i in range(100000):
-    r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
-    r.save(float(i), values(float(i)), ONE if i % 4 < 2 else TWO)
-    r.flush()  # at once, where a run would hold outputs back for a moment: more chances to go wrong
-    if i == 20:
-        print("ready", flush=True)
+with locked(Path({path!r})):
+    r = recorder({path!r})
+    for i in range({count}):
+        r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
+        r.save(float(i), values(float(i)), ONE if i % 4 < 2 else TWO)
+        r.flush()  # at once, where a run would hold outputs back for a moment: more chances to go wrong
+        if i == 20:
+            print("ready", flush=True)
+    os.kill(os.getpid(), 9)
 """
+
+
+def writer_of(path: Path, count: int) -> subprocess.Popen[str]:
+    """A process that writes so many outputs and is killed."""
+    root, here = Path(hybrid.__file__).parents[1], Path(__file__).parent
+    code = WRITER.format(root=str(root), here=str(here), path=str(path), count=count)
+    return subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
 
 
 def test_a_running_file_can_be_read_and_survives_a_kill(tmp_path: Path) -> None:
     path = tmp_path / "run.h5"
-    root, here = Path(hybrid.__file__).parents[1], Path(__file__).parent
-    code = WRITER.format(root=str(root), here=str(here), path=str(path))
-    writer = subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True)
+    writer = writer_of(path, 100_000)
     try:
         assert writer.stdout is not None and writer.stdout.readline() == "ready\n"
         result = open_result(path)
         before = len(result.times)
+        assert result._file.swmr_mode
         for _ in range(20):
             check_consistent(result)
             result.refresh()
@@ -229,6 +239,7 @@ def test_a_running_file_can_be_read_and_survives_a_kill(tmp_path: Path) -> None:
         writer.stdout.close()
     for opened in (result.refresh(), open_result(path)):
         check_consistent(opened)
+        assert not opened._file.swmr_mode
         assert opened.status == "running" and "interrupted or still running" in repr(opened)
     with recorder(path, overwrite=True):  # and a killed file can be replaced
         pass
