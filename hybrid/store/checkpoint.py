@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import hashlib
 from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -18,6 +19,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.format import plain_text
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
@@ -87,8 +89,11 @@ def read_checkpoint(file: h5py.File) -> Checkpoint:
             except ResultError as error:
                 why = str(error).split("detail:")[-1].splitlines()[0].strip()
     if not points:
+        wrote, advice = plain_text(file.attrs.get("version_hybrid-cable", "")), "run its scene again"
+        if wrote != version("hybrid-cable") and any(name in file for name in SLOTS):
+            advice += f", or resume it with hybrid-cable {wrote}, which wrote it"
         raise ResultError(
-            f"{file.filename} has no checkpoint to go on from\n    detail:   {why}\n    try:      run its scene again"
+            f"{file.filename} has no checkpoint to go on from\n    detail:   {why}\n    try:      {advice}"
         )
     return max(points, key=lambda point: point.number)
 

@@ -1,6 +1,5 @@
 """Beyond the end, other loads, and what is refused."""
 
-import gzip
 import json
 import subprocess
 import sys
@@ -306,17 +305,6 @@ def test_the_command_goes_on_and_says_so(tmp_path, monkeypatch, capsys):
 
 
 # ---- versions --------------------------------------------------------------------------------------
-
-
-def test_a_file_of_an_older_program_opens_and_does_not_go_on(tmp_path):
-    """Written by 0.4.0: its numbers are there; it has no checkpoint."""
-    older = tmp_path / "older.h5"
-    older.write_bytes(gzip.decompress((Path(__file__).parents[1] / "data" / "result_0.4.h5.gz").read_bytes()))
-    with hybrid.open(older) as result:
-        assert result.tension[-1].tolist() == [10.109223689133069, 5.164341571429652, 0.0]
-        assert result.title == "a chain of hybrid-cable 0.4.0" and result.zones[0][0].kind == "catenary"
-    with pytest.raises(hybrid.ResultError, match="no checkpoint"):
-        hybrid.resume(older)
 
 
 def test_a_file_of_a_newer_format_is_refused(whole):
