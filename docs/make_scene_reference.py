@@ -60,7 +60,25 @@ added mass or buoyancy without fluid or diameter; a motion that does not start f
 an initial shape that misses a held end; a normal along its tangent; waves without a surface, or so steep that they
 break (height / length ≥ 0.142 tanh(k depth)); an end in the ground, or carried out of the reach of the cable; a float
 that sinks; an attachment beyond the end of the cable; a cable that nothing holds, unless it lies on a seabed or floats
-at a surface; a time step that cannot follow a period, a ramp or a move.
+at a surface; a time step that cannot follow a period, a ramp or a move; a section whose mass and diameter make a mean
+density below 15 or above 30 000 kg/m³; a fluid of 1.02 to 1.03 kg/m³ (sea water in t/m³), below 0.0005 or above 14 000;
+over a seabed one that is neither air (0.5 to 2 kg/m³) nor a liquid (400 to 3000), with a surface one that is no
+liquid.
+
+A computation stops, with time and place, where a section is stretched beyond its `max_strain`.
+
+## Roll, pitch and yaw
+
+Angles are right-handed about the axes of the inertial frame: a positive roll turns y towards z, a positive pitch z
+towards x (so that a tangent along x dips), a positive yaw x towards y.
+Given together they are applied in this order, each about the fixed inertial axis: roll about x, then pitch about y,
+then yaw about z (extrinsic x-y-z).
+What stood at time zero as a vector v, such as the tangent of a clamp, then points along Rz(yaw) Ry(pitch) Rx(roll) v.
+The same rotation about axes that turn with the end is yaw about z, then pitch about the new y, then roll about the new
+x (intrinsic z-y′-x″).
+In scipy: `Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True)`.
+Columns rx, ry, rz of a motion file are something else: a rotation vector, whose direction is the axis and whose length
+the angle, in degrees.
 
 ## Air and wind
 

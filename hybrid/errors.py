@@ -76,6 +76,7 @@ class Outcome(IntEnum):
     TWISTED_TOO_FAR = 8
     ILL_CONDITIONED = 9
     BURIED = 10
+    OVERSTRETCHED = 11
 
     @property
     def cause(self) -> str:
@@ -99,7 +100,6 @@ EVENTS_BY_WEIGHT = (
     "out of plane",
     "unresolved twist",
     "unresolved bend",
-    "stretched",
     "deep in the seabed",
     "numerical dissipation",
     "vibrations damped",
@@ -147,6 +147,7 @@ _CAUSE = {
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
+    Outcome.OVERSTRETCHED: "the cable is stretched beyond what a section bears",
 }
 
 _REMEDY = {
@@ -160,6 +161,7 @@ _REMEDY = {
     Outcome.ILL_CONDITIONED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
+    Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }
 

@@ -215,7 +215,8 @@ def sagging_line(axial_stiffness: float | None, cells: int) -> Scene:
     so it is off by the sag of a cell, h^2 w/(8 H), on every cell: 1e-2 m at 40 cells; and the tension in the middle
     of a cell by a part (w h/H)^2/8, 1.6e-3.
     """
-    section = {"length": 100.0, "mass": 1.0} | ({"axial_stiffness": axial_stiffness} if axial_stiffness else {})
+    elastic = {"axial_stiffness": axial_stiffness, "max_strain": 0.1} if axial_stiffness else {}
+    section = {"length": 100.0, "mass": 1.0} | elastic
     return scene(section, pinned(), pinned(70, 0, 20), model="catenary", cells=cells, gravity=10.0)
 
 

@@ -399,8 +399,8 @@ def floating_buoy(model: str) -> tuple[Scene, float, float]:
     Round-off, but for what the cable (1 mm thick) displaces above the water: 1e-6 m.  Returns scene, height, tension.
     """
     mass, volume, extent = 200.0, 1.0, 1.2
-    section = {"length": 30.0, "mass": 5.0, "diameter": 0.001, "axial_stiffness": 1e7, "bending_stiffness": 10.0}
-    pull = 30.0 * in_water(5.0, 0.001)
+    section = {"length": 30.0, "mass": 0.02, "diameter": 0.001, "axial_stiffness": 1e7, "bending_stiffness": 10.0}
+    pull = 30.0 * in_water(0.02, 0.001)
     what = sea_scene(
         section, "free", {"kind": "body", "mass": mass, "volume": volume, "height": extent}, model=model, cells=60,
         fluid={"density": RHO, "surface": 0.0}, initial={"kind": "equilibrium", "points": [[0, 0, -30], [0, 0, 0]]},
@@ -580,7 +580,7 @@ def taut_pile(cells: int) -> Scene:
     """
     p = PILE
     section = {
-        "length": p["length"], "mass": 1.0, "diameter": p["diameter"], "axial_stiffness": 1e11,
+        "length": p["length"], "mass": 3.0, "diameter": p["diameter"], "axial_stiffness": 1e11,
         "drag": {"normal": p["drag"]}, "added_mass": {"normal": p["added"]},
     }  # fmt: skip
     waves = {"kind": "regular", "height": p["height"], "period": p["period"], "ramp": 2 * p["period"]}

@@ -46,6 +46,7 @@ ONLY = {
     "plotly": ("view",),
     "pydantic": ("scene",),
     "ruamel": ("scene",),
+    "yaml": ("scene",),
     "typer": ("cli",),
     "rich": ("cli",),
     "filelock": ("store",),

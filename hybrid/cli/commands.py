@@ -288,9 +288,4 @@ def main(arguments: list[str] | None = None) -> None:
     except BrokenPipeError:  # the reader has gone, as in `hybrid schema | head`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         code = INTERRUPTED
-    record = sys.modules.get("hybrid.store.writer")
-    if record is not None and record.ABANDONED:  # HDF5 would crash when Python lets go of them
-        sys.stdout.flush()
-        sys.stderr.flush()
-        os._exit(int(code or 0))
     sys.exit(code)

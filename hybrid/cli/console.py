@@ -22,7 +22,7 @@ from hybrid.errors import EXPECTED, weight_of_event
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
     from hybrid.simulation.progress import Progress
-    from hybrid.store.reader import Event
+    from hybrid.store.records import Event
     from hybrid.studies.runs import Doing
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log

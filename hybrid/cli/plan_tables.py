@@ -78,11 +78,10 @@ def _time(scene: Scene, plan: Plan) -> str:
         return "no motion, statics only"
     steps = f"{scene.time.duration:.6g} s in {plan.steps} steps"
     if scene.time.controlled:
-        return f"{steps} or more, as the motion asks; {span(plan.seconds)} or more of CPU"
+        return f"{steps} or more, as the motion asks; about {span(plan.seconds)} of CPU"
     asked = scene.time.step or plan.step
     short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
-    most = "about" if plan.base_cells is None else "at most about"
-    return f"{steps} of {plan.step:.6g} s{short}; {most} {span(plan.seconds)} of CPU"
+    return f"{steps} of {plan.step:.6g} s{short}; about {span(plan.seconds)} of CPU"
 
 
 def ledger_table(plan: Plan) -> Any:

@@ -86,7 +86,7 @@ def errors_facts(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
-        known = not kinds & {"error uncertain", "model error not estimated"}
+        known = not kinds & {"error uncertain", "model error not estimated", "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 

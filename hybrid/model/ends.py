@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from math import sqrt
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -28,12 +29,14 @@ def transported(first: Floats, tangents: Floats) -> Floats:
     t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
     out = np.empty_like(t)
     out[0] = first
+    both = t[:-1] + t[1:]
     for i in range(1, len(t)):
-        a, c = out[i - 1], 1.0 + float(np.dot(t[i - 1], t[i]))
+        a, d = out[i - 1], t[i]
+        c = 1.0 + float(t[i - 1].dot(d))
         # a fold has no smallest rotation: any director normal to both will do, and a rod refuses the fold later
-        b = a - np.dot(a, t[i]) / c * (t[i - 1] + t[i]) if c > 1e-12 else a
-        b = b - np.dot(b, t[i]) * t[i]
-        out[i] = b / np.linalg.norm(b)
+        b = a - a.dot(d) / c * both[i - 1] if c > 1e-12 else a
+        b = b - b.dot(d) * d
+        out[i] = b / sqrt(b.dot(b))
     return out
 
 

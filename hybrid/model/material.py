@@ -40,6 +40,7 @@ class Material:
     mass: Floats  # (K,) kg/m, with modules
     weight: Floats  # (K,) N/m, downwards, less the buoyancy that does not depend on the surface
     ck: Floats  # (K,) 1/N
+    max_strain: Floats  # (K,) strain that is borne; infinite where nothing stretches
     B: Floats  # (K, 3) N m2: two bending stiffnesses, torsion
     kappa: Floats  # (K, 3) 1/m, curvatures and twist without stress
     rotary: Floats  # (K,) kg m
@@ -137,6 +138,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         mass=np.array([x.mass for x in of], float),
         weight=np.array([x.mass * gravity for x in of], float),
         ck=np.array([1.0 / x.axial_stiffness if x.axial_stiffness else 0.0 for x in of]),
+        max_strain=np.array([x.max_strain if x.axial_stiffness else np.inf for x in of]),
         B=np.array([[*bending_stiffness(x), torsional_stiffness(x)] for x in of], float),
         kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
         rotary=np.array([rotary_inertia(x)[0] for x in of]),
@@ -203,8 +205,7 @@ def _points(out: Material, scene: Scene) -> None:
     out.at = np.array(at)
     out.lift = np.zeros(len(at))
     out.points = {name: np.zeros(len(at)) for name in POINT}
-    for x, body in everything:
-        i = int(np.argmin(np.abs(out.at - x)))
+    for i, (_, body) in zip(_nearest(out.at, [x for x, _ in everything]), everything, strict=True):
         out.points["point_mass"][i] += body.mass
         out.lift[i] -= gravity * body.mass
         if fluid is None:
@@ -226,3 +227,16 @@ def _points(out: Material, scene: Scene) -> None:
     asked = ["point_drag", "point_added", "point_buoy"] + (["point_displaced"] if out.bits & WAVES else [])
     if any(out.points[name].any() for name in asked):
         out.bits |= BODIES
+
+
+def _nearest(places: Floats, wanted: list[float]) -> list[int]:
+    """Of `places` (P,), rising, that which is nearest to each of those wanted; the first of two as near."""
+    if not wanted:
+        return []
+    if not wanted:
+        return []
+    x = np.array(wanted, float)
+    right = np.clip(np.searchsorted(places, x), 0, places.size - 1)
+    left = np.maximum(right - 1, 0)
+    found: list[int] = np.where(np.abs(x - places[left]) <= np.abs(places[right] - x), left, right).tolist()
+    return found

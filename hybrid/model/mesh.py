@@ -120,23 +120,28 @@ def thinned(s: Floats, fixed: Sequence[float], parts: int) -> Floats:
 
 
 def _with_cuts(nodes: Floats, cuts: Sequence[float]) -> list[float]:
-    """`nodes` with each cut as a node."""
-    x = list(nodes)
-    fixed = {0, len(x) - 1}
+    """`nodes` with each cut as a node: those before a cut are done, those behind it as they were."""
+    behind, tolerance = nodes.tolist(), 1e-9 * float(nodes[-1] - nodes[0])
+    done, fixed, j = behind[:1], [True], 1  # j: the first node behind what is done
     for c in sorted(cuts):
-        i = int(np.argmin(np.abs(np.array(x) - c)))
-        tolerance = 1e-9 * (x[-1] - x[0])
-        if abs(x[i] - c) <= tolerance:
-            x[i] = x[i] if i in (0, len(x) - 1) else c
-            fixed.add(i)
-        elif i not in fixed and abs(x[i] - c) < 0.5 * min(x[i] - x[i - 1], x[i + 1] - x[i]):
-            x[i] = c
-            fixed.add(i)
-        else:
-            i = int(np.searchsorted(x, c))
-            x.insert(i, c)
-            fixed = {j + (j >= i) for j in fixed} | {i}
-    return x
+        while behind[j] < c:
+            done.append(behind[j])
+            fixed.append(False)
+            j += 1
+        left, right, last = done[-1], behind[j], j == len(behind) - 1
+        if c - left <= right - c:
+            near, moves = c - left, not fixed[-1] and c - left < 0.5 * min(left - done[-2], right - left)
+            if near <= tolerance or moves:
+                done[-1] = c if len(done) > 1 else left
+                fixed[-1] = True
+                continue
+        elif right - c <= tolerance and last:
+            continue
+        elif right - c <= tolerance or (not last and right - c < 0.5 * min(right - left, behind[j + 1] - right)):
+            j += 1  # it moves to the cut
+        done.append(c)
+        fixed.append(True)
+    return done + behind[j:]
 
 
 def given_nodes(

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE, WAVES
 from hybrid.model.build import build
 from hybrid.model.ledger import Entry
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import first_resolution, wants_errors
+from hybrid.model.resolution import first_resolution
+from hybrid.model.run_time import processor_time
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
 
@@ -27,23 +27,9 @@ class Plan:
     unknowns: int
     steps: int
     step: float  # s, of most steps: the scene's, shortened to fit between outputs
-    seconds: float  # of processor time, from the measured cost per cell and iteration
+    seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
 
 
-# Processor time per cell and Newton iteration (s), per step and per output, as bench/test_bench_cost.py and
-# test_bench_parts.py print them on one core; a plan promises an order of magnitude, not more.
-COST = {"rod": 0.45e-6, "catenary": 0.15e-6}
-FLAT_COST = {"rod": 0.15e-6, "catenary": 0.08e-6}  # in a plane, with the push that watches it
-# What optional forces add to that, in space and in a plane; those that are not here add nothing that can be seen.
-MORE = {
-    DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
-    ROTARY: (0.025e-6, 0.005e-6), SURFACE: (0.035e-6, 0.015e-6), WAVES: (0.025e-6, 0.025e-6),
-    SEABED: (0.03e-6, 0.018e-6), FRICTION: (0.01e-6, 0.005e-6),
-}  # fmt: skip
-COST_STEP, COST_MANAGER, COST_OUTPUT = 25e-6, 15e-6, 0.3e-3
-USUAL_ITERATIONS = 2.2
-COST_ERRORS = 1.9  # times a run that a run with its coarser ones costs (bench/test_bench_accuracy.py, share)
-COST_CORRECTOR = 0.3  # of the catenary's own, where the error of leaving bending out is followed
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
 # Numbers that a result has per point and output, some twenty, and the largest file that still fits a disk.
 VALUES, MOST_BYTES = 20, 1e11
@@ -120,16 +106,10 @@ def plan(scene: SceneLike) -> Plan:
     if scene.time:
         every = output_interval(scene)
         steps, step = count_steps(scene), every / parts(every, first_resolution(scene).step)
-    cost = COST if model.plane is None else FLAT_COST
-    each = sum(cost[z.kind] * c for z, c in zip(model.zones, cells, strict=True))
-    each += model.cells * sum(x[model.plane is not None] for bit, x in MORE.items() if model.line.bits & bit)
-    each *= 1.0 + COST_CORRECTOR * model.follows_error
     names = {"catenary": "corrected"} if model.corrected else {}
     zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
-    per_step = COST_STEP + (COST_MANAGER if model.layout is not None else 0.0)
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
-    seconds = steps * (USUAL_ITERATIONS * each + per_step) + outputs * COST_OUTPUT
-    seconds *= COST_ERRORS if wants_errors(scene) else 1.0
+    seconds = processor_time(scene, model, cells, steps, outputs)
     return Plan(
         model.ledger, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
         seconds,

@@ -47,6 +47,12 @@ def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
     return _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
 
 
+def borne_tension(scene: Scene, s: np.ndarray) -> np.ndarray:
+    """Tension (ns,) N at which a section reaches its max_strain, at arc lengths s (m); the smaller one at a seam."""
+    borne = [x.axial_stiffness * x.max_strain if x.axial_stiffness else np.inf for x in scene.cable.sections]
+    return _along(scene, s, borne, np.fmin)
+
+
 def _along(scene: Scene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:
     """A number per section at arc lengths s (ns,); where two sections meet, what `choose` makes of both."""
     ends = np.cumsum([x.length for x in scene.cable.sections])[:-1]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated
 
 from pydantic import Discriminator, Field, Tag, model_validator
@@ -114,6 +115,26 @@ OneOrTwo = Annotated[
 ]
 
 
+# Mean densities of a section, kg/m^3: nothing that is laid or moored is lighter than foam, and a studless chain is
+# 28 000 by the diameter of its bar.  USUAL_DENSITIES: what a corrected unit should lead to.
+SECTION_DENSITIES, USUAL_DENSITIES = (15.0, 30_000.0), (300.0, 12_000.0)
+# Slips of units: the key, what its value is divided by, and the unit it was written in.
+_SLIPS = (
+    ("mass", 1e3, "in g/m or kg/km"), ("diameter", 1e3, "in mm"), ("diameter", 1e2, "in cm"), ("mass", 1e-3, "in t/m"),
+    ("diameter", 0.5, "a radius"),
+)  # fmt: skip
+
+
+def _other_units(density: float, mass: float, diameter: float) -> str:
+    """The unit from which an impossible mean density, kg/m^3, most likely comes, and what to write instead."""
+    for key, divisor, unit in _SLIPS:
+        corrected = density / divisor if key == "mass" else density * divisor**2
+        if USUAL_DENSITIES[0] <= corrected <= USUAL_DENSITIES[1]:
+            value = (mass if key == "mass" else diameter) / divisor
+            return f"is {key} {unit}? then {key}: {value:.6g}"
+    return "check mass (kg/m) and diameter (m); without a diameter there is no volume to compare with"
+
+
 class Section(Table):
     """A stretch of cable with constant properties, per metre of unstretched length."""
 
@@ -123,6 +144,11 @@ class Section(Table):
         default=None, description="outer diameter; needed by buoyancy, drag and added mass [m]"
     )
     axial_stiffness: Positive | None = Field(default=None, description="axial stiffness EA; absent: inextensible [N]")
+    max_strain: Positive = Field(
+        default=0.05,
+        description="strain that the section bears; a computation that exceeds it stops; an inextensible section has "
+        "none [-]",
+    )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,
         description="bending stiffness EI, or [about a1, about a2]; needed in rod zones [N m^2]",
@@ -167,6 +193,20 @@ class Section(Table):
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
 
     @model_validator(mode="after")
+    def _density_is_possible(self) -> Section:
+        if self.diameter is None:
+            return self
+        area = 0.25 * math.pi * self.diameter**2
+        density, (least, most) = self.mass / area, SECTION_DENSITIES
+        if not least <= density <= most:
+            expected = (
+                f"{least * area:.3g} to {most * area:.3g} kg/m with a diameter of {self.diameter:g} m: a mean density "
+                f"of {least:g} to {most:g} kg/m^3; this one is {density:.3g} kg/m^3"
+            )
+            refuse([Finding(("mass",), expected, _other_units(density, self.mass, self.diameter))])
+        return self
+
+    @model_validator(mode="after")
     def _frame_needs_torsion(self) -> Section:
         reason = ""
         if self.anisotropic:
@@ -191,6 +231,13 @@ class Cable(Table):
     def length(self) -> float:
         """Unstretched length of the whole cable [m]."""
         return sum(section.length for section in self.sections)
+
+    @property
+    def reach(self) -> float:
+        """Length at which the first of its sections bears no more, pulled straight [m]."""
+        elastic = [x for x in self.sections if x.axial_stiffness is not None]
+        most = min((x.axial_stiffness * x.max_strain for x in elastic if x.axial_stiffness), default=0.0)  # N
+        return self.length + sum(x.length * most / x.axial_stiffness for x in elastic if x.axial_stiffness)
 
     @property
     def inextensible(self) -> bool:

@@ -241,6 +241,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     start_checks.span_in_motion,
     start_checks.start_is_known,
     start_checks.equilibrium_exists,
+    sea_checks.fluid_density,
     sea_checks.attachments_on_cable,
     sea_checks.attachments_in_fluid,
     sea_checks.bodies_in_fluid,

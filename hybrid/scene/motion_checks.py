@@ -27,8 +27,6 @@ SAMPLES, RAMP_STEPS = 6, 3
 # The most that an end may be turned in a step (rad): beyond half a turn nobody knows which way it went.
 MOST_TURN = 1.0
 
-# Stretch at which a section is taken to break; steel and fibre ropes break at 2 to 5 %, umbilicals before.
-MOST_STRETCH = 0.05
 # Speed of tension waves, m/s, in what is given as inextensible: that of steel; ropes and chains are slower.
 STEEL_WAVES = 5000.0
 # Largest speed and acceleration of a smooth move, over way / time and way / time^2: 15/8, and that of the polynomial
@@ -121,8 +119,9 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
     An end that is pulled at v sends a wave of tension along the cable, which stretches it by v/c behind its front,
     c = sqrt(EA/m); with acceleration a, no more than the whole cable of length L does by its inertia, a L/c^2.
     """
-    c = max(math.sqrt(s.axial_stiffness / s.mass) if s.axial_stiffness else STEEL_WAVES for s in cable.sections)
-    limit = f"at most {100 * MOST_STRETCH:g} % of stretch"
+    waves = [(math.sqrt(s.axial_stiffness / s.mass) if s.axial_stiffness else STEEL_WAVES, s) for s in cable.sections]
+    c, most = max(((c, s.max_strain) for c, s in waves), key=lambda pair: pair[0] * pair[1])
+    limit = f"at most {100 * most:g} % of stretch (max_strain)"
 
     def stretch(speed: float, acceleration: float) -> float:
         return min(speed / c, acceleration * cable.length / c**2)
@@ -134,9 +133,9 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
     if motion.travel is not None:
         way, over = math.hypot(*motion.travel.by), motion.travel.over
         speed, acceleration = TOP_SPEED * way / over, TOP_ACCELERATION * way / over / over
-        if stretch(speed, acceleration) > MOST_STRETCH:
-            enough = min(TOP_SPEED * way / (MOST_STRETCH * c),
-                         math.sqrt(TOP_ACCELERATION * way * cable.length / MOST_STRETCH) / c)  # fmt: skip
+        if stretch(speed, acceleration) > most:
+            enough = min(TOP_SPEED * way / (most * c),
+                         math.sqrt(TOP_ACCELERATION * way * cable.length / most) / c)  # fmt: skip
             given = f"{way:.6g} m in {over:g} s: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
             fix = f"over: {_rounded_up(enough)} (s) or more, if way and time are meant so"
             yield Finding(("travel", "over"), said(speed, acceleration), fix, given)
@@ -144,9 +143,9 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
         from hybrid.scene.motion_file import fastest_in
 
         speed, acceleration = fastest_in(record)
-        if stretch(speed, acceleration) > MOST_STRETCH:
+        if stretch(speed, acceleration) > most:
             given = f"{record.name}: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
-            fix = f"check the units of the columns (s, m): {MOST_STRETCH * c:.3g} m/s would be accepted"
+            fix = f"check the units of the columns (s, m): {most * c:.3g} m/s would be accepted"
             yield Finding(("file",), said(speed, acceleration), fix, given)
 
 

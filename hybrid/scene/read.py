@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import gc
 import io
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
 from os import PathLike
@@ -24,9 +26,8 @@ from hybrid.scene.schema import Scene
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Spot, Unreadable, from_data, from_text, override
 
-# Bytes: a scene is a page or two, of which the slow reader that keeps line and column takes milliseconds, and of this
-# some seconds.
-LARGEST_SCENE = 1_000_000
+# Bytes: a scene is a page or two, which is read in milliseconds, and this in some seconds.
+LARGEST_SCENE = 4_000_000
 
 
 class RenamedKey(FutureWarning):
@@ -105,6 +106,19 @@ def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Sce
     return _told(*_parsed(text, file, overrides))
 
 
+@contextmanager
+def _without_collection() -> Iterator[None]:
+    """No search for cycles meanwhile: there are none, and among all values of a long scene it takes half the time."""
+    collects = gc.isenabled()
+    gc.disable()
+    try:
+        yield
+    finally:
+        if collects:
+            gc.enable()
+
+
+@_without_collection()
 def _parsed(text: str, file: str, overrides: Sequence[str]) -> tuple[Scene, list[RenamedKey]]:
     try:
         root, complaints = from_text(text)

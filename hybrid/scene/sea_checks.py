@@ -26,6 +26,34 @@ _WATER = "give environment.fluid, such as `fluid: {density: 1025}` (kg/m^3)"
 _WAVES: Place = ("environment", "fluid", "waves")
 
 
+# Densities of fluids, kg/m^3: what has a surface is a liquid, from liquefied gas to the heaviest mud; over a seabed
+# there is a liquid or air; else anything from the air at 50 km to mercury.
+LIQUIDS, AIR, FLUIDS = (400.0, 3000.0), (0.5, 2.0), (5e-4, 14_000.0)
+# Sea water in g/cm^3 or t/m^3, which is no usual air, and what it is to be in kg/m^3.
+SEA_WATER_IN_GRAMS, WATER = (1.02, 1.03), (950.0, 1100.0)
+
+
+def fluid_density(environment: Environment) -> Iterator[Finding]:
+    """A density that no such fluid has."""
+    fluid = environment.fluid
+    if fluid is None:
+        return
+    x, bounds, what = fluid.density, [FLUIDS], "a fluid"
+    if fluid.surface is not None:
+        bounds, what = [LIQUIDS], "a liquid, because it has a surface"
+    elif environment.seabed is not None:
+        bounds, what = [AIR, LIQUIDS], "air or a liquid, because it lies over a seabed"
+    grams = SEA_WATER_IN_GRAMS[0] <= x <= SEA_WATER_IN_GRAMS[1]
+    if any(low <= x <= high for low, high in bounds) and not grams:
+        return
+    expected = f"{' or '.join(f'{low:g} to {high:g}' for low, high in bounds)} kg/m^3, {what}"
+    in_kg = [x * k for k in (1e3, 1e-3) if WATER[0] <= x * k <= WATER[1]]
+    fix = "1025 is sea water, 1000 fresh water, in kg/m^3" + ("; 1.225 is air" if fluid.surface is None else "")
+    if in_kg:
+        fix = f"write {in_kg[0]:g}, in kg/m^3" + ("; for thin air, 1.015" if grams and fluid.surface is None else "")
+    yield Finding(("environment", "fluid", "density"), expected, fix)
+
+
 # --- attachments and bodies --------------------------------------------------------------------
 
 

@@ -18,9 +18,6 @@ SAME_PLACE = 1e-6
 # Lengths are sums of what people wrote; only round-off may separate them.
 SAME_LENGTH = 1e-9
 
-# Real cables break at a few per cent; beyond this a typing error is more likely than rubber.
-LARGEST_STRAIN = 0.5
-
 # A polyline drawn by hand, or an extensible cable that starts along one, may be longer or shorter by this part.
 POLYLINE_STRETCH = 0.2
 
@@ -47,13 +44,11 @@ def too_short(cable: Cable, distance: float) -> str | None:
         if distance < length * (1 - SAME_LENGTH):
             return None
         return f"less than {length:.8g} m from the start, the length of this inextensible cable; it is too short"
-    elastic = sum(s.length for s in cable.sections if s.axial_stiffness is not None)
-    strain = (distance - length) / elastic
-    if strain <= LARGEST_STRAIN:
+    if distance <= cable.reach * (1 + SAME_LENGTH):
         return None
     return (
-        f"at most {length + LARGEST_STRAIN * elastic:.8g} m from the start; the cable, {length:.8g} m long, is too "
-        f"short and would stretch by {100 * strain:.3g} %"
+        f"at most {cable.reach:.8g} m from the start, where a section bears no more (max_strain); the cable, "
+        f"{length:.8g} m long, is too short and would stretch by {100 * (distance / length - 1):.3g} %"
     )
 
 

@@ -14,7 +14,6 @@ from typing import Any
 
 from ruamel.yaml import YAML
 from ruamel.yaml.error import MarkedYAMLError, ReusedAnchorWarning, YAMLError
-from ruamel.yaml.nodes import MappingNode, ScalarNode, SequenceNode
 from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
@@ -27,9 +26,11 @@ Spot = tuple[int, int]
 # A table or list as written may be long; a complaint shows its beginning.
 SHOWN = 60
 
-# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh is far below, and a
-# few lines of aliases of aliases are far above.
-MOST_VALUES = 200_000
+# Values that a scene may have once its aliases are written out: a list of every node of a fine mesh, or tens of
+# thousands of attachments, are below, and a few lines of aliases of aliases are far above.
+MOST_VALUES = 500_000
+# Characters beyond which ruamel.yaml would take longer than all the rest of reading a scene, a tenth of a second.
+LONG = 10_000
 
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
 _WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
@@ -86,7 +87,7 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error", ReusedAnchorWarning)
-            top = YAML(typ="safe", pure=True).compose(text)
+            top = _composed(text)
     except MarkedYAMLError as error:
         raise Unreadable(_not_yaml(text, error)) from None
     except ReusedAnchorWarning as warning:
@@ -103,6 +104,17 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
         return _build(top, (), complaints, (), iter(range(MOST_VALUES))), complaints
     except RecursionError:
         raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
+
+
+def _composed(text: str) -> Any:
+    """The tree of a text as YAML sees it."""
+    if len(text) > LONG:
+        from hybrid.scene.yaml_nodes import composed
+
+        found = composed(text)
+        if found is not None:
+            return found
+    return YAML(typ="safe", pure=True).compose(text)
 
 
 def _not_yaml(text: str, error: MarkedYAMLError) -> Complaint:
@@ -151,17 +163,17 @@ def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[in
         complaints.append(Complaint(dotted(path), "an alias of itself", "a value", "write it out", *place))
         return Node(None, place)
     inside = (*inside, id(node))
-    if isinstance(node, SequenceNode):
+    if node.id == "sequence":
         entries = [_build(entry, (*path, i), complaints, inside, room) for i, entry in enumerate(node.value)]
         return Node(entries, place)
-    if isinstance(node, MappingNode):
+    if node.id == "mapping":
         return _build_table(node, path, complaints, inside, room, place)
     written = f'"{node.value}"' if node.style in ("'", '"') else str(node.value)
     return Node(_scalar(node), place, written)
 
 
 def _build_table(
-    node: MappingNode,
+    node: Any,
     path: Place,
     complaints: list[Complaint],
     inside: tuple[int, ...],
@@ -172,7 +184,7 @@ def _build_table(
     merged: dict[str, Node] = {}
     for i, (key_node, value_node) in enumerate(node.value):
         spot = (key_node.start_mark.line + 1, key_node.start_mark.column + 1)
-        if not isinstance(key_node, ScalarNode):
+        if key_node.id != "scalar":
             complaints.append(
                 Complaint(dotted(path) or "scene", "a list or table as key", "a word as key", _QUOTE, *spot)
             )
@@ -217,10 +229,10 @@ def _build_table(
     return table
 
 
-def _is_behind_comma(before: Any, key: ScalarNode, value: Any) -> bool:
+def _is_behind_comma(before: Any, key: Any, value: Any) -> bool:
     """Whether a key is what stands behind a decimal comma: YAML reads {mass: 2,5} as mass: 2 and a key 5."""
     return (
-        isinstance(before, ScalarNode)
+        before.id == "scalar"
         and not isinstance(value.value, list)
         and value.value == ""
         and before.end_mark.index + 1 == key.start_mark.index
@@ -229,7 +241,7 @@ def _is_behind_comma(before: Any, key: ScalarNode, value: Any) -> bool:
     )
 
 
-def _scalar(node: ScalarNode) -> Any:
+def _scalar(node: Any) -> Any:
     text, tag = str(node.value), str(node.tag).rpartition(":")[2]
     try:
         if tag == "null":

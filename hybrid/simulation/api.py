@@ -40,10 +40,10 @@ from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import RemainingRun, remaining_run
 from hybrid.simulation.restore import refused
 from hybrid.simulation.static_case import StaticCase
+from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
-from hybrid.store.writer import check_target
 
 Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 

@@ -12,9 +12,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import Floats
 from hybrid.model.plan import output_times
+from hybrid.model.sections import borne_tension
 from hybrid.outputs.probes import PROBES, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -41,6 +42,7 @@ def static_shooting(scene: Scene, output: str | Path | None, overwrite: bool) ->
         if state.rod.any():
             text = "literal shooting finds an equilibrium, stable or not, and a rod may have several"
             recorder.event(0.0, 0.0, scene.length, "stability not judged", text)
+        _refuse_stretch(scene, state, None)
         recorder.save(0.0, _values(scene, state), _zones(state))
         recorder.close("complete", f"equilibrium by literal shooting, growth {state.growth:.2g}")
     return open_result(target)
@@ -56,6 +58,7 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
 
         def record(state: ShootingState) -> None:
             last[:] = [state]
+            _refuse_stretch(scene, state, state.t)
             if state.t > 0.0:
                 recorder.log(
                     {"t": state.t, "iterations": state.iterations, "residual": state.residual, "growth": state.growth}
@@ -71,6 +74,15 @@ def run_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Re
             raise ComputationError(error.outcome, error.t, error.s, error.detail, left) from None
         recorder.close("complete", "literal shooting")
     return open_result(target)
+
+
+def _refuse_stretch(scene: Scene, state: ShootingState, t: float | None) -> None:
+    """ComputationError where a section is stretched beyond what it bears."""
+    used = state.tension / borne_tension(scene, state.s)
+    worst = int(np.argmax(used))
+    if used[worst] > 1.0:
+        detail = f"{100.0 * used[worst]:.4g} % of max_strain, under {state.tension[worst]:.4g} N"
+        raise ComputationError(Outcome.OVERSTRETCHED, t, float(state.s[worst]), detail)
 
 
 def _target(output: str | Path | None) -> Path | io.BytesIO:

@@ -36,9 +36,10 @@ from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
+from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import Tree, pack
-from hybrid.store.reader import is_result, open_result, opened
+from hybrid.store.reader import open_result
 from hybrid.store.writer import Recorder
 
 ZONES_FIXED = (

@@ -36,8 +36,6 @@ GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
 NEWTON_LEAVES = 1e-7
 # Energy that the scheme swallows, as a part of the same: beyond this a motion was too fast for its step.
 LOSS_NOTED = 0.5
-# Strain beyond which a cable is hardly one; ropes of polymer reach a few per cent in service.
-STRETCHED = 0.05
 # A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
 # under, and what Newton leaves of no tension at all is far below.
 PRESSED = 1e-3
@@ -63,20 +61,37 @@ LET_GO = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
-    "_bend", "_twist", "_strain", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
+    "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
     "_rho", "_moved", "_steps", "_put_in", "_potential", "_alive",
 )  # fmt: skip
 
 Stop = tuple[Outcome, int] | None
 
 
+def borne_strain(model: Model) -> Floats:
+    """Strain (N,) that each cell bears; infinite where it does not stretch."""
+    s = model.line.s
+    return np.asarray(model.cable.max_strain[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
+
+
+def most_stretched(model: Model, state: State) -> int:
+    """The cell that is stretched most, of what it bears."""
+    return int(np.argmax((np.linalg.norm(state.e, axis=1) / model.line.h - 1.0) / borne_strain(model)))
+
+
+def stretch_text(model: Model, state: State) -> str:
+    """How far the cable is stretched, and how far it may be."""
+    cell = most_stretched(model, state)
+    strain, borne = np.linalg.norm(state.e[cell]) / model.line.h[cell] - 1.0, borne_strain(model)[cell]
+    return f"a strain of {100.0 * strain:.3g} % under {state.T[cell]:.4g} N, where max_strain is {100.0 * borne:.3g} %"
+
+
 class Diagnostics:
     """What is watched in one run or one static solve."""
 
     def __init__(self, model: Model, events: EventLog) -> None:
-        self.events, self._model = events, model
+        self.events, self._model, self._longest = events, model, 1.0 + borne_strain(model)
         self._bend = self._twist = UNRESOLVED
-        self._strain = STRETCHED
         self._slack = model.slack_floor
         self._fold, self._sunk = UNRESOLVED, SUNK * model.length
         self._off = OFF * model.length
@@ -114,7 +129,8 @@ class Diagnostics:
 
     def follow(self, model: Model) -> None:
         """Watch the same line with other zones."""
-        self._model = model
+        if model is not self._model:
+            self._model, self._longest = model, 1.0 + borne_strain(model)
 
     def note(self, t: float, node: int, kind: str, text: str) -> None:
         s = float(self._model.line.s[node])
@@ -246,15 +262,10 @@ class Diagnostics:
             self.events.event(t, 0.0, self._model.length, "torque neglected", text)
             self._left_out = True
 
-    def strain(self, t: float, state: State) -> None:
-        """A cable that is stretched more than cables are."""
-        strain = self._model.line.ck * state.T
-        cell = int(np.argmax(strain))
-        if strain[cell] > self._strain:
-            part = 100.0 * float(strain[cell])
-            text = f"the cable is stretched by {part:.3g} %: is it long enough, and axial_stiffness in N?"
-            self.note(t, cell, "stretched", text)
-            self._strain = 2.0 * float(strain[cell])
+    def stretch(self, state: State) -> Stop:
+        """A section that is stretched beyond what it bears."""
+        over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
+        return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
     def mesh(self, t: float, state: State) -> None:
         """Folds that a catenary's cells do not resolve, and a seabed in which the line drowns."""

@@ -11,9 +11,9 @@ from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import Errors, RunSample, summary
 from hybrid.simulation.result_checks import undersampled_end_forces
+from hybrid.store.amend import amend
 from hybrid.store.format import Field
 from hybrid.store.reader import open_result
-from hybrid.store.writer import amend
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",

@@ -12,6 +12,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.scene.read import scene_text
+from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient
 from hybrid.solve.stepper import Taken
 
@@ -28,6 +29,8 @@ def explanation(run: Transient, taken: Taken, dt: float) -> str:
         detail = "the fastest point is at this place"
     elif taken.outcome == Outcome.TWISTED_TOO_FAR:
         detail = f"{model.cells} cells"
+    elif taken.outcome == Outcome.OVERSTRETCHED:
+        detail = stretch_text(model, run.state)
     elif dt == 0.0:
         detail = "no accelerations are consistent with the shape and the loads"
     else:

@@ -21,8 +21,9 @@ from hybrid.scene.read import parse_scene, scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import refused, resolution_from
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
+from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
-from hybrid.store.reader import open_result, opened
+from hybrid.store.reader import open_result
 
 # What may be other from some time on: it acts from outside, and nothing of the cable's state hangs on it.
 MAY_CHANGE = (

@@ -16,7 +16,7 @@ from hybrid.outputs.probes import Observer, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.diagnostics import Diagnostics
+from hybrid.simulation.diagnostics import Diagnostics, stretch_text
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, RunSample, compared_cells
 from hybrid.simulation.events import EventLog
@@ -43,12 +43,13 @@ class StaticCase:
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()
             diagnostics.equilibrium(found)
-            diagnostics.strain(0.0, found.state)
             diagnostics.mesh(0.0, found.state)
-            stop = diagnostics.still(ends, found.state)
+            stretched = diagnostics.stretch(found.state)
+            stop = stretched or diagnostics.still(ends, found.state)
             events.write_to(recorder)
             if stop is not None:
-                raise ComputationError(stop[0], None, float(model.line.s[stop[1]]))
+                detail = stretch_text(model, found.state) if stretched else ""
+                raise ComputationError(stop[0], None, float(model.line.s[stop[1]]), detail)
             values = _values(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")

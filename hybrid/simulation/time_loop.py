@@ -58,6 +58,7 @@ class TimeLoop:
         except StepFailed as failed:
             self._fail(failed.taken, failed.dt)
         self.diagnostics.follow(run.model)
+        self._stop_if(self.diagnostics.stretch(run.state))
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
         self.diagnostics.scheme(run.rho)
         self._output()
@@ -115,6 +116,7 @@ class TimeLoop:
             diagnostics.follow(run.model)
             if self.target is not None:
                 diagnostics.step(step.t, step.dt, run.rho, run.before, run.state)
+                self._stop_if(diagnostics.stretch(run.state))
             self._stop_if(diagnostics.shape(step.t, run.stepper.told[BEND : TWIST_NODE + 1], run.state))
             if run.model.slack == "warn":
                 diagnostics.tension(step.t, run.state)
@@ -134,7 +136,6 @@ class TimeLoop:
         if self.target is None:
             return
         diagnostics.follow(model)
-        diagnostics.strain(run.t, run.state)
         diagnostics.mesh(run.t, run.state)
         diagnostics.rest(run.t, ends, values, run.state)
         if switching is not None:

@@ -10,6 +10,8 @@ the checkpoint (store.copying), put in its place when it is whole.
 from __future__ import annotations
 
 import hashlib
+from collections.abc import Sequence
+from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
 
@@ -17,6 +19,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.format import plain_text
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
@@ -63,9 +66,9 @@ def read_before(file: h5py.File) -> Tree:
     return unpack(file[BEFORE][()].tobytes()) if BEFORE in file else {}
 
 
-def write_slot(file: h5py.File, number: int, data: bytes) -> None:
-    """Write a packed checkpoint over the older of the two."""
-    slot = file[SLOTS[number % 2]]
+def write_slot(slots: Sequence[h5py.Dataset], number: int, data: bytes) -> None:
+    """Write a packed checkpoint over the older of the two; whoever holds the slots open hears of it when that fails."""
+    slot = slots[number % 2]
     if slot.shape[0] < len(data):
         slot.resize(len(data), axis=0)
     slot[: len(data)] = np.frombuffer(data, "u1")
@@ -86,8 +89,11 @@ def read_checkpoint(file: h5py.File) -> Checkpoint:
             except ResultError as error:
                 why = str(error).split("detail:")[-1].splitlines()[0].strip()
     if not points:
+        wrote, advice = plain_text(file.attrs.get("version_hybrid-cable", "")), "run its scene again"
+        if wrote != version("hybrid-cable") and any(name in file for name in SLOTS):
+            advice += f", or resume it with hybrid-cable {wrote}, which wrote it"
         raise ResultError(
-            f"{file.filename} has no checkpoint to go on from\n    detail:   {why}\n    try:      run its scene again"
+            f"{file.filename} has no checkpoint to go on from\n    detail:   {why}\n    try:      {advice}"
         )
     return max(points, key=lambda point: point.number)
 

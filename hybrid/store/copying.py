@@ -1,36 +1,39 @@
-"""Copies of result files: all rows or some, without what is left out, as a file that is whole and can be written to."""
+"""Copies of result files: all rows or some, without what is left out.
+
+A run is resumed in a copy, because HDF5 refuses to open a file for writing that a killed process was writing ("file is
+already open for write"; the mark can be taken away by h5clear alone), and because the file stays as it is until the
+copy is whole.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping
-from pathlib import Path
 from typing import Any
 
 import h5py
 import numpy as np
 
+from hybrid.store.format import plain_text
+
 _BLOCK = 1 << 22  # bytes that are copied at a time
 
 
-def copied(
-    old: h5py.File, path: Path, libver: tuple[str, str], rows: Mapping[str, int] | None, without: Iterable[str] = ()
-) -> None:
+def copied(old: h5py.File, new: h5py.File, rows: Mapping[str, int] | None, without: Iterable[str] = ()) -> None:
     """Copy a result to a new file; rows: of every table that are taken, by its scale (None: all that are complete)."""
     left = set(without)
     whole = [(name, data) for name, data in _datasets(old) if name not in left]
     scales = [name for name, data in whole if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
     kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
-    with h5py.File(path, "w", libver=libver, locking="best-effort") as new:
-        _annotations(old, new)
-        for name, data in whole:
-            _copied_dataset(data, new, name, kept)
-        for name in scales:
-            new[name].make_scale(_word(old[name].attrs.get("NAME", name)))
-        for name, data in whole:
-            for k, dim in enumerate(data.dims):
-                new[name].dims[k].label = dim.label
-                if dim.label in kept and dim.label != name:
-                    new[name].dims[k].attach_scale(new[dim.label])
+    _annotations(old, new)
+    for name, data in whole:
+        _copied_dataset(data, new, name, kept)
+    for name in scales:
+        new[name].make_scale(plain_text(old[name].attrs.get("NAME", name)))
+    for name, data in whole:
+        for k, dim in enumerate(data.dims):
+            new[name].dims[k].label = dim.label
+            if dim.label in kept and dim.label != name:
+                new[name].dims[k].attach_scale(new[dim.label])
 
 
 def names_in(file: h5py.File, group: str) -> list[str]:
@@ -69,7 +72,3 @@ def _annotations(old: Any, new: Any) -> None:
     for key, value in old.attrs.items():
         if key not in ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"):
             new.attrs.create(key, value, dtype=old.attrs.get_id(key).dtype)
-
-
-def _word(value: Any) -> str:
-    return value.decode() if isinstance(value, bytes) else str(value)

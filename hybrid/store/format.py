@@ -1,6 +1,6 @@
 """What a result file is made of: fields, the tables they form, and how HDF5 gets them.
 
-The layout is described in `read`; `record` fills it.
+The layout is described in store/reader.py; store/writer.py fills it.
 """
 
 from __future__ import annotations
@@ -15,8 +15,9 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.reader import FORMAT, FORMAT_VERSION
 
+FORMAT = "hybrid-cable"
+FORMAT_VERSION = 1
 # Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
 _CHUNK_BYTES = 16384
 # Bytes of chunks that HDF5 keeps of every dataset: what is written is not read again, and its own 8 MB of each would
@@ -206,3 +207,8 @@ def cut(text: str, width: int) -> bytes:
 def set_status(file: h5py.File, status: str, message: str) -> None:
     for name, text in (("status", status), ("message", message)):
         file.attrs.modify(name, fixed_text(text, file.attrs.get_id(name).dtype))
+
+
+def plain_text(value: object) -> str:
+    """A text that HDF5 gives as bytes or as str."""
+    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)

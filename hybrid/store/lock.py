@@ -11,6 +11,21 @@ from filelock import FileLock, Timeout
 
 from hybrid.errors import ResultError, ResultHeld
 
+# s: whoever asks `is_held` holds a lock for some microseconds.
+_PATIENCE = 0.2
+_OURS: set[Path] = set()  # results that this process holds
+
+
+def is_held(path: Path) -> bool:
+    """Whether another process holds a result for writing."""
+    if path in _OURS or not _beside(path).exists():
+        return False
+    try:
+        with FileLock(_beside(path), timeout=0):
+            return False
+    except (Timeout, OSError):
+        return True
+
 
 @contextmanager
 def locked(path: Path | None) -> Iterator[None]:
@@ -18,8 +33,8 @@ def locked(path: Path | None) -> Iterator[None]:
     if path is None:
         yield
         return
-    beside = path.with_name(f".{path.name}.lock")
-    lock = FileLock(beside, timeout=0)
+    beside = _beside(path)
+    lock = FileLock(beside, timeout=_PATIENCE)
     try:
         lock.acquire()
     except Timeout:
@@ -31,7 +46,13 @@ def locked(path: Path | None) -> Iterator[None]:
     try:
         for left in path.parent.glob(f".{escape(path.name)}.[0-9]*.new"):  # of a process that was killed
             left.unlink(missing_ok=True)
+        _OURS.add(path)
         yield
     finally:
+        _OURS.discard(path)
         beside.unlink(missing_ok=True)
         lock.release()
+
+
+def _beside(path: Path) -> Path:
+    return path.with_name(f".{path.name}.lock")

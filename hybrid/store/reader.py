@@ -24,141 +24,29 @@ kill, looks at no row beyond it.
 
 from __future__ import annotations
 
-import atexit
 import difflib
 import html
 import io
-import time
-import weakref
-from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.integrity import being_written, readable
+from hybrid.store.format import plain_text
+from hybrid.store.hdf5_file import check_format, open_file
+from hybrid.store.integrity import readable
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
+from hybrid.store.records import Attributes, Columns, Event, UnknownName, Zone, ZoneHistory, joined
 
 if TYPE_CHECKING:
     import xarray
 
-FORMAT = "hybrid-cable"
-FORMAT_VERSION = 1
 TEXTS = ("scene", "changes")
 HIDDEN = ("checkpoint",)  # what is for the program alone
-
-# The writer holds the file alone while it starts, for milliseconds; so long (s) a reader waits for it to let go.
-_PATIENCE = 1.0
-# A writer brings the first bytes up to date in a single write, so what is still wrong after so long (s) is wrong.
-_TORN = 0.1
-
-
-class Zone(NamedTuple):
-    """A stretch s_a <= s <= s_b (m, unstretched) and the kind of model that holds there."""
-
-    kind: str
-    s_a: float
-    s_b: float
-
-    def __str__(self) -> str:
-        return f"{self.kind} {self.s_a:.6g}-{self.s_b:.6g} m"
-
-
-class Event(NamedTuple):
-    """Something that happened at time t (s) on s_a <= s <= s_b (m), and why.
-
-    Of a change of zones also: the criterion, its value and threshold, and the energy (J) that all changes of this
-    moment put in, on the first of them.
-    """
-
-    t: float
-    s_a: float
-    s_b: float
-    kind: str
-    text: str
-    criterion: str = ""
-    value: float | None = None
-    threshold: float | None = None
-    energy: float | None = None  # J
-
-
-class UnknownName(ResultError, AttributeError):
-    """The file holds nothing of this name.  (An AttributeError too, so that `hasattr` works.)"""
-
-
-class Attributes(dict[str, Any]):
-    """Attributes of a file by name; names of older versions are understood in `attributes[name]`."""
-
-    def __missing__(self, name: str) -> Any:
-        if name in OLD_ATTRIBUTES:
-            return self[OLD_ATTRIBUTES[name]]
-        raise KeyError(name)
-
-
-class Columns(Mapping[str, np.ndarray]):
-    """The datasets of one group, by name: ``result.energy["kinetic"]`` or ``result.energy.kinetic``."""
-
-    def __init__(self, result: Result, group: str) -> None:
-        self._result, self._group = result, group
-        self._keys = [n.removeprefix(group + "/") for n in result.names if n.startswith(group + "/")]
-
-    def __getitem__(self, key: str) -> np.ndarray:
-        return self._result[f"{self._group}/{key}"]
-
-    def __getattr__(self, key: str) -> np.ndarray:
-        if key.startswith("_"):
-            raise AttributeError(key)
-        return self[key]
-
-    def __iter__(self) -> Iterator[str]:
-        return iter(self._keys)
-
-    def __len__(self) -> int:
-        return len(self._keys)
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self._keys]
-
-    def __repr__(self) -> str:
-        return f"<{self._result.describe(self._group)}>"
-
-
-class ZoneHistory(Sequence[list[Zone]]):
-    """`zones[i]`: the zones at output i, in the order of s."""
-
-    def __init__(self, outputs: np.ndarray, zones: list[Zone], count: int) -> None:
-        self._first, starts = np.unique(outputs, return_index=True)
-        self._sets = [zones[a:b] for a, b in zip(starts, [*starts, len(zones)][1:], strict=True)]
-        self._count = count
-
-    def __len__(self) -> int:
-        return self._count
-
-    def __getitem__(self, i: Any) -> Any:
-        if isinstance(i, slice):
-            return [self[k] for k in range(*i.indices(self._count))]
-        if not -self._count <= i < self._count:
-            raise IndexError(f"output {i} of {self._count}")
-        k = int(np.searchsorted(self._first, i % self._count, side="right")) - 1
-        return list(self._sets[k]) if k >= 0 else []
-
-    def __repr__(self) -> str:
-        sets = [f"from output {i}: {_joined(list(map(str, z)))}" for i, z in zip(self._first, self._sets, strict=True)]
-        return f"<zones at {self._count} outputs; {_joined(sets, '; ')}>"
-
-
-# HDF5 calls Python to close a file in memory, which crashes the interpreter when that happens while it shuts down.
-_ALIVE: weakref.WeakSet[Result] = weakref.WeakSet()
-
-
-@atexit.register
-def _close_all() -> None:
-    for result in list(_ALIVE):
-        result.close()
 
 
 class Result:
@@ -171,13 +59,12 @@ class Result:
     def __init__(self, source: Path | io.BytesIO) -> None:
         self._source = source
         self._open()
-        _ALIVE.add(self)
 
     def _open(self) -> None:
-        self._file = _open_file(self._source)
+        self._file = open_file(self._source)
         try:
             with readable(self._source):
-                _check_format(self._file, self._source)
+                check_format(self._file, self._source)
                 self._scan()
         except BaseException:
             self._file.close()
@@ -197,8 +84,8 @@ class Result:
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
                     name = OLD_NAMES[name]
-                self._dims[name] = tuple(d.label for d in item.dims)
-                self.units[name] = _text(item.attrs.get("units", ""))
+                self._dims[name] = tuple(plain_text(d.label) for d in item.dims)
+                self.units[name] = plain_text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
                 groups.add(name)
 
@@ -292,7 +179,7 @@ class Result:
         if not self._file:
             raise ResultError("the result is closed; open the file again")
         attrs = self._dataset(self._known(name)).attrs
-        return {key: _text(attrs.get(key, "")) for key in ("units", "description", "frame")}
+        return {key: plain_text(attrs.get(key, "")) for key in ("units", "description", "frame")}
 
     def describe(self, name: str) -> str:
         """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
@@ -362,12 +249,12 @@ class Result:
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
         with readable(self._source):
-            return _text(self._file["scene"][()])
+            return plain_text(self._file["scene"][()])
 
     @property
     def changes_text(self) -> str:
         """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
-        return _text(self._file["changes"][()]) if "changes" in self._file else ""
+        return plain_text(self._file["changes"][()]) if "changes" in self._file else ""
 
     @property
     def title(self) -> str:
@@ -400,7 +287,7 @@ class Result:
         text = f"Result of '{self.title}' ({name}): {len(t)} output{'s' * (len(t) != 1)}, {span}; "
         text += f"{len(s)} points on s = {s[0]:.6g} ... {s[-1]:.6g} m; "
         if len(t) and self.zones[-1]:
-            text += f"last zones {_joined(list(map(str, self.zones[-1])))}; "
+            text += f"last zones {joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
 
     def _repr_html_(self) -> str:
@@ -422,62 +309,6 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     """
     source = io.BytesIO(source) if isinstance(source, bytes) else source
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
-
-
-@contextmanager
-def opened(source: Path) -> Iterator[h5py.File]:
-    """The HDF5 file of a result, for what is not in a `Result`.  ResultError as of `open_result`."""
-    with _open_file(source) as file:
-        _check_format(file, source)
-        yield file
-
-
-def is_result(path: Path) -> bool:
-    """Whether the file is one of ours, of whatever format version and status."""
-    with suppress(ResultError), _open_file(path) as file:
-        return _text(file.attrs.get("format", "")) == FORMAT
-    return False
-
-
-def _open_file(source: Path | io.BytesIO) -> h5py.File:
-    if not isinstance(source, Path):
-        try:
-            return h5py.File(source, "r")
-        except OSError as error:
-            raise ResultError(f"the bytes in memory are no HDF5 file: {error}") from None
-    if not source.exists():
-        raise ResultError(f"there is no file {source}\n    try:      check the name, or run the scene first")
-    if source.is_dir():
-        raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
-    begin = time.monotonic()
-    while True:
-        try:
-            # SWMR (single writer, multiple readers) for files with a writer, alive or killed, and for no other.
-            return h5py.File(source, "r", swmr=being_written(source), locking="best-effort")
-        except OSError as error:
-            problem: Exception = error
-        except ResultError as error:  # perhaps a writer has not come to the end of the first 48 bytes
-            problem = error
-        waited, torn = time.monotonic() - begin, isinstance(problem, ResultError)
-        if not (torn or "lock" in str(problem)) or waited > (_TORN if torn else _PATIENCE):
-            break
-        time.sleep(0.05)
-    if isinstance(problem, ResultError):
-        raise problem
-    raise ResultError(
-        f"{source} cannot be read as a result\n    detail:   {problem}\n    expected: an HDF5 file written by hybrid"
-    )
-
-
-def _check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
-    name = str(source) if isinstance(source, Path) else "the file in memory"
-    kind, version = _text(file.attrs.get("format", "")), file.attrs.get("format_version")
-    if kind != FORMAT:
-        raise ResultError(f"{name} is an HDF5 file, but not a result of hybrid\n    given:    format '{kind}'")
-    if version != FORMAT_VERSION:
-        wrote = _text(file.attrs.get("version_hybrid-cable", "?"))
-        said = f"{name} has result format {version}; this program reads format {FORMAT_VERSION}"
-        raise ResultError(f"{said}\n    try:      read it with hybrid-cable {wrote}, or run its scene again")
 
 
 def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:
@@ -507,13 +338,5 @@ def _current(name: str) -> str:
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
 
 
-def _joined(texts: list[str], by: str = ", ") -> str:
-    return by.join(texts if len(texts) <= 6 else [*texts[:6], f"and {len(texts) - 6} more"])
-
-
-def _text(value: Any) -> str:
-    return value.decode("utf-8", "replace") if isinstance(value, bytes) else str(value)
-
-
 def _plain(value: Any) -> Any:
-    return _text(value) if isinstance(value, bytes) else value.item() if isinstance(value, np.generic) else value
+    return plain_text(value) if isinstance(value, bytes) else value.item() if isinstance(value, np.generic) else value

@@ -14,7 +14,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.reader import Result, Zone
+from hybrid.store.reader import Result
+from hybrid.store.records import Zone
 from hybrid.view.decimate import even
 from hybrid.view.panels import draw_sea, place_along
 from hybrid.view.projections import View, aspect_of, extent_in, magnification, views_of, whole_zones

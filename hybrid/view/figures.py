@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.store.reader import Result, Zone
+from hybrid.store.reader import Result
+from hybrid.store.records import Zone
 from hybrid.view.decimate import Kept, Store, outline
 from hybrid.view.projections import STILL, free_edges, history_points, whole_zones
 from hybrid.view.style import ALARM, BED, DOUBT, GREY, INK, KIND_COLOURS, POINT_COLOURS, ZERO, prefix, title_of

@@ -10,7 +10,8 @@ from itertools import groupby
 
 import numpy as np
 
-from hybrid.store.reader import Result, Zone
+from hybrid.store.reader import Result
+from hybrid.store.records import Zone
 from hybrid.view.decimate import even
 from hybrid.view.projections import View, bed_in, extent_in, magnification, telling_times, views_of, whole_zones
 from hybrid.view.style import ALARM, BED, BODY, GREY, INK, KIND_COLOURS, LEVEL, SAND, WATER

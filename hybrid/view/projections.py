@@ -9,7 +9,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.reader import Result, Zone
+from hybrid.store.reader import Result
+from hybrid.store.records import Zone
 
 Numbers = Sequence[float] | np.ndarray
 STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off

@@ -12,7 +12,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, weight_of_event
-from hybrid.store.reader import Event, Result
+from hybrid.store.reader import Result
+from hybrid.store.records import Event
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix
 

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, weight_of_event
-from hybrid.store.reader import Event, Result
+from hybrid.store.reader import Result
+from hybrid.store.records import Event
 from hybrid.view.decimate import Kept, Store, outline
 from hybrid.view.figures import Spec, colour_scale, layout
 from hybrid.view.projections import STILL, free_edges

@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.store.reader import Result, Zone
+from hybrid.store.reader import Result
+from hybrid.store.records import Zone
 from hybrid.view.projections import STILL, free_edges, whole_zones
 from hybrid.view.save import save_figure
 from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL, legend_row, new_page, prefix, style

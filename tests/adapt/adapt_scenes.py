@@ -17,7 +17,8 @@ from problems import Scene, clamped, pinned, scene
 from hybrid import run
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.model.material import TENSION_FLOOR
-from hybrid.store.reader import Event, Result
+from hybrid.store.reader import Result
+from hybrid.store.records import Event
 
 Floats = np.ndarray
 GRAVITY = 10.0

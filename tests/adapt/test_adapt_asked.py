@@ -191,7 +191,9 @@ def test_a_cable_that_becomes_rod_again_has_its_twist():
 
 def test_a_step_that_goes_too_far_is_taken_back():
     """A blow that no criterion saw coming: the step is repeated with rods, and an event says so, with time and place."""
-    what = breathing(9.0, 3.0, {"tolerance": 0.1, "hold_time": 0.05}, period=0.56, duration=0.5, step=0.05)
+    what = breathing(
+        9.0, 3.0, {"tolerance": 0.1, "hold_time": 0.05}, period=0.56, duration=0.5, step=0.05, max_strain=0.2
+    )
     result = hybrid.run(what)
     again = [e for e in result.events if e.kind == "retry"]
     assert again

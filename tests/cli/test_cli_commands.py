@@ -178,7 +178,8 @@ def test_json_lines_of_a_run(call: Call) -> None:
 
 
 def test_what_happened_is_told_most_important_first(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
-    from hybrid.store.reader import Event, Result
+    from hybrid.store.reader import Result
+    from hybrid.store.records import Event
 
     events = [Event(0.0, 1, 1, "other", "b"), Event(0.0, 2, 2, "end rotated in", "a"), Event(1.5, 3, 3, "other", "c")]
     monkeypatch.setattr(Result, "events", events)

@@ -33,6 +33,9 @@ LONGEST = 20.0  # s of wall time: a case that takes longer has failed
 NEWS = {"end rotated in", "stability not judged", "zones fixed", "static friction neglected", "undamped"}
 DOUBTS = tuple(kind for kind in EVENTS_BY_WEIGHT if kind not in NEWS)
 
+# The truths are those of linear elasticity, however far a line is stretched.
+ANY_STRAIN = 1e9
+
 Floats = np.ndarray
 Measured = Iterable[tuple[str, float, float]]  # what, error, tolerance
 X, Y, Z = np.eye(3)
@@ -161,6 +164,8 @@ def scene(
     if tables.pop("slack", False) and model in ("catenary", "zones"):
         kind = {"kind": model, **(kind if isinstance(kind, dict) else {}), "slack": "warn"}
     tables.setdefault("initial", "equilibrium")
+    if "axial_stiffness" in section:
+        section = {"max_strain": ANY_STRAIN} | section
     if model == "catenary":
         section = {k: v for k, v in section.items() if k not in ("bending_stiffness", "torsional_stiffness")}
     return {

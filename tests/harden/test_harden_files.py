@@ -21,6 +21,7 @@ from collections import Counter
 from pathlib import Path
 
 import pytest
+from test_result_file import writer_of
 
 import hybrid
 
@@ -129,19 +130,19 @@ def test_three_thousand_spoilt_files(good: Path) -> None:
     assert sum(n for kind, n in count.items() if kind.startswith("crashed")) <= 60
 
 
-@pytest.mark.bench
-def test_spoilt_files_of_a_run_that_was_killed(good: Path) -> None:
-    """They have no sums, and HDF5 reads them with patience: how often it then hangs or crashes is told, not promised."""
-    begin, killed = time.perf_counter(), good.with_name("killed.h5")
-    long = f"import hybrid; s = hybrid.load_scene({str(good.with_name('wire.yaml'))!r}, ['time.duration=1000'])"
-    with subprocess.Popen([sys.executable, "-c", f"{long}; hybrid.run(s, {str(killed)!r})"]) as worker:
-        while not killed.is_file() or killed.stat().st_size < 150_000:
-            time.sleep(0.2)
-        worker.kill()
-    count, bad = opened(killed, range(100), 0, patience=10.0)
-    _told("the file of a killed run", range(100), count, begin)
+def test_spoilt_files_of_a_run_that_was_killed(tmp_path: Path) -> None:
+    """They have no sums, so other numbers are told and not promised; but they do not keep a reader waiting.
+
+    With a reader in SWMR mode 61 of 200 variants never opened; without, 2 of 200 hang and 1 crashes the process.
+    """
+    begin, killed = time.perf_counter(), tmp_path / "killed.h5"
+    with writer_of(killed, 300) as writer:
+        assert writer.wait() == -signal.SIGKILL
+    count, bad = opened(killed, range(40), 0, patience=5.0)
+    _told("the file of a killed run", range(40), count, begin)
     assert not [x for x in bad if ": fault: " in x], "\n".join(bad[:20])
-    assert count["refused"] and count["whole"]
+    assert count["refused"] >= 10 and count["whole"] >= 10
+    assert sum(n for kind, n in count.items() if "HDF5" in kind) <= 1, count
 
 
 def test_a_file_that_is_cut_off_is_said_at_once(good: Path) -> None:

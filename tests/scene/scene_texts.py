@@ -55,6 +55,7 @@ cable:
       mass: 1.0
       diameter: 0.02
       axial_stiffness: 1.0e6
+      max_strain: 0.02
       bending_stiffness: [1.0, 2.0]
       torsional_stiffness: 1.5
       rotary_inertia: [1.0e-4, 2.0e-4]

@@ -96,8 +96,30 @@ def test_angles_follow_the_convention() -> None:
             for h in (HARMONIC.yaw, HARMONIC.pitch, HARMONIC.roll)
             if h is not None
         ]
-        expected = Rotation.from_euler("ZYX", angles, degrees=True).as_matrix() @ BASE
-        np.testing.assert_allclose(motion.at(t)[2], expected, atol=1e-14)
+        for order, given in (("ZYX", angles), ("xyz", angles[::-1])):  # about axes that turn, about those of space
+            expected = Rotation.from_euler(order, given, degrees=True).as_matrix() @ BASE
+            np.testing.assert_allclose(motion.at(t)[2], expected, atol=1e-14)
+
+
+def test_the_manual_states_the_convention() -> None:
+    """The line of scipy in docs/scene.md, as it stands there, and the signs that it states."""
+    from scipy.spatial.transform import Rotation
+
+    text = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
+    (line,) = re.findall(r"`(Rotation\.from_euler\(.*\))`", text)
+    roll, pitch, yaw = 40.0, -25.0, 70.0
+
+    def turned(**angles: float) -> np.ndarray:
+        table = {name: Harmonic(amplitude=x, period=4.0, phase=90.0) for name, x in angles.items()}
+        frame = EndMotion(Motion(**table, ramp=1.0), PLACE, np.eye(3)).at(4.0)[2]
+        assert frame is not None
+        return frame
+
+    said = eval(line, {"Rotation": Rotation, "roll": roll, "pitch": pitch, "yaw": yaw})
+    np.testing.assert_allclose(turned(roll=roll, pitch=pitch, yaw=yaw), said.as_matrix(), atol=1e-14)
+    x, y, z = np.eye(3)
+    for name, from_, to in (("roll", y, z), ("pitch", z, x), ("yaw", x, y)):
+        np.testing.assert_allclose(turned(**{name: 90.0}) @ from_, to, atol=1e-14)
 
 
 def test_rotation_vectors_follow_the_convention(recorded: Motion) -> None:

@@ -10,6 +10,7 @@ from pydantic import ValidationError
 from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPENSION, complaints, marked
 
 from hybrid.errors import SceneError
+from hybrid.scene import yaml_source
 from hybrid.scene.read import as_scene, load_scene, parse_scene, scene_text, validate_scene
 from hybrid.scene.schema import (
     Cable,
@@ -254,7 +255,7 @@ def test_overrides() -> None:
         SUSPENSION,
         overrides=[
             "time.step=0.005",
-            "cable.sections[0].mass=2",
+            "cable.sections[0].mass=2e-3",
             "ends.start.position=[0, 0, 1]",
             "mesh.cells=40",
             "cable.sections[0].damping.stiffness=1e-3",
@@ -264,7 +265,7 @@ def test_overrides() -> None:
         ],
     )
     assert scene.require_time().step == 0.005
-    assert scene.cable.sections[0].mass == 2.0
+    assert scene.cable.sections[0].mass == 2e-3
     assert scene.cable.sections[0].damping == Damping(mass=2.0, stiffness=1e-3)
     assert scene.mesh is not None and scene.mesh.cells == 40
     assert scene.model == RodModel() and scene.title == "a-b"
@@ -313,3 +314,41 @@ def test_a_table_of_a_model_may_imply_its_kind() -> None:
     for text, kind in (("{tolerance: 1.0e-4}", "adaptive"), ("{zones: [{catenary: 1.5}, {rod: 0.5}]}", "zones")):
         model = "model: {kind: zones, zones: [{catenary: 1.5}, {rod: 0.5}]}"
         assert parse_scene(SUSPENSION.replace(model, f"model: {text}")).model.kind == kind
+
+
+# --- long scenes -------------------------------------------------------------------------------
+
+ODD_TEXTS = [
+    "a: [1e-3, .5, 0o17, 0x1F, 1_000, +1, -.inf, .nan, ~, null, yes, on, no, true, 12:30, 2001-01-01, '1', \"2\"]",
+    "a: &x {b: 1, c: [*, d]}\ne: *x", "a: &x {b: 1}\ne: *x\nf: {<<: *x, g: 2}", "a: &x [*x]", "a: &x 1\nb: &x 2", "a: *x",
+    "{mass: 2,5}", "a: |\n  text\n  more\nb: >-\n  folded\n  text\n", "a: !!str 1\nb: !!float x\nc: ! 3", "é: ü # ü\nb: 1",
+    "a:\n\t- 1", "a: [1, 2", "a: 1\n--- \nb: 2", "", "# nothing", "? [1]\n: 2", "a: \x01", "a:\r\n  b: 1\r\nc: 2",
+    "[" * 120 + "]" * 120, "a: %b", "%YAML 1.2\n---\na: 1", "a: 'x\n\n  y'", "a: {b: , c}", "a:b: 1", "- 1\n- - 2\n  - x: 3",
+]  # fmt: skip
+
+
+def _seen(text: str, long: bool, monkeypatch: pytest.MonkeyPatch) -> object:
+    """The tree of a text and what is said of it, read as a short or as a long one."""
+    monkeypatch.setattr(yaml_source, "LONG", -1 if long else 10**9)
+    try:
+        return repr(yaml_source.from_text(text))  # nan is not itself
+    except yaml_source.Unreadable as error:
+        return str(error)
+
+
+@pytest.mark.parametrize("text", [*ALL, *ODD_TEXTS])
+def test_a_long_text_is_read_like_a_short_one(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    assert _seen(text, True, monkeypatch) == _seen(text, False, monkeypatch)
+
+
+def test_a_mistake_in_a_long_scene_has_its_place() -> None:
+    rows = [f"    - {{kind: clump, at: {0.001 * i:.3f}, mass: 0.1}}\n" for i in range(1000)]
+    rows[700] = "    - {kind: clump, at: 0.7, mas: 0.1}\n"
+    text = AT_REST.replace(
+        "cable: {sections: [{length: 10.0, mass: 1.0}]}",
+        "cable:\n  sections: [{length: 10.0, mass: 1.0}]\n  attachments:\n" + "".join(rows).rstrip(),
+    )
+    assert len(text) > yaml_source.LONG
+    unknown, missing = sorted(complaints(text), key=lambda c: c.where, reverse=True)
+    assert (missing.where, unknown.where) == tuple(f"cable.attachments[700].{key}" for key in ("mas", "mass"))
+    assert {c.line for c in (unknown, missing)} == {704}

@@ -337,7 +337,7 @@ CASES = {
     "ramp of a travel": (OCEAN, HEAVE, "{travel: {by: [1, 0, 0], over: 20}, ramp: §3}", "ends.end.motion.ramp", "travel has `over`"),
     "travel of no time": (OCEAN, HEAVE, "{travel: §{by: [1, 0, 0]}}", "ends.end.motion.travel.over", "add `over: ...` (s)"),
     "travel at once": (OCEAN, HEAVE, "{travel: {by: [1, 0, 0], over: §0.05}}", "ends.end.motion.travel.over", "smaller time.step"),
-    "ramp at once": (OCEAN, HEAVE, "{velocity: [1, 0, 0], ramp: §0.05}", "ends.end.motion.ramp", "a longer ramp"),
+    "ramp at once": (OCEAN, HEAVE, "{velocity: [0.1, 0, 0], ramp: §0.05}", "ends.end.motion.ramp", "a longer ramp"),
     "travel to": (OCEAN, HEAVE, "{travel: {by: [1, 0, 0], over: 20, §to: [0, 0, 1]}}", "ends.end.motion.travel.to", "did you mean by?"),
     "file and velocity": (OCEAN, HEAVE, "{file: x.csv, velocity: §[1, 0, 0], ramp: 3}", "ends.end.motion.velocity", "leave file out"),
     "file and travel": (OCEAN, HEAVE, "{file: x.csv, travel: §{by: [1, 0, 0], over: 20}}", "ends.end.motion.travel", "leave file out"),

@@ -11,7 +11,7 @@ from bits import differences
 
 import hybrid
 from hybrid.store.checkpoint import read_checkpoint
-from hybrid.store.reader import opened
+from hybrid.store.hdf5_file import opened
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 RUN = "import sys, hybrid; hybrid.run(hybrid.load_scene(sys.argv[1], sys.argv[3:]), sys.argv[2])"

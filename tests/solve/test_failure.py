@@ -76,6 +76,67 @@ def test_a_cable_pulled_beyond_its_length():
         hybrid.run(scene("rod", ends={"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}))
 
 
+HUNG = {"length": 50.0, "mass": 20.0, "axial_stiffness": 1e5}  # 9.8 kN of weight: 9.8 % of strain at the top
+
+
+def hung(**more):
+    """A line that hangs from its start; by default its weight stretches it beyond 5 %."""
+    return hybrid.validate_scene(
+        {
+            "cable": {"sections": [HUNG | more]},
+            "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free"}},
+            "initial": {"kind": "equilibrium"},
+            "model": "catenary",
+            "mesh": {"cells": 50},
+        }
+    )
+
+
+@pytest.mark.parametrize("solver", ["elimination", "shooting"])
+def test_an_equilibrium_that_no_section_bears_is_refused(solver):
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.static(hung().model_copy(update={"solver": solver}))
+    error = stop.value
+    assert error.outcome is hybrid.Outcome.OVERSTRETCHED and error.t is None
+    assert error.s == pytest.approx(0.0, abs=1.0)
+    assert "max_strain" in error.detail and "axial_stiffness (N)" in str(error)
+    assert "N" in error.detail
+    assert hybrid.static(hung(max_strain=0.1)).status == "complete"
+    assert hybrid.static(hung(axial_stiffness=None)).status == "complete"
+
+
+def test_a_line_that_is_pulled_beyond_what_it_bears_stops(tmp_path):
+    """Stretched by 4 % at rest; its end moves on until it is 7 %."""
+    line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5}
+    motion = {"surge": {"amplitude": 0.6, "period": 8.0}, "ramp": 1.0}
+    data = {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [line, line | {"max_strain": 0.2}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [20.8, 0, 0], "motion": motion},
+        },
+        "initial": "equilibrium",
+        "model": "catenary",
+        "mesh": {"cells": 20},
+        "time": {"duration": 2.0, "step": 0.01},
+    }
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(data, tmp_path / "run.h5")
+    error = stop.value
+    assert error.outcome is hybrid.Outcome.OVERSTRETCHED
+    assert 0.5 < error.t < 1.0 and 0.0 <= error.s < 10.0  # of the section that bears less, when the ends are 21 m apart
+    assert "max_strain is 5 %" in error.detail
+    kept = hybrid.open(tmp_path / "run.h5")
+    assert kept.status == "failed" and kept.times[-1] == pytest.approx(error.t)
+    assert [e.kind for e in kept.events] == ["overstretched"]
+    data["cable"]["sections"][0]["max_strain"] = 0.07
+    assert hybrid.run(data | {"time": {"duration": 1.0, "step": 0.01}}).status == "complete"
+    data["cable"]["sections"][0]["max_strain"] = 0.03  # less than at rest
+    with pytest.raises(hybrid.SceneError, match=r"at most 20\.6 m from the start"):
+        hybrid.run(data)
+
+
 @pytest.mark.parametrize("field", ["e", "v", "T", "a1"])
 def test_a_number_that_is_not_finite_is_found_at_once(field):
     model = build(scene("rod"))

@@ -236,10 +236,10 @@ def test_floating_buoy(model, report):
     off, tension = abs(result.position[-1, -1, 2] - height), abs(result.tension[-1, -1] / pull - 1)
     report(
         f"A buoy with a {model} below it: height, tension under it", "weights = buoyancy",
-        f"{off:.1e} m, {tension:.1e}", "round-off and a dry end of wire: 1e-6 m, 1e-6",
+        f"{off:.1e} m, {tension:.1e}", "round-off and a dry end of wire: 1e-6 m, 3e-5",
     )  # fmt: skip
     assert off <= 1e-6
-    assert tension <= 1e-6
+    assert tension <= 3e-5
 
 
 @pytest.mark.parametrize("volume", [0.01, 0.0])

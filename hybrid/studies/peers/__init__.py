@@ -45,7 +45,7 @@ def unfit(scene: Scene) -> str:
         return "something is attached to the cable"
     section = scene.cable.sections[0].model_dump(exclude_none=True)
     known = {"length", "mass", "diameter", "axial_stiffness", "bending_stiffness", "torsional_stiffness", "drag"}
-    other = sorted(set(section) - known - {"added_mass", "rotary_inertia"})
+    other = sorted(set(section) - known - {"added_mass", "rotary_inertia", "max_strain"})
     if other:
         return f"the section has {', '.join(other)}"
     if "axial_stiffness" not in section or "diameter" not in section:

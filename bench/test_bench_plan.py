@@ -1,0 +1,94 @@
+"""How long `hybrid plan` takes, and how well it foretells what a run takes, as processor time of this process.
+
+pytest bench/test_bench_plan.py -n 0 -m bench -s
+"""
+
+from __future__ import annotations
+
+import resource
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import pytest
+
+import hybrid
+
+pytestmark = pytest.mark.bench
+EXAMPLES = sorted((Path(__file__).parents[1] / "examples").glob("*.yaml"))
+FACTOR = 2.0  # within which an estimate is
+ATTACHMENTS, LONGEST_PLAN = 20_000, 2.0  # s, imports included
+
+# What else a scene may ask for, by the example that is changed.
+VARIANTS = {
+    "02_suspension in space": ("02_suspension", ["dimension=3"]),
+    "02_suspension, 1000 cells": ("02_suspension", ["model=rod", "mesh.cells=1000", "time.duration=4"]),
+    "02_suspension, errors": ("02_suspension", ["output.errors=true"]),
+    "02_suspension, accuracy": ("02_suspension", ["accuracy=1%"]),
+    "touchdown, rod": ("touchdown", ["model=rod"]),
+    "touchdown, steps that follow the motion": ("touchdown", ["time={duration: 100}", "accuracy=1%"]),
+    "irregular_sea, rod": ("irregular_sea", ["model=rod"]),
+    "touchdown, rod of 400 cells": ("touchdown", ["model=rod", "mesh.cells=400"]),
+    "s_tether in space": ("s_tether", ["dimension=3"]),
+    "laying, accuracy": ("laying", ["accuracy=2%"]),
+    "rov_tether, every step": ("rov_tether", ["output.every=0.1"]),
+}
+CASES = {path.stem: (path.stem, []) for path in EXAMPLES} | VARIANTS
+
+
+def test_estimates():
+    """Measured, estimated, and their ratio, of every example and of variants of them."""
+    for settings in ([], ["dimension=3"]):  # what they need compiled
+        for example in ("02_suspension", "irregular_sea"):
+            short = ["time.duration=1", "output.errors=true", *settings]
+            hybrid.run(hybrid.load_scene(EXAMPLES[0].with_name(f"{example}.yaml"), short))
+    ratios = {}
+    print(f"\n{'scene':42s}{'measured':>10s}{'estimated':>11s}{'ratio':>7s}")
+    for name, (stem, settings) in CASES.items():
+        scene = hybrid.load_scene(EXAMPLES[0].with_name(f"{stem}.yaml"), settings)
+        hybrid.run(scene)  # what it needs compiled
+        begin = time.process_time()
+        hybrid.run(scene)
+        measured = time.process_time() - begin
+        estimated = hybrid.plan(scene).seconds
+        ratios[name] = measured / estimated
+        print(f"{name:42s}{measured:>8.2f} s{estimated:>9.2f} s{ratios[name]:>7.2f}")
+    far = {name: round(x, 2) for name, x in ratios.items() if not 1.0 / FACTOR <= x <= FACTOR}
+    assert not far, far
+
+
+def test_many_attachments(tmp_path):
+    """Seconds of `hybrid plan` from the shell, of a scene with so many attachments."""
+    rows = "".join(f"    - {{kind: clump, at: {0.5 + 0.9999 * i:.4f}, mass: 1.5}}\n" for i in range(ATTACHMENTS))
+    text = f"""\
+environment: {{fluid: {{density: 1025, surface: 0.0}}}}
+cable:
+  sections: [{{length: {ATTACHMENTS}, diameter: 0.05, mass: 4.0, axial_stiffness: 2.0e+8, drag: {{normal: 1.2}}}}]
+  attachments:
+{rows}\
+ends:
+  start: {{kind: pinned, position: [0, 0, -4000]}}
+  end: {{kind: pinned, position: [15000, 0, 0]}}
+initial: equilibrium
+model: catenary
+time: {{duration: 10.0, step: 0.1}}
+"""
+    (tmp_path / "many.yaml").write_text(text)
+    command = [
+        sys.executable,
+        "-c",
+        "from hybrid.cli.commands import main; main()",
+        "plan",
+        str(tmp_path / "many.yaml"),
+    ]
+    found = []
+    for _ in range(3):
+        begin, before = time.perf_counter(), resource.getrusage(resource.RUSAGE_CHILDREN)
+        subprocess.run(command, check=True, capture_output=True)
+        after = resource.getrusage(resource.RUSAGE_CHILDREN)
+        cpu = after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
+        found.append((cpu, time.perf_counter() - begin))
+    cpu, wall = min(found)
+    print(f"\nplan of {ATTACHMENTS} attachments: {cpu:.2f} s of processor time, {wall:.2f} s of wall time")
+    assert cpu <= LONGEST_PLAN

@@ -1,0 +1,58 @@
+"""How much processor time a run takes: what its steps, cells and outputs cost, as bench/test_bench_plan.py measures it.
+
+Costs are those of one core of a server of 2024; on another machine all of them change by one factor.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from hybrid.kernels.forces import ADDED_MASS, DRAG, FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING, SURFACE
+from hybrid.model.build import Model
+from hybrid.model.resolution import requested_accuracy, wants_errors
+from hybrid.scene.schema import JonswapWaves, Scene
+
+# s per cell and Newton iteration, in space and in a plane.
+COST = {"rod": (0.6e-6, 0.25e-6), "catenary": (0.2e-6, 0.15e-6)}
+# What optional forces add to that; those that are not here add nothing that can be seen.
+MORE = {
+    DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
+    ROTARY: (0.025e-6, 0.005e-6), SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.03e-6, 0.018e-6),
+    FRICTION: (0.01e-6, 0.005e-6),
+}  # fmt: skip
+# s per node, step and wave: sines and exponentials.
+COST_WAVE = 30e-9
+# s of a run, a step, a step of zones that move, an output.
+COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.01, 32e-6, 100e-6, 0.33e-3
+USUAL_ITERATIONS = 2.1
+# Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
+ROD_SHARE = 0.38
+# Steps that follow the motion, of the least number there may be.
+MORE_STEPS = 1.5
+# Times a run that a run with its coarser ones costs; with an accuracy, also the mesh pre-run and, perhaps, a finer run.
+COST_ERRORS, COST_ACCURACY = 2.1, 2.6
+COST_CORRECTOR = 0.3  # of the line's own, where the error of leaving bending out is followed
+
+
+def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
+    """Processor time, s, of a run with so many steps at least; cells: of each zone of the model, if all is rod."""
+    if scene.time is None:
+        return 0.0
+    flat = model.plane is not None
+    counts = {"rod": 0.0, "catenary": 0.0}
+    for zone, count in zip(model.zones, cells, strict=True):
+        counts[zone.kind] += count
+    if model.layout is not None:
+        counts = {"rod": ROD_SHARE * model.cells, "catenary": (1.0 - ROD_SHARE) * model.layout.rod.size}
+    total = sum(counts.values())
+    each = sum(COST[kind][flat] * count for kind, count in counts.items())
+    each += total * sum(cost[flat] for bit, cost in MORE.items() if model.line.bits & bit)
+    each *= USUAL_ITERATIONS * (1.0 + COST_CORRECTOR * model.follows_error)
+    waves = scene.environment.waves
+    if waves is not None:
+        each += COST_WAVE * total * (waves.components if isinstance(waves, JonswapWaves) else 1)
+    step = each + COST_STEP + COST_MANAGER * (model.layout is not None)
+    one = COST_RUN + steps * (MORE_STEPS if scene.time.controlled else 1.0) * step + outputs * COST_OUTPUT
+    if not wants_errors(scene):
+        return one
+    return one * (COST_ERRORS if requested_accuracy(scene) is None else COST_ACCURACY)

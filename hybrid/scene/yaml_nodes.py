@@ -1,0 +1,99 @@
+"""The nodes of a long YAML text, by libyaml: twenty times as fast as ruamel.yaml, which reads everything else.
+
+Tags are those of YAML 1.2, by the rules of ruamel.yaml, so that both make the same tree.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import Any
+
+import yaml
+from ruamel.yaml.resolver import implicit_resolvers
+from yaml.cyaml import CParser
+
+# Levels of tables within tables: a scene has eight, and deeper ones are ruamel.yaml's to refuse.
+DEEPEST = 100
+_TAG = "tag:yaml.org,2002:"
+
+
+def composed(text: str) -> yaml.Node | None:
+    """The tree of a text; None: ruamel.yaml has to say what is wrong with it."""
+    parser = CParser(text)
+    try:
+        return _tree(parser)
+    except (yaml.YAMLError, _Odd):
+        return None
+    finally:
+        parser.dispose()
+
+
+class _Odd(Exception):
+    """Something that no scene needs."""
+
+
+def _tree(parser: Any) -> yaml.Node:
+    """Events put together; a loop, not a recursion, so that no text can exhaust the stack of C."""
+    anchors: dict[str, yaml.Node] = {}
+    inside: list[list[yaml.Node]] = []  # of each open table or list what it holds, keys and values in turn
+    opened: list[yaml.Node] = []
+    top: list[yaml.Node] = []
+    while True:
+        event = parser.get_event()
+        kind = type(event)
+        holds = inside[-1] if inside else top
+        if kind is yaml.ScalarEvent:
+            node: yaml.Node = yaml.ScalarNode(_tag(event), event.value, event.start_mark, event.end_mark, event.style)
+            holds.append(node)
+        elif kind is yaml.MappingStartEvent or kind is yaml.SequenceStartEvent:
+            new = yaml.MappingNode if kind is yaml.MappingStartEvent else yaml.SequenceNode
+            node = new(event.tag, [], event.start_mark, event.end_mark)
+            holds.append(node)
+            opened.append(node)
+            inside.append([])
+            if len(inside) > DEEPEST:
+                raise _Odd
+        elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
+            values = inside.pop()
+            pairs = zip(values[::2], values[1::2], strict=True)
+            opened.pop().value[:] = pairs if kind is yaml.MappingEndEvent else values
+            continue
+        elif kind is yaml.AliasEvent and event.anchor in anchors:
+            holds.append(anchors[event.anchor])
+            continue
+        elif kind is yaml.AliasEvent:
+            raise _Odd
+        elif kind is yaml.StreamEndEvent:
+            break
+        else:  # begin and end of the text
+            continue
+        if event.anchor is not None:
+            if event.anchor in anchors:
+                raise _Odd
+            anchors[event.anchor] = node
+    if len(top) != 1:
+        raise _Odd
+    return top[0]
+
+
+@cache
+def _rules() -> dict[str, list[tuple[str, Any]]]:
+    """By the first character of a word, the tags that it may have, and what it must match."""
+    rules: dict[str, list[tuple[str, Any]]] = {}
+    for versions, tag, pattern, first in implicit_resolvers:
+        if (1, 2) in versions:
+            for character in first:
+                rules.setdefault(character, []).append((tag, pattern))
+    return rules
+
+
+def _tag(event: Any) -> str:
+    """The tag of a value: as it is written, or by its text, if that has no quotes."""
+    if event.tag not in (None, "!"):
+        return str(event.tag)
+    if event.implicit[0]:
+        word = event.value
+        for tag, pattern in _rules().get(word[:1], ()):
+            if pattern.match(word):
+                return tag
+    return _TAG + "str"

@@ -1,0 +1,181 @@
+"""The HDF5 file of a result: where it may be written, how it is created, opened, given up and closed.
+
+Files have the v110 format: the oldest with SWMR (single writer, multiple readers), so the most other programs can read
+it.  A file is made under another name and moved into place when readers can open it.
+"""
+
+from __future__ import annotations
+
+import io
+import os
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import h5py
+
+from hybrid.errors import ResultError
+from hybrid.store.format import CACHE, FORMAT, FORMAT_VERSION, plain_text
+from hybrid.store.integrity import being_written, unmarked
+from hybrid.store.lock import is_held
+
+_LIBVER = ("v110", "v110")
+_MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
+
+
+# ---- reading --------------------------------------------------------------------------------------
+
+
+def open_file(source: Path | io.BytesIO) -> h5py.File:
+    """Open a file, or bytes in memory, for reading.  ResultError when it is no HDF5 file or not there."""
+    if not isinstance(source, Path):
+        try:
+            return _Image(h5py.File.in_memory(source.getvalue()).id)
+        except OSError as error:
+            raise ResultError(f"the bytes in memory are no HDF5 file: {error}") from None
+    if not source.exists():
+        raise ResultError(f"there is no file {source}\n    try:      check the name, or run the scene first")
+    if source.is_dir():
+        raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
+    try:
+        if not being_written(source):
+            return h5py.File(source, "r", locking="best-effort")
+        if is_held(source) or source.stat().st_size > _MOST_IN_MEMORY:
+            return h5py.File(source, "r", swmr=True, locking="best-effort")
+        file = _Image(h5py.File.in_memory(unmarked(source)).id)
+        file.filename = str(source)
+        return file
+    except OSError as error:
+        advice = "expected: an HDF5 file written by hybrid\n    try:      copy it anew, or run its scene again"
+        raise ResultError(f"{source} cannot be read as a result\n    detail:   {error}\n    {advice}") from error
+
+
+@contextmanager
+def opened(source: Path) -> Iterator[h5py.File]:
+    """The HDF5 file of a result, for what is not in a `Result`.  ResultError as of `open_result`."""
+    with open_file(source) as file:
+        check_format(file, source)
+        yield file
+
+
+def is_result(path: Path) -> bool:
+    """Whether the file is one of ours, of whatever format version and status."""
+    with suppress(ResultError), open_file(path) as file:
+        return plain_text(file.attrs.get("format", "")) == FORMAT
+    return False
+
+
+def check_format(file: h5py.File, source: Path | io.BytesIO) -> None:
+    """ResultError if a file is no result, or has another format version."""
+    name = str(source) if isinstance(source, Path) else "the file in memory"
+    kind, version = plain_text(file.attrs.get("format", "")), file.attrs.get("format_version")
+    if kind != FORMAT:
+        raise ResultError(f"{name} is an HDF5 file, but not a result of hybrid\n    given:    format '{kind}'")
+    if version != FORMAT_VERSION:
+        wrote = plain_text(file.attrs.get("version_hybrid-cable", "?"))
+        said = f"{name} has result format {version}; this program reads format {FORMAT_VERSION}"
+        raise ResultError(f"{said}\n    try:      read it with hybrid-cable {wrote}, or run its scene again")
+
+
+class _Image(h5py.File):
+    """A file in memory under the name of the one that it was read from."""
+
+    filename = "the file in memory"
+
+
+# ---- writing --------------------------------------------------------------------------------------
+
+
+def check_target(path: Path, overwrite: bool) -> None:
+    """ResultError if a result cannot be written there."""
+    if path.exists():
+        if path.is_dir():
+            raise ResultError(f"{path} is a folder\n    try:      name a file in it, such as {path / 'run.h5'}")
+        if not overwrite:
+            raise ResultError(f"{path} exists\n    try:      another name, or allow overwriting")
+        if not os.access(path, os.W_OK) or (path.stat().st_size and not is_result(path)):
+            why = "is not a result of hybrid" if os.access(path, os.W_OK) else "is write-protected"
+            raise ResultError(f"{path} exists and {why}\n    try:      another name, or delete the file yourself")
+    if not path.parent.is_dir():
+        raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
+
+
+class _Draft(io.FileIO):
+    """A file that HDF5 writes through Python: it never hears of an error, which is raised when it has closed the file.
+
+    What HDF5 cannot write when it closes a file ends the process: SIGSEGV in 12 of 12 (tests/store/test_disk_full.py).
+    """
+
+    error: OSError | None = None
+
+    def write(self, data: Any) -> int:
+        left = memoryview(data)
+        try:
+            while self.error is None and left.nbytes:
+                left = left[super().write(left) :]
+        except OSError as error:
+            self.error = error
+        return memoryview(data).nbytes
+
+    def truncate(self, size: int | None = None) -> int:
+        try:
+            return super().truncate(size)
+        except OSError as error:
+            self.error = self.error or error
+            return size or 0
+
+
+@contextmanager
+def drafted(path: Path) -> Iterator[h5py.File]:
+    """A new file that is made in one go; OSError when it could not be written."""
+    with _Draft(path, "w+") as draft:
+        with h5py.File(draft, "w", libver=_LIBVER) as file:
+            yield file
+        if draft.error is not None:
+            raise draft.error
+
+
+def created(path: Path, make: Callable[[Path], None]) -> h5py.File:
+    """Make a file beside its place, open it to readers, and move it into place.
+
+    So an older result survives a failed start, and a reader who has it open keeps what he sees.
+    """
+    new = beside(path)
+    try:
+        make(new)
+        file = h5py.File(new, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE)
+        file.swmr_mode = True
+        os.replace(new, path)
+    except OSError as error:
+        raise unwritable(path, error) from error
+    finally:
+        new.unlink(missing_ok=True)
+    return file
+
+
+def in_memory(content: bytes = b"") -> h5py.File:
+    """A file in memory, to be written; content: of an existing one."""
+    return h5py.File.in_memory(content, libver=_LIBVER, rdcc_nbytes=CACHE)
+
+
+def give_up(file: h5py.File) -> None:
+    """Close a file in SWMR mode that could not be written; on the disk it stays as it was when last flushed.
+
+    HDF5 would try again when the file is closed or Python ends, and that ends the process: SIGSEGV in 12 of 12 on a
+    full disk (tests/store/test_disk_full.py).  So what it writes from here on leads nowhere.
+    """
+    with open(os.devnull, "r+b") as nowhere:
+        os.dup2(nowhere.fileno(), file.id.get_vfd_handle())
+    file.close()
+
+
+def beside(path: Path) -> Path:
+    """Where a file is made before it takes its place; what a killed process has left there, store.lock removes."""
+    return path.with_name(f".{path.name}.{os.getpid()}.new")
+
+
+def unwritable(path: Path | None, error: Exception, advice: str = "") -> ResultError:
+    """What to say when a file cannot be written."""
+    advice = advice or "a folder you may write to, with free space; close programs that hold the file"
+    return ResultError(f"{path or 'the result'} cannot be written\n    detail:   {error}\n    try:      {advice}")

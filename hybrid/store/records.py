@@ -1,0 +1,113 @@
+"""What a result consists of: zones and their history, events, attributes, the columns of a group."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.store.names import OLD_ATTRIBUTES
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+
+class Zone(NamedTuple):
+    """A stretch s_a <= s <= s_b (m, unstretched) and the kind of model that holds there."""
+
+    kind: str
+    s_a: float
+    s_b: float
+
+    def __str__(self) -> str:
+        return f"{self.kind} {self.s_a:.6g}-{self.s_b:.6g} m"
+
+
+class Event(NamedTuple):
+    """Something that happened at time t (s) on s_a <= s <= s_b (m), and why.
+
+    Of a change of zones also: the criterion, its value and threshold, and the energy (J) that all changes of this
+    moment put in, on the first of them.
+    """
+
+    t: float
+    s_a: float
+    s_b: float
+    kind: str
+    text: str
+    criterion: str = ""
+    value: float | None = None
+    threshold: float | None = None
+    energy: float | None = None  # J
+
+
+class UnknownName(ResultError, AttributeError):
+    """The file holds nothing of this name.  (An AttributeError too, so that `hasattr` works.)"""
+
+
+class Attributes(dict[str, Any]):
+    """Attributes of a file by name; names of older versions are understood in `attributes[name]`."""
+
+    def __missing__(self, name: str) -> Any:
+        if name in OLD_ATTRIBUTES:
+            return self[OLD_ATTRIBUTES[name]]
+        raise KeyError(name)
+
+
+class Columns(Mapping[str, np.ndarray]):
+    """The datasets of one group, by name: ``result.energy["kinetic"]`` or ``result.energy.kinetic``."""
+
+    def __init__(self, result: Result, group: str) -> None:
+        self._result, self._group = result, group
+        self._keys = [n.removeprefix(group + "/") for n in result.names if n.startswith(group + "/")]
+
+    def __getitem__(self, key: str) -> np.ndarray:
+        return self._result[f"{self._group}/{key}"]
+
+    def __getattr__(self, key: str) -> np.ndarray:
+        if key.startswith("_"):
+            raise AttributeError(key)
+        return self[key]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._keys)
+
+    def __len__(self) -> int:
+        return len(self._keys)
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self._keys]
+
+    def __repr__(self) -> str:
+        return f"<{self._result.describe(self._group)}>"
+
+
+class ZoneHistory(Sequence[list[Zone]]):
+    """`zones[i]`: the zones at output i, in the order of s."""
+
+    def __init__(self, outputs: np.ndarray, zones: list[Zone], count: int) -> None:
+        self._first, starts = np.unique(outputs, return_index=True)
+        self._sets = [zones[a:b] for a, b in zip(starts, [*starts, len(zones)][1:], strict=True)]
+        self._count = count
+
+    def __len__(self) -> int:
+        return self._count
+
+    def __getitem__(self, i: Any) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(self._count))]
+        if not -self._count <= i < self._count:
+            raise IndexError(f"output {i} of {self._count}")
+        k = int(np.searchsorted(self._first, i % self._count, side="right")) - 1
+        return list(self._sets[k]) if k >= 0 else []
+
+    def __repr__(self) -> str:
+        sets = [f"from output {i}: {joined(list(map(str, z)))}" for i, z in zip(self._first, self._sets, strict=True)]
+        return f"<zones at {self._count} outputs; {joined(sets, '; ')}>"
+
+
+def joined(texts: list[str], by: str = ", ") -> str:
+    """The first six texts, and how many more there are."""
+    return by.join(texts if len(texts) <= 6 else [*texts[:6], f"and {len(texts) - 6} more"])

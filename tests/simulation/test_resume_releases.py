@@ -1,0 +1,89 @@
+"""Result files of releases: what each of them can still be used for.
+
+tests/data holds a file of 0.4.0 and of 0.5.0, and of 0.6.0 one that was stopped after 0.5 s of 1 s by Ctrl-C.  Whoever
+changes the format of checkpoints adds one of the release before, and says here what becomes of it.
+"""
+
+from __future__ import annotations
+
+import gzip
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import OTHER_PROGRAM
+from hybrid.simulation import case
+from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.hdf5_file import opened
+
+DATA = Path(__file__).parents[1] / "data"
+# Another compiler, or other sources, may change the last bits of a step, and then Newton's method may stop one iteration
+# earlier or later, below 1e-9 of the force scale; a swing of a second does not amplify that by more than ten.
+SAME = 1e-8
+
+
+def kept(name: str, folder: Path) -> Path:
+    """A file of tests/data, in a folder where it may be changed."""
+    path = folder / name.removesuffix(".gz")
+    path.write_bytes(gzip.decompress((DATA / name).read_bytes()))
+    return path
+
+
+def test_a_file_of_0_4_opens_and_cannot_be_resumed(tmp_path: Path) -> None:
+    """It has no checkpoint."""
+    older = kept("result_0.4.h5.gz", tmp_path)
+    with hybrid.open(older) as result:
+        assert result.tension[-1].tolist() == [10.109223689133069, 5.164341571429652, 0.0]
+        assert result.title == "a chain of hybrid-cable 0.4.0" and result.zones[0][0].kind == "catenary"
+    with pytest.raises(hybrid.ResultError, match=r"(?s)no checkpoint.*run its scene again$"):
+        hybrid.resume(older)
+
+
+def test_a_file_of_0_5_is_read_by_old_and_new_names(tmp_path: Path) -> None:
+    with hybrid.open(kept("result_0.5.h5.gz", tmp_path)) as result:
+        assert result.versions["hybrid-cable"] == "0.5.0" and result.status == "interrupted"
+        assert np.allclose(result.times, np.arange(6) / 10, rtol=0, atol=1e-12)
+        assert result.position[-1, -1].tolist() == [0.06818282171614135, 0.0, -0.9779678410959755]
+        assert "steps/end_force_end" in result.names and "steps/pull_end" not in result.names
+        for old, new in (("pull_end", "end_force_end"), ("pull_start", "end_force_start")):
+            assert result.steps[old].tolist() == result.steps[new].tolist()
+        assert set(result.steps["pull_end"][:10]) == {0.3}  # N, until 0.4 s
+        assert "title: a chain of hybrid-cable 0.5.0" in result.scene_text
+
+
+def test_a_file_of_0_5_cannot_be_resumed_and_says_what_can_be_done(tmp_path: Path) -> None:
+    """Its checkpoints were pickles (format 1), which nothing reads any more; its scene runs."""
+    path = kept("result_0.5.h5.gz", tmp_path)
+    before = path.read_bytes()
+    expected = (
+        r"(?s)result_0\.5\.h5 has no checkpoint.*format 1.*reads format 2.*run its scene again.*hybrid-cable 0\.5\.0"
+    )
+    with pytest.raises(hybrid.ResultError, match=expected):
+        hybrid.resume(path)
+    assert path.read_bytes() == before
+    with hybrid.open(path) as old, hybrid.run(hybrid.parse_scene(old.scene_text)) as new:
+        assert np.allclose(old.position, new.position[: len(old.times)], rtol=0, atol=SAME)
+
+
+@pytest.mark.parametrize("other", [False, True])
+def test_a_file_of_0_6_is_resumed(other: bool, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Catenary and rod in space, in a current; the same as the run that was never stopped."""
+    path = kept("result_0.6.h5.gz", tmp_path)
+    if other:  # as a release will that is not the one that wrote it
+        monkeypatch.setattr(case, "program", lambda: "9.9.9 0123456789abcdef")
+    with opened(path) as file:
+        point = read_checkpoint(file)
+    assert point.t == pytest.approx(0.5) and point.program.startswith("0.6.0 ")
+    with hybrid.resume(path) as result, hybrid.run(hybrid.parse_scene(result.scene_text)) as fresh:
+        assert result.status == "complete" and result.names == fresh.names
+        assert np.array_equal(result.times, fresh.times) and len(result.times) == 11
+        assert len(result["steps/t"]) == len(fresh["steps/t"]) and result.zones[-1] == fresh.zones[-1]
+        for name in ("position", "velocity", "tension", "bending_moment", "curvature", "work/drag", "energy/kinetic"):
+            scale = np.abs(fresh[name]).max()
+            assert np.allclose(result[name], fresh[name], rtol=0, atol=SAME * scale), name
+        assert np.ptp(fresh.position[6:, -1], axis=0).min() > 1e-3, "nothing moves in space after the checkpoint"
+        if other:
+            (event,) = (e for e in result.events if e.kind == OTHER_PROGRAM)
+            assert "0.6.0" in event.text and "9.9.9" in event.text and event.t == point.t

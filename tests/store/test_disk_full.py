@@ -1,0 +1,61 @@
+"""A disk that is full: what was written until then stays, the process ends in order, and the file can be resumed.
+
+As full as a limit of the file's size makes it (RLIMIT_FSIZE), each in a process of its own: HDF5 2.0 ends a process that
+could not write a file, with SIGSEGV, when it is closed or let go of.
+"""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import hybrid
+from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.hdf5_file import opened
+from hybrid.store.reader import open_result
+
+WRITER = """
+import resource, sys
+sys.path[:0] = [{here!r}]
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+from hybrid.errors import ResultError
+from test_result_file import ONE, TWO, recorder, values
+kept = []  # nothing is let go of before the end
+try:
+    with recorder({path!r}, before={{}}) as r:
+        kept.append(r)
+        for i in range(4000):
+            r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
+            r.save(float(i), values(float(i)), ONE if i % 4 < 2 else TWO)
+            if i % 20 == 19:
+                r.flush(lambda: {{"program": "", "asks": False, "resolution": {{}}, "state": {{}}}})
+except ResultError as error:
+    print(error)
+"""
+
+
+# bytes: before the file is made, while it is made, at its first outputs, later ones
+@pytest.mark.parametrize("limit", [0, 20_000, 60_000, 240_000, 300_000, 412_345, 777_777])
+def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
+    path, here = tmp_path / "run.h5", Path(__file__).parent
+    code = WRITER.format(here=str(here), limit=limit, path=str(path))
+    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
+    assert str(path) in done.stdout and "cannot be written" in done.stdout and "free" in done.stdout
+    assert {x.name for x in tmp_path.iterdir()} <= {"run.h5"}, "something is left behind"
+    assert path.exists() == (limit > 50_000), "a file that could not be made must not appear"
+    if not path.exists():
+        return
+    assert path.stat().st_size <= limit
+    result = open_result(path)
+    t = result.times
+    assert (t == range(len(t))).all() and (result.tension[:, 0] == 10.0 * t).all()
+    assert len(result["steps/t"]) >= len(t) and result.status == "running"
+    if len(t):  # and then it has a checkpoint of these very rows
+        with opened(path) as file:
+            assert read_checkpoint(file).rows["t"] == len(t)
