@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from pathlib import Path
+from types import FunctionType
 from typing import Any
 
 import numba
@@ -33,6 +34,13 @@ class _Inner(_Kernel):
         raise TypeError(
             f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python"
         )
+
+
+def named(function: FunctionType, name: str) -> FunctionType:
+    """A copy of a function under another name: a kernel of its own, with its own file on disk."""
+    copy = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
+    copy.__qualname__, copy.__module__, copy.__doc__ = name, function.__module__, function.__doc__
+    return copy
 
 
 def kernel(function: Callable[..., Any]) -> Any:

@@ -1,4 +1,4 @@
-"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.newton.solve)."""
+"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.newton)."""
 
 from __future__ import annotations
 
@@ -7,17 +7,29 @@ import numpy as np
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.block_elimination_plane import WIDE
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task, solve
+from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task, solve_in_plane, solve_in_space
 from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
 
 NO_PUSH: Floats = np.zeros((0, 4))
 ONE_MARCH = Limits(1.0, 1.0, 1)
 
 
-def plane_of(line: Line) -> Floats | None:
-    """The plane that tells `solve` for which kind of line it is."""
-    return line.plane if line.bits & PLANAR else None
+def _solve(
+    task: Task, line: Line, sea: Sea, ends: Ends, old: State, new: State, was: Floats, now: Floats, work: Work
+) -> tuple[int, int, float, int]:
+    """As kernels.newton._solve, by the kernel for the line's kind."""
+    if line.bits & PLANAR:
+        return solve_in_plane(line.plane, task, line, sea, ends, old, new, was, now, work)
+    return solve_in_space(None, task, line, sea, ends, old, new, was, now, work)
+
+
+def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:
+    """Largest bend and twist of an element, rad, and their nodes (kernels.resolution_checks)."""
+    if line.bits & PLANAR:
+        return sharpest_in_plane(line, ends, state.e, state.T)
+    return sharpest_in_space(line, ends, state.e, state.T, state.a1)
 
 
 def workspace(n_cells: int, keep: bool = False) -> Work:
@@ -52,7 +64,7 @@ def step(
 ) -> tuple[int, int, float, int]:  # fmt: skip
     """One step in time from `old` to `new` (overwritten)."""
     task = Task(STEP, dt, before, rho, 0.0, 0.0, False, limits)
-    return solve(plane_of(line), task, line, sea, ends, old, new, was, now, work)
+    return _solve(task, line, sea, ends, old, new, was, now, work)
 
 
 def equilibrium(
@@ -60,7 +72,7 @@ def equilibrium(
 ) -> tuple[int, int, float, int]:
     """One static solve from state.r + work.u; ca: 1/s2, of springs of that times the mass."""
     task = Task(EQUILIBRIUM, ca=ca, turning=turning, limits=limits)
-    return solve(plane_of(line), task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    return _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
 
 
 def assembly(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
@@ -75,5 +87,5 @@ def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: fl
 
 def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
-    outcome, _, _, where = solve(plane_of(line), task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
+    outcome, _, _, where = _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)
     return -1 if outcome == OK else max(where, 0)

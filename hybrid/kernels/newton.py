@@ -4,7 +4,7 @@ Each iteration is one march along s and one substitution back (kernels.assembly)
 tensions, frames and rates.  `plane` is the plane of a line that is computed in one, or None: numba drops what the
 other kind would need, so that neither is compiled for a scene that does not have it.
 
-`solve` is the one compiled entry to all that needs the march.  An entry for each would compile the march once more,
+`_solve` is the one compiled entry to all that needs the march.  An entry for each would compile the march once more,
 and so does every function that stands between: they are inlined here.  kernels.entry has its faces for Python.
 """
 
@@ -17,7 +17,7 @@ from hybrid.kernels.assembly import march
 from hybrid.kernels.assembly_plane import march_planar
 from hybrid.kernels.block_elimination import substitute
 from hybrid.kernels.block_elimination_plane import substitute_planar
-from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.compile import inner, kernel, named
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.generalized_alpha import Scheme, scheme
@@ -79,8 +79,7 @@ def noise_of(line, ca, scale):
     return min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
 
 
-@kernel
-def solve(plane, task, line, sea, ends, old, new, was, now, work):
+def _solve(plane, task, line, sea, ends, old, new, was, now, work):
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
     STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
@@ -154,3 +153,8 @@ def solve(plane, task, line, sea, ends, old, new, was, now, work):
             if not turn < LARGEST_STEP_TURN:
                 outcome, where = TURNED_TOO_FAR, cell
     return outcome, it, left, where
+
+
+# One kernel for each kind of line: neither is compiled for a scene that does not have it.
+solve_in_plane = kernel(named(_solve, "solve_in_plane"))
+solve_in_space = kernel(named(_solve, "solve_in_space"))

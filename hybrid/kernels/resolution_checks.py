@@ -6,7 +6,7 @@ import math
 
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.cell import chord
-from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.compile import kernel
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.plane import angle_between, chord2, end_chord, part2
 from hybrid.kernels.rotations import frame, log_rotation
@@ -16,11 +16,11 @@ from hybrid.kernels.rotations import frame, log_rotation
 CLAMP = 20.0
 
 
-@inner
-def sharpest_planar(plane, line, ends, e, T):
-    """As `sharpest` for a cable in a plane: largest bend and its node; there is no twist."""
+@kernel
+def sharpest_in_plane(line, ends, e, T):
+    """As `sharpest_in_space` for a cable in a plane: largest bend and its node; there is no twist."""
     bend, at = 0.0, -1
-    n = e.shape[0]
+    n, plane = e.shape[0], line.plane
     d, l, _ = chord2(part2(plane, e, 0))
     for i in range(n + 1):
         before = d if i > 0 else end_chord(plane, ends.frame, 0)
@@ -43,14 +43,12 @@ def sharpest_planar(plane, line, ends, e, T):
 
 
 @kernel
-def sharpest(plane, line, ends, e, T, a1):
+def sharpest_in_space(line, ends, e, T, a1):
     """How far the mesh is from resolving a rod: largest bend and twist of an element, rad, and their nodes (-1: none).
 
     The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
     h/lambda where the cell is longer than lambda = sqrt(EI/T), over which a cable leaves its clamp.
     """
-    if plane is not None:
-        return sharpest_planar(plane, line, ends, e, T)
     bend, twist, bend_at, twist_at = 0.0, 0.0, -1, -1
     n = e.shape[0]
     for i in range(n + 1):

@@ -26,7 +26,7 @@ from hybrid.kernels.report import (
     TWIST_NODE,
     WRONG_PIVOTS,
 )
-from hybrid.kernels.resolution_checks import lowest, sharpest
+from hybrid.kernels.resolution_checks import lowest, sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.rotations import dot, spin_about
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.water import stir
@@ -176,9 +176,14 @@ def begin_step(plane, line, sea, old, new, u, s):
 def end_step(plane, line, sea, ends, old, new, s, task, was, now, work):
     """Report of a step that Newton has solved.  Returns its largest turn of a chord, rad, and its cell."""
     u, report, dt = work.u, work.report, s.dt
-    report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest(
-        plane, line, ends, new.e, new.T, new.a1
-    )
+    if plane is None:
+        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_space(
+            line, ends, new.e, new.T, new.a1
+        )
+    else:
+        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_plane(
+            line, ends, new.e, new.T
+        )
     report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = unrest(old, new)
     _, _, _, _, slip = weights(task.rho, task.before / dt)

@@ -13,8 +13,8 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
-from hybrid.kernels.entry import plane_of
-from hybrid.kernels.resolution_checks import lowest, sharpest
+from hybrid.kernels.entry import sharpest
+from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Ends, Floats, State
 from hybrid.model.build import Model
 from hybrid.simulation.events import EventLog
@@ -162,10 +162,10 @@ class Diagnostics:
 
     def still(self, ends: Ends, state: State) -> Stop:
         """As `shape`, for a state that no step has led to."""
-        return self.shape(0.0, sharpest(plane_of(self._model.line), self._model.line, ends, state.e, state.T, state.a1), state)
+        return self.shape(0.0, sharpest(self._model.line, ends, state), state)
 
     def shape(self, t: float, sharp: Sequence[float], state: State) -> Stop:
-        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.resolution_checks.sharpest has found."""
+        """Bends and twists that the mesh does not resolve; `sharp`: what kernels.entry.sharpest has found."""
         bend, twist = sharp[0], sharp[2]
         if bend <= self._bend and twist <= min(self._twist, LARGEST_TWIST):
             return None
