@@ -101,7 +101,9 @@ def test_elimination_against_lapack():
     """Elimination and substitution against solve_banded, on the same system of 1000 rod cells."""
     model, stepper, state = moving([("rod", 2.0, 1000)])
     rows = block_rows(model.line)
-    assembly(model.line, model.sea.at(np.inf), model.ends.at(np.inf), state, 200.0, 4e4, stepper.work._replace(rows=rows))
+    assembly(
+        model.line, model.sea.at(np.inf), model.ends.at(np.inf), state, 200.0, 4e4, stepper.work._replace(rows=rows)
+    )
     W, X, x = stepper.work.W, stepper.work.X, stepper.work.x
     blocks = rows.reshape(1001, SIZE, WIDTH)
     low, up = 14, 13

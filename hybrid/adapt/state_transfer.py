@@ -14,7 +14,6 @@ from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.linalg import solve_banded
 
 from hybrid.kernels.state import Floats, Line, State, blank_state
 from hybrid.model.layout import Layout, edges
@@ -207,42 +206,6 @@ def _frames(
             angle = np.arctan2(np.cross(closing, right[0]) @ right[1], closing @ right[0])
             for k, c in enumerate(range(p, q), start=1):
                 out.a1[c] = _turned(out.a1[c], d[c], angle * k / (q - p + 1))
-
-
-def balance(
-    old: Layout, new: Layout, target: Line, carried: Remapped, left: Floats, bed: Floats, taut: np.ndarray
-) -> None:
-    """Move nodes that are new across the line to where what acts on them is in balance with tension.
-
-    Between base nodes a line has the shape that its loads give it.  A cubic knows nothing of them, and the
-    difference would swing.  left: (N+1, 3) N, what is out of balance; bed: (N+1,) N/m, stiffness under the nodes;
-    taut: (N,) cells whose tension says where they are.
-    """
-    state, lengths = carried
-    fresh = np.append(np.repeat(new.rod & ~old.rod, new.counts), False)
-    fresh[new.first] = False
-    fresh[1:-1] &= taut[1:] & taut[:-1]
-    if not fresh.any():
-        return
-    l = np.linalg.norm(state.e, axis=1)
-    d = state.e / l[:, None]
-    tangent = np.zeros_like(left)
-    tangent[1:-1] = d[1:] + d[:-1]
-    tangent[1:-1] /= np.linalg.norm(tangent[1:-1], axis=1)[:, None]
-    across = np.where(fresh[:, None], left - np.einsum("ij,ij->i", left, tangent)[:, None] * tangent, 0.0)
-    k = np.where(taut, state.T, 0.0) / l
-    band = np.zeros((3, fresh.size))
-    band[1] = np.where(fresh, np.append(k, 0.0) + np.append(0.0, k) + bed, 1.0)
-    band[0, 1:], band[2, :-1] = np.where(fresh[:-1], -k, 0.0), np.where(fresh[1:], -k, 0.0)
-    shift = solve_banded((1, 1), band, across)
-    size = np.linalg.norm(shift, axis=1)
-    shift *= np.minimum(1.0, FARTHEST * np.append(l, l[-1]) / np.maximum(size, 1e-300))[:, None]
-    state.r[:] += shift
-    c = np.flatnonzero(fresh[1:] | fresh[:-1])
-    state.e[c] += shift[c + 1] - shift[c]
-    l = np.linalg.norm(state.e[c], axis=1)
-    state.a1[c] = _all_carried(state.a1[c], d[c], state.e[c] / l[:, None])
-    lengths[c] = l / (1.0 + target.ck[c] * state.T[c])
 
 
 def _across(d: Floats) -> Floats:

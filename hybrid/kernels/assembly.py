@@ -371,9 +371,7 @@ def march(line, sea, ends, r, state, cv, ca, work):
         there = element_after(line, ends, state, i, cell, following, cv, report)
         bent = i < n and (line.element[i] != 0 or line.element[i + 1] != 0 or line.spin[i] != 0)
         force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, report)
-        node = balance(
-            line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report
-        )
+        node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         wide = bent or bent_before
         if wide or rows.shape[0] > 0:
             fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca)

@@ -127,9 +127,7 @@ def rates(line, sea, i, state, u, before, after, history):
             cv, x = 1.0, yi
         elif k == 2:
             ca, x = 1.0, zi
-        _, D, _, _ = inertia_and_water(
-            line, sea, i, state.r[i, 2], v, vd, before, after, cv, ca, history.powers
-        )
+        _, D, _, _ = inertia_and_water(line, sea, i, state.r[i, 2], v, vd, before, after, cv, ca, history.powers)
         F = add(F, mat_vec(D, x))
     if line.bits & SEABED:
         F = add(F, seabed_rates(line, sea, i, state, u, history))

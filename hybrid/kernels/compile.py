@@ -36,7 +36,7 @@ class _Inner(_Kernel):
         )
 
 
-def named(function: FunctionType, name: str) -> FunctionType:
+def named(function: Any, name: str) -> FunctionType:
     """A copy of a function under another name: a kernel of its own, with its own file on disk."""
     copy = FunctionType(function.__code__, function.__globals__, name, function.__defaults__, function.__closure__)
     copy.__qualname__, copy.__module__, copy.__doc__ = name, function.__module__, function.__doc__

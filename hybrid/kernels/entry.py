@@ -7,7 +7,17 @@ import numpy as np
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.block_elimination_plane import WIDE
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task, solve_in_plane, solve_in_space
+from hybrid.kernels.newton import (
+    ASSEMBLY,
+    CORRECTION,
+    EQUILIBRIUM,
+    OK,
+    STEP,
+    Limits,
+    Task,
+    solve_in_plane,
+    solve_in_space,
+)
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work

@@ -48,6 +48,7 @@ class Task(NamedTuple):
     turning: bool = False  # whether chords are turned instead of shifted (kernels.newton.update)
     limits: Limits = Limits(1.0, 1.0, 1)
 
+
 # Newton stops when the next correction, predicted from the last two by quadratic
 # convergence, turns no chord by more than TOLERANCE (rad) and changes no tension by more
 # than TOLERANCE of the largest.  Differences between two ways of computing the same thing

@@ -19,7 +19,6 @@ grow rather than fade; so is what a chord's tilt does to its contact with the be
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 from hybrid.kernels.compile import inner, kernel

@@ -6,9 +6,9 @@ import math
 
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.configuration import carry_director
 from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, WAVES
 from hybrid.kernels.generalized_alpha import weights
-from hybrid.kernels.configuration import carry_director
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.out_of_plane import step_out_of_plane
 from hybrid.kernels.report import (
@@ -181,9 +181,7 @@ def end_step(plane, line, sea, ends, old, new, s, task, was, now, work):
             line, ends, new.e, new.T, new.a1
         )
     else:
-        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_plane(
-            line, ends, new.e, new.T
-        )
+        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_plane(line, ends, new.e, new.T)
     report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = unrest(old, new)
     _, _, _, _, slip = weights(task.rho, task.before / dt)

@@ -12,8 +12,8 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
-from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.entry import sharpest
+from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Ends, Floats, State
 from hybrid.model.build import Model

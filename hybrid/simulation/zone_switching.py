@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.adapt.manager import HARD, Change, DomainManager
 from hybrid.adapt.moment_joints import Joints
-from hybrid.adapt.state_transfer import Clamp, Remapped, balance, remap
+from hybrid.adapt.state_transfer import Clamp, Remapped, remap
 from hybrid.errors import Outcome
 from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
@@ -22,7 +22,7 @@ from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.plane import planar, untwist
-from hybrid.solve.stepper import Stepper, Taken
+from hybrid.solve.stepper import Taken
 from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
@@ -196,17 +196,9 @@ class ZoneSwitching:
         carried = self._carried(old, new, line, target, ends, state)
         if target.bits & PLANAR:
             untwist(target, ends, model.cable.held_tangent, carried.state)
-        fresh = new.rod & ~old.rod
         manager.take(new, change, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()
         soften(manager.parts(), self.stiff, target.kb)
-        cells = np.repeat(fresh, new.counts)
-        limp = np.append(cells, False) | np.append(False, cells)
-        loose = target._replace(kb=np.where(limp[:, None], 0.0, target.kb))
-        left = Stepper(loose, model.length, model.tension_scale).unbalanced(changed.sea.values, ends, carried.state)
-        bed = _bed_stiffness(target, changed.sea.values, carried.state)
-        taut = TAUT * manager.floor[:-1] < carried.state.T
-        balance(old, new, target, carried, left, bed, taut)
         target.h[:] = carried.lengths
         self.lengths = carried.lengths.copy()
         # new cells go on with the length, and the change of length, that their ends and tension imply, but for what
@@ -261,14 +253,6 @@ def _lengthening(state: State) -> Floats:
     """Rate (N,) m/s at which cells grow longer."""
     d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
     return np.asarray(np.einsum("ij,ij->i", d, np.diff(state.v, axis=0)))
-
-
-def _bed_stiffness(line: Line, sea: Sea, state: State) -> Floats:
-    """Stiffness (N+1,) N/m that the seabed has under every node."""
-    if not line.bits & SEABED:
-        return np.zeros(line.s.size)
-    deep = sea.offset + 0.5 * sea.onset - state.r @ sea.normal > 0.0
-    return np.where(deep, sea.stiffness * line.hn, 0.0)
 
 
 def _strain(line: Line, ends: Ends, state: State) -> Floats:

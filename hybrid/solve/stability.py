@@ -157,6 +157,4 @@ def is_stable(line: Line, sea: Sea, ends: Ends, state: State, length: float, sca
     if not is_judged(line, ends, length):
         return True
     stability = Stability(line, sea, length, scale)
-    return stability.holds(ends, state) and (
-        not line.bits & PLANAR or stability.holds(ends, state, across=True)
-    )
+    return stability.holds(ends, state) and (not line.bits & PLANAR or stability.holds(ends, state, across=True))

@@ -350,7 +350,16 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
     rubbed = bool(solver.line.bits & FRICTION)
-    judged = (is_judged(solver.line, ends, solver.length) and not solver.stability.blurred) or not solver.line.element.any()
+    blurred = solver.stability.blurred
+    judged = (is_judged(solver.line, ends, solver.length) and not blurred) or not solver.line.element.any()
     return Equilibrium(
-        state, tuple(path), solver.total, residual, solver.work.report.copy(), int(slack), rubbed, judged, solver.stability.blurred
+        state,
+        tuple(path),
+        solver.total,
+        residual,
+        solver.work.report.copy(),
+        int(slack),
+        rubbed,
+        judged,
+        solver.stability.blurred,
     )

@@ -154,27 +154,18 @@ class Stepper:
         self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
-    def unbalanced(self, sea: Sea, ends: Ends, state: State) -> Floats:
-        """Force (N+1, 3) N left over at every node of a state: all that acts on it, less its inertia."""
-        rows = block_rows(self.line)
-        self._march_as_it_is(sea, ends, state, rows)
-        return out_of_balance(self.line, rows)
-
     def feel(self, sea: Sea, ends: Ends, state: State) -> None:
         """The forces and the report of a state as it is, for the books of the step that follows."""
-        self._march_as_it_is(sea, ends, state, self.work.rows)
-        if self.line.bits & SEABED:
-            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
-            state.bed[:] = sea.bed
-        self.told = self.work.report.tolist()
-
-    def _march_as_it_is(self, sea: Sea, ends: Ends, state: State, rows: Floats) -> None:
         self.work.u[:] = 0.0
         if self.line.bits & WAVES:
             stir(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
             lay(sea, state.e, state.slip)
-        entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work._replace(rows=rows))
+        entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
+        if self.line.bits & SEABED:
+            self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
+            state.bed[:] = sea.bed
+        self.told = self.work.report.tolist()
 
     def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
         """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""

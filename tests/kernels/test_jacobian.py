@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from hybrid.kernels.block_elimination import SIZE, WIDTH
+from hybrid.kernels.configuration import update
 from hybrid.kernels.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.forces import (
     ADDED_MASS,
@@ -25,7 +26,6 @@ from hybrid.kernels.forces import (
     SURFACE,
     WAVES,
 )
-from hybrid.kernels.configuration import update
 from hybrid.kernels.state import Ends, Line, Sea, blank_state
 
 N = 7

@@ -13,10 +13,10 @@ from test_jacobian import BITS, CA, CV, ZONES, random_case
 from hybrid.kernels import forces
 from hybrid.kernels.block_elimination import SIZE, WIDTH
 from hybrid.kernels.block_elimination_plane import WIDE
-from hybrid.kernels.entry import block_rows, correction, workspace
-from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.configuration import update
-from hybrid.kernels.out_of_plane import BAND, step_out_of_plane
+from hybrid.kernels.entry import assembly, block_rows, correction, workspace
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.out_of_plane import BAND, REACH, step_out_of_plane, wrong_pivots_at_rest
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.state import State
 
@@ -197,16 +197,42 @@ def test_the_push_obeys_the_jacobian_across_the_plane(zones, seed):
 
 def _assembled(line, sea, ends, st, cv, ca):
     rows = in_space(line, sea, ends, st, np.zeros_like(st.r), cv, ca)[0]
+    return _dense(rows), rows.reshape(N + 1, SIZE, WIDTH)[:, :, 23].ravel()
+
+
+def _dense(rows):
+    """The matrix of block rows in space."""
     n = N + 1
-    J, b = np.zeros((5 * n, 5 * n + 25)), np.zeros(5 * n)
+    J = np.zeros((5 * n, 5 * n + 25))
     for i in range(n):
         block = rows[i].reshape(SIZE, WIDTH)
         J[5 * i : 5 * i + 5, 5 * i : 5 * i + 20] = block[:, :20]
         J[5 * i : 5 * i + 5, 5 * i + 21 : 5 * i + 24] = block[:, 20:23]
-        b[5 * i : 5 * i + 5] = block[:, 23]
-    return J[:, 10 : 10 + 5 * n], b
+    return J[:, 10 : 10 + 5 * n]
 
 
 def test_band_of_the_push_fits_its_work_array():
     assert workspace(N).X.size >= (2 * (N + 1) + 4) * BAND
     assert workspace(1).X.size >= (2 * 2 + 4) * BAND
+
+
+@pytest.mark.parametrize("zones", ["rod", "rod-catenary", "three"])
+@pytest.mark.parametrize("pressed", [0.0, -0.3, -3.0, -30.0])
+def test_stiffness_across_the_plane_is_definite_when_that_in_space_is(zones, pressed):
+    """Pivots of the one against a Cholesky factor of the other, both with springs that hold what is free."""
+    line, sea, ends, st = flat_case(4, ZONES[zones], forces.ADDED_MASS, (1, 1))
+    st.T[:] = 2.0 + pressed
+    st.v[:] = st.vd[:] = 0.0
+    n, soft = line.plane[2], 1e-3
+    work = workspace(N)._replace(rows=block_rows(line._replace(bits=0)))
+    assembly(line._replace(bits=line.bits & ~PLANAR), sea, ends, st, 0.0, soft, work)
+    J = -_dense(work.rows)
+    across = np.zeros((5 * (N + 1), 2 * (N + 1)))
+    for i in range(N + 1):
+        across[5 * i + 1 : 5 * i + 4, 2 * i], across[5 * i + 4, 2 * i + 1] = n, 1.0
+    keep = [2 * i for i in range(1, N)] + [2 * i + 1 for i in range(N) if line.spin[i]]
+    K = (across.T @ J @ across)[np.ix_(keep, keep)]
+    lowest = np.linalg.eigvalsh(0.5 * (K + K.T))[0]
+    A = np.zeros((2 * (N + 1) + REACH) * BAND)
+    assert abs(lowest) > 1e-6
+    assert (wrong_pivots_at_rest(line, sea, ends, st, soft, A) == 0) == (lowest > 0.0)
