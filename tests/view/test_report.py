@@ -129,7 +129,7 @@ def test_a_map_of_many_events_says_that_it_marks_the_worst() -> None:
     page = html(reported(events=events))
     assert "Of 2000 events the 600 that matter most are marked." in page and "1600 more are in the result file" in page
     marks = {t["name"]: t for f in index_of(page)["figures"] for t in f["data"] if t.get("mode") == "markers"}
-    assert len(marks["warning"]["x"]) == 20 and len(marks["change of zones"]["x"]) == 580
+    assert len(marks["warning"]["x"]) == 20 and len(marks["grow"]["x"]) == 580
 
 
 def test_thinning_keeps_ends_peaks_and_asked_moments() -> None:
