@@ -115,7 +115,7 @@ def _traces(item: Item, store: Store, unit: str | None) -> list[Spec]:
 
 
 def _line(item: Line, store: Store, unit: str | None) -> list[Spec]:
-    k = outline(item.y)
+    k = outline(item.y) if np.isfinite(item.x).all() else np.arange(len(item.x))  # of pieces every one is needed
     around = {"type": "scatter", "mode": "lines", "x": store.add(item.x[k]), "y": store.add(item.y[k])}
     look: Spec = {"color": item.colour, "width": _WIDER * item.width} | ({"dash": item.dash} if item.dash else {})
     line = around | {"name": escape(item.label), "line": look}

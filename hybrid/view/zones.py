@@ -202,11 +202,8 @@ def share_of_rod(result: Result) -> Panel:
     ]
     low, high = (f"{x:.3g}" for x in (share.min(), share.max()))
     span = f" on average, between {low} and {high} %" * (low != high)
-    title, up = (
-        f"share of rod: {mean:.3g} % of the cable{span}",
-        Axis("share", "%", 0.0, 100.0, ticks=(0.0, 50.0, 100.0)),
-    )
-    return Panel("share", title, _time(result, edges), up, items)
+    up = Axis("share", "%", 0.0, 100.0, ticks=(0.0, 50.0, 100.0))
+    return Panel("share", f"share of rod: {mean:.3g} % of the cable{span}", _time(result, edges), up, items)
 
 
 def strip(result: Result) -> Panel:
@@ -305,7 +302,8 @@ def _events(events: Sequence[Event]) -> list[Item]:
             continue
         at = np.array([(e.t, e.s_a, e.s_b) for e in found])
         if name in ZONE_EVENTS:
-            x, y = np.repeat(at[:, 0], 3), np.column_stack([at[:, 1:], np.full(len(at), np.nan)]).ravel()
+            gaps = np.full(len(at), np.nan)
+            x, y = (np.column_stack([at[:, k], gaps]).ravel() for k in ([0, 0], [1, 2]))
             items.append(Line(x, y, width=0.5))
         texts = [_told(event) for event in found]
         items.append(Marks(at[:, 0], at[:, 1:].mean(axis=1), symbol, name, face, edge, 0.5, size, texts))

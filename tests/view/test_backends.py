@@ -62,6 +62,14 @@ def test_paper_and_page_show_the_same_curves_and_limits() -> None:
         assert names <= {label.replace("_", "", label[0] == "_") for label in ax.get_legend_handles_labels()[1]}
 
 
+def test_pieces_of_a_line_are_all_on_the_page() -> None:
+    """A boundary of zones is many pieces; thinned as a curve it would lose some."""
+    x = np.column_stack([np.arange(1000.0), np.arange(1000.0), np.full(1000, np.nan)]).ravel()
+    store = Store()
+    (trace,) = figure_of(Panel("p", "p", Axis("x", "m"), Axis("y", "m"), [Line(x, np.sin(x))]), store)["data"]
+    assert np.allclose(array(store.block, trace["x"]), x, equal_nan=True)
+
+
 def test_a_name_is_in_a_legend_once() -> None:
     x = np.linspace(0.0, 1.0, 3)
     items: list[Any] = [Line(x, k * x, "the <same>") for k in (1.0, 2.0)]
