@@ -256,7 +256,7 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     if component is not None:
         values = values[..., component] - values[0, ..., component]
         label = f"Δ{AXES[component]}" if name == "position" else f"Δ{title_of(name)} {AXES[component]}"
-        title, caption = f"{label} since t = {result.times[0]:.4g} s", "At the same points."
+        title, caption = f"{label} since t = {result.times[0]:.4g} s", "Change since then, at the same points."
     else:
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
         label = title_of(name)
