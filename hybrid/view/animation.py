@@ -8,7 +8,6 @@ from __future__ import annotations
 import shutil
 import subprocess
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -137,7 +136,7 @@ def _still(result: Result, view: View) -> Panel:
 def _tension_range(result: Result) -> Panel:
     panel = profiles(result, "tension", title="tension, and its range over all times")
     band = next(item for item in panel.items if isinstance(item, Band))
-    return replace(panel, items=[replace(band, opacity=0.18)])
+    return panel._replace(items=[band._replace(opacity=0.18)])
 
 
 def _pieces(result: Result, i: int, scale: float) -> list[Item]:

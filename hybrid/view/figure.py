@@ -8,16 +8,14 @@ panel with one label are one entry.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from hybrid.view.style import GREY, INK, ZERO
 
 
-@dataclass(frozen=True, eq=False)
-class Line:
+class Line(NamedTuple):
     """A curve, with a gap where x or y is not finite.
 
     dash: "", "dash" or "dot"; casing: colour of a wider line below it; symbol: marks on its points, or, with
@@ -37,8 +35,7 @@ class Line:
     frames: np.ndarray | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class Marks:
+class Marks(NamedTuple):
     """Points, with matplotlib's names of symbols; texts: lines to read at each, if a page can, the first a heading."""
 
     x: np.ndarray
@@ -52,8 +49,7 @@ class Marks:
     texts: Sequence[Sequence[str]] = ()
 
 
-@dataclass(frozen=True, eq=False)
-class Band:
+class Band(NamedTuple):
     """The area between two curves over x."""
 
     x: np.ndarray
@@ -64,8 +60,7 @@ class Band:
     opacity: float = 0.2
 
 
-@dataclass(frozen=True, eq=False)
-class Area:
+class Area(NamedTuple):
     """Filled outlines (n, points, 2): water or sand, or the many strips that a curve has swept."""
 
     outlines: np.ndarray
@@ -73,8 +68,7 @@ class Area:
     label: str = ""
 
 
-@dataclass(frozen=True, eq=False)
-class Box:
+class Box(NamedTuple):
     """A shaded rectangle; None: all of the panel."""
 
     x: tuple[float, float] | None
@@ -84,8 +78,7 @@ class Box:
     opacity: float = 0.1
 
 
-@dataclass(frozen=True, eq=False)
-class Rule:
+class Rule(NamedTuple):
     """Lines across the panel where x (or y) has certain values."""
 
     axis: str
@@ -96,8 +89,7 @@ class Rule:
     dash: str = "dot"
 
 
-@dataclass(frozen=True, eq=False)
-class Map:
+class Map(NamedTuple):
     """A colour for every cell between edges; values (ny, nx), NaN where there is none; shades from `low` to `high`."""
 
     x: np.ndarray
@@ -112,8 +104,7 @@ class Map:
     log: bool = False
 
 
-@dataclass(frozen=True, eq=False)
-class Text:
+class Text(NamedTuple):
     """A short text beside a place; a coordinate named in `parts` runs from 0 to 1 over the panel. offset: points."""
 
     x: float
@@ -130,15 +121,17 @@ class Text:
 Item = Line | Marks | Band | Area | Box | Rule | Map | Text
 
 
-@dataclass(frozen=True)
-class Axis:
-    """What it shows and in which unit; from where to where (None: what the items span), and at least how much."""
+class Axis(NamedTuple):
+    """What it shows and in which unit; from where to where (None: what the items span).
+
+    peak: the largest value of the quantity at any time; of round-off beside it a panel is not made full.
+    """
 
     name: str
     unit: str
     low: float | None = None
     high: float | None = None
-    least: float = 0.0
+    peak: float | None = None
     log: bool = False
     ticks: tuple[float, ...] = ()
 
@@ -147,8 +140,7 @@ class Axis:
         return f"{self.name} ({self.unit})" if self.name else f"({self.unit})" if self.unit else ""
 
 
-@dataclass(frozen=True, eq=False)
-class Panel:
+class Panel(NamedTuple):
     """One pair of axes. aspect: length of a unit of y over that of a unit of x, None: free; legend: inside the panel.
 
     caption: a sentence for the reader of a page; cursor: x is the time, which a page can move.
@@ -171,8 +163,7 @@ class Panel:
         return _limits(self.x, self.items, "x"), _limits(self.y, self.items, "y")
 
 
-@dataclass(frozen=True, eq=False)
-class Page:
+class Page(NamedTuple):
     """Panels on a page with a head, a foot and legends.
 
     mosaic, widths, heights: which panels (keys) stand where, lists in lists for blocks; a cell with the name of a `Map`
@@ -182,8 +173,8 @@ class Page:
     title: str
     facts: str
     fact_lines: int = 1  # at most
-    panels: dict[str, Panel] = field(default_factory=dict)
-    mosaic: list[Any] = field(default_factory=list)
+    panels: dict[str, Panel] = {}  # noqa: RUF012  never written to
+    mosaic: list[Any] = []  # noqa: RUF012
     widths: Sequence[float] | None = None
     heights: Sequence[float] | None = None
     legend: Sequence[str] = ()
@@ -202,15 +193,11 @@ def _limits(axis: Axis, items: Sequence[Item], name: str) -> tuple[float, float]
     low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
     low, high = low - 0.05 * (high - low), high + 0.05 * (high - low)
     low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
-    least = axis.least or 1e-9 * max(abs(low), abs(high)) or 1.0
+    part, peak = (1e-9, max(abs(low), abs(high))) if axis.peak is None else (1e-3, axis.peak)
+    least = part * peak if peak > ZERO else 2.0  # of nothing some room on either side
     if high - low < least:
         low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
     return low, high
-
-
-def least_span(peak: float) -> float:
-    """Round-off does not fill a panel: 0.1 % of the largest value is the least that an axis shows."""
-    return 1e-3 * peak if peak > ZERO else 2.0
 
 
 def changes_sign(low: float, high: float) -> bool:

@@ -16,7 +16,7 @@ from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.store.records import Zone
 from hybrid.view.decimate import Kept, even
-from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text, least_span
+from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
 from hybrid.view.projections import (
     STILL,
     Numbers,
@@ -192,7 +192,7 @@ def profiles(
     short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
     title = title or (short if drawn[1:] else title_of(names[0])) + _at(result, output)
-    y = Axis(up, unit, bottom, top, least_span(peak * factor))
+    y = Axis(up, unit, bottom, top, peak * factor)
     return Panel("-".join(names), title, _along(result), y, items, legend=len(drawn) > 1)
 
 
@@ -228,7 +228,7 @@ def _range(result: Result, name: str, shown: Kept) -> Panel:
         items.append(Line(s, factor / result["min_bend_radius"], "allowed", ALARM, 1.6, "dot"))
     title = title_of(name).replace("|", "")
     label = title_of(name).replace("bending ", "").replace("contact ", "")
-    y = Axis(label, unit, least=least_span(float(np.abs(values).max()) * factor))
+    y = Axis(label, unit, peak=float(np.abs(values).max()) * factor)
     return Panel(f"range-{name}", title, _along(result), y, items)
 
 
@@ -278,7 +278,7 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     if 0 < len(changes) <= MOST_CHANGES:
         items.append(Rule("x", changes.tolist(), "zones changed"))
     bound = round_off * factor if peak < round_off else None
-    up = Axis(label, unit, None if bound is None else -bound, bound, least_span(peak * factor))
+    up = Axis(label, unit, None if bound is None else -bound, bound, peak * factor)
     key = name if component is None else "displacement" if name == "position" else f"{name}-{AXES[component]}"
     return Panel(key, title, _time(result), up, items, legend=legend, caption=caption, cursor=True)
 
@@ -300,7 +300,7 @@ def end_forces(result: Result) -> Panel | None:
             middle = np.linalg.norm(result[f"reaction_{end}"], axis=1)
             items.append(_doubt(result.times, middle * factor, result[error] * factor, size=True))
     items += [Line(t, y * factor, f"at the {end}", _ENDS[end]) for end, (t, y) in found.items()]
-    y = Axis("force", unit, least=least_span(peak * factor))
+    y = Axis("force", unit, peak=peak * factor)
     caption = "Force that holds or loads each end, at every step."
     return Panel("pulls", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
 
@@ -313,7 +313,7 @@ def touchdown(result: Result) -> Panel:
     items += [Line(result.times, y, name, BED) for k, (name, y) in enumerate(named) if k in free]
     seen = edges[:, free][np.isfinite(edges[:, free])] if free else s[[0, -1]]
     margin = 0.05 * float(np.ptp(seen)) or 0.05
-    y = Axis("s", "m", float(seen.min()) - margin, float(seen.max()) + margin, least_span(float(s[-1])))
+    y = Axis("s", "m", float(seen.min()) - margin, float(seen.max()) + margin, float(s[-1]))
     caption = "Arc length where contact with the seabed begins or ends; a gap where nothing touches."
     return Panel("touchdown", "touchdown over time", _time(result), y, items, caption=caption, cursor=True)
 
@@ -337,7 +337,7 @@ def energy(result: Result, group: str) -> Panel | None:
     left = [name for name in parts if name not in seen]
     if left:
         caption += f" Too small to be seen: {', '.join(left)}."
-    y = Axis(group, unit, least=least_span(peak * factor))
+    y = Axis(group, unit, peak=peak * factor)
     return Panel(group, title, _time(result), y, items, caption=caption, cursor=True)
 
 

@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, weight_of_event
 from hybrid.store.reader import Result
 from hybrid.view.figure import Map, Page, Panel
 from hybrid.view.panels import history as over_time
@@ -27,6 +26,7 @@ from hybrid.view.projections import (
 )
 from hybrid.view.save import save_figure
 from hybrid.view.style import NEWS
+from hybrid.view.summary import warnings_of
 from hybrid.view.zones import counted, share_of_rod, zone_map
 
 if TYPE_CHECKING:
@@ -134,17 +134,17 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
     if n:
         span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
         head.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
-    events = [e for e in result.events if e.kind in EVENTS_BY_WEIGHT]
-    events.sort(key=lambda e: (weight_of_event(e.kind), e.t))
-    kinds = [e.kind for e in events if e.kind not in NEWS]
-    note = ""
-    if events:
-        names = ", ".join(k + f" (× {kinds.count(k)})" * (kinds.count(k) > 1) for k in dict.fromkeys(kinds))
-        note = f"Warning: {names}; at t = {events[0].t:.4g} s: " if kinds else "Note: "
-        note += "; ".join(dict.fromkeys(e.text for e in (events[:1] if kinds else events)))
+    found = warnings_of(result)
+    alarms = [(event, count) for event, count in found if event.kind not in NEWS]
+    note = "; ".join(dict.fromkeys(event.text for event, _ in (alarms[:1] or found)))
+    if alarms:
+        names = ", ".join(event.kind + f" (× {count})" * (count > 1) for event, count in alarms)
+        note = f"Warning: {names}; at t = {alarms[0][0].t:.4g} s: {note}"
+    elif found:
+        note = f"Note: {note}"
     texts = "; ".join(filter(None, [*head, *facts]))
     empty = "" if n else "no output was saved"
-    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(kinds)), empty=empty, **more)
+    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(alarms)), empty=empty, **more)
 
 
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:

@@ -86,7 +86,7 @@ def test_limits_hold_what_is_drawn_and_no_round_off() -> None:
     panel = Panel("p", "p", Axis("x", "m"), Axis("y", "m"), [Line(x, np.array([1.0, np.nan, 3.0])), Band(x, -x, x)])
     (left, right), (low, high) = panel.limits()
     assert (left, right, low, high) == pytest.approx((-0.1, 2.1, -2.25, 3.25))
-    still = Panel("p", "p", Axis("x", "m"), Axis("y", "m", least=0.5), [Line(x, 7.0 + 1e-12 * x)])
+    still = Panel("p", "p", Axis("x", "m"), Axis("y", "m", peak=500.0), [Line(x, 7.0 + 1e-12 * x)])
     assert still.limits()[1] == pytest.approx((6.75, 7.25))
 
 
