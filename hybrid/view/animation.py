@@ -15,15 +15,14 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
-from hybrid.store.records import Zone
 from hybrid.view.decimate import even
 from hybrid.view.figure import Band, Item, Line, Panel
 from hybrid.view.panels import cable, framed, profiles, sea
 from hybrid.view.plots import page_of
-from hybrid.view.projections import View, aspect_of, views_of, whole_zones
+from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
-from hybrid.view.style import INK, KIND_COLOURS, prefix
+from hybrid.view.style import colour_of, prefix
 
 FORMATS = (".mp4", ".gif")
 # A film of 12 to 30 s shows a motion without tiring; at most so many frames are drawn for it, and a gif, which stores
@@ -119,7 +118,10 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int) -> It
 
     def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
         shapes = {name: cable(result, view, i) for name, view in views.items()}
-        return f"t = {result.times[i]:.{places}f} s", shapes | {"tension": _pieces(result, i, scale)}
+        curve = result.tension[i] * scale
+        pieces = pieces_of(result, i)
+        tension: list[Item] = [Line(s, np.interp(s, result.s, curve), kind, colour_of(kind), 1.8) for kind, s in pieces]
+        return f"t = {result.times[i]:.{places}f} s", shapes | {"tension": tension}
 
     return film(page, moving, frames, dpi)
 
@@ -128,7 +130,7 @@ def _still(result: Result, view: View) -> Panel:
     """What does not move: the surroundings and the first shape; empty lines bring the kinds into the legend."""
     kinds = dict.fromkeys(zone.kind for zones in result.zones for zone in zones)
     none = np.zeros(0)
-    legend = [Line(none, none, kind, KIND_COLOURS.get(kind, INK), 2.0) for kind in kinds]
+    legend = [Line(none, none, kind, colour_of(kind), 2.0) for kind in kinds]
     first = Line(*view.project(result.position[0]), "first shape", "#B5B5B5", 0.8)
     return framed(result, view, [*sea(result, view), *legend, first])
 
@@ -137,16 +139,6 @@ def _tension_range(result: Result) -> Panel:
     panel = profiles(result, "tension", title="tension, and its range over all times")
     band = next(item for item in panel.items if isinstance(item, Band))
     return panel._replace(items=[band._replace(opacity=0.18)])
-
-
-def _pieces(result: Result, i: int, scale: float) -> list[Item]:
-    """The tension at an output, each zone in its colour."""
-    s, items = result.s, list[Item]()
-    for kind, s_a, s_b in whole_zones(result.zones[i]) or [Zone("cable", float(s[0]), float(s[-1]))]:
-        where = np.array([s_a, *s[(s > s_a) & (s < s_b)], s_b])
-        y = np.interp(where, s, result.tension[i] * scale)
-        items.append(Line(where, y, kind, KIND_COLOURS.get(kind, INK), 1.8))
-    return items
 
 
 # ---- files ----------------------------------------------------------------------------------------

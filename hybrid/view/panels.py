@@ -14,7 +14,6 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
-from hybrid.store.records import Zone
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
 from hybrid.view.projections import (
@@ -25,6 +24,7 @@ from hybrid.view.projections import (
     extent_in,
     free_edges,
     magnification,
+    pieces_of,
     telling_times,
     view_named,
     views_of,
@@ -36,13 +36,12 @@ from hybrid.view.style import (
     BODY,
     DOUBT,
     GREY,
-    INK,
-    KIND_COLOURS,
     LEVEL,
     POINT_COLOURS,
     SAND,
     WATER,
     ZERO,
+    colour_of,
     earlier_grey,
     prefix,
     title_of,
@@ -113,17 +112,15 @@ def framed(result: Result, view: View, items: list[Item], when: str = "") -> Pan
 def cable(result: Result, view: View, output: int, *, joints: bool = False) -> list[Item]:
     """The cable at an output: its zones, its ends, what is attached, and where it touches down."""
     s, position = result.s, result.position[output]
-    zones = whole_zones(result.zones[output]) or [Zone("cable", float(s[0]), float(s[-1]))]
-    items: list[Item] = []
-    for zone in zones:
-        piece = _place(np.array([zone.s_a, *s[(s > zone.s_a) & (s < zone.s_b)], zone.s_b]), s, position)
-        items.append(Line(*view.project(piece), zone.kind, KIND_COLOURS.get(zone.kind, INK), 2.0))
+    items, pieces = list[Item](), pieces_of(result, output)
+    for kind, where in pieces:
+        items.append(Line(*view.project(_place(where, s, position)), kind, colour_of(kind), 2.0))
     if "attached" in result:
         bodies = view.project(_place(result["attached"], s, position))
         items.append(Marks(*bodies, "o", "float, clump, body", BODY, size=8.0))
     items += [Marks(*view.project(position[[k]]), "s^"[k], ("start", "end")[k]) for k in (0, -1)]
-    if joints and len(zones) > 1:
-        at = view.project(_place(np.array([zone.s_b for zone in zones[:-1]]), s, position))
+    if joints and len(pieces) > 1:
+        at = view.project(_place(np.array([where[-1] for _, where in pieces[:-1]]), s, position))
         items.append(Marks(*at, "o", "joint", "#FFFFFF"))
     if joints and "touchdown_position" in result:
         away = np.abs(result["touchdown"][output] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own
@@ -238,7 +235,7 @@ def _along(result: Result) -> Axis:
 
 def _zones_behind(result: Result, output: int) -> list[Item]:
     zones = whole_zones(result.zones[output])
-    return [Box((zone.s_a, zone.s_b), None, colour=KIND_COLOURS.get(zone.kind, INK)) for zone in zones]
+    return [Box((zone.s_a, zone.s_b), None, colour=colour_of(zone.kind)) for zone in zones]
 
 
 # ---- over time ------------------------------------------------------------------------------------

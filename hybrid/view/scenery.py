@@ -13,7 +13,7 @@ from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
 from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.projections import STILL
-from hybrid.view.style import BED, BODY, INK, KIND_COLOURS, LEVEL, SAND, WATER, prefix
+from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, WATER, colour_of, prefix
 from hybrid.view.zones import COLOURS, span_of
 
 # Pale shades would be lost on white: of nine, those from here on.
@@ -69,8 +69,8 @@ def _colours(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     if kinds:
         of = np.array([_kinds(result.zones[i], kinds, result.s[shown.points]) for i in shown.frames])
-        steps = [[(k + d) / len(kinds), KIND_COLOURS.get(kind, INK)] for k, kind in enumerate(kinds) for d in (0, 1)]
-        legend = [[kind, KIND_COLOURS.get(kind, INK)] for kind in kinds]
+        steps = [[(k + d) / len(kinds), colour_of(kind)] for k, kind in enumerate(kinds) for d in (0, 1)]
+        legend = [[kind, colour_of(kind)] for kind in kinds]
         out.append(
             {"key": "zone", "label": "zone", "values": store.add(of, "u1"), "scale": steps, "legend": legend}
             | {"low": -0.5, "high": len(kinds) - 0.5}

@@ -36,6 +36,10 @@ def title_of(name: str) -> str:
     return _NAMES.get(name, name.replace("/", " ").replace("_", " "))
 
 
+def colour_of(kind: str) -> str:
+    return KIND_COLOURS.get(kind, INK)
+
+
 def earlier_grey(k: int, count: int) -> str:
     """The colour of the k-th of so many earlier curves: later ones are darker."""
     level = round(255 * (0.7 - 0.3 * k / max(count - 1, 1)))

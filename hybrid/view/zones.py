@@ -20,7 +20,7 @@ from hybrid.store.records import Event, Zone
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel
 from hybrid.view.projections import STILL, free_edges, whole_zones
-from hybrid.view.style import ALARM, INK, KIND_COLOURS, NEWS, prefix
+from hybrid.view.style import ALARM, INK, NEWS, colour_of, prefix
 
 # What is shown of each kind, and its colours: shades of the orange and the blue that the kinds have on other pages.
 # Lightness falls evenly (in OKLab, 0.93 to 0.32), and none of one kind is near any of the other to colour-blind eyes.
@@ -173,8 +173,11 @@ def zone_map(result: Result, shown: Kept | None = None) -> Panel:
         ends = cells.t[[0, -1]]
         items.append(Line(ends, np.array([s, s]), "attached", width=0.7, dash="dash", casing="#FFFFFF"))
     items += _touchdown(result)
-    events = sorted_events(result, _MOST_ON_PAGE) if shown else marked_events(result, cells.t)
-    items += _events(events if shown or len(events) <= _MOST_MARKS else [])
+    if shown:
+        items += _events(sorted_events(result, _MOST_ON_PAGE))
+    else:
+        events = [e for e in result.events if e.kind in ZONE_EVENTS and cells.t[0] <= e.t <= cells.t[-1]]
+        items += _events(events) if len(events) <= _MOST_MARKS else []
     if ((cells.kind >= 0) & (cells.point < 0)).any():
         nowhere = np.zeros(0)
         items.append(Marks(nowhere, nowhere, "s", "no output point in the zone", _UNSEEN, _UNSEEN))
@@ -216,7 +219,7 @@ def strip(result: Result) -> Panel:
     for zones, same in groupby(whole_zones(result.zones[int(i)]) for i in frames):
         n = k + len(list(same))
         for kind, s_a, s_b in zones:
-            items.append(Box((edges[k], edges[n]), (s_a, s_b), kind, KIND_COLOURS.get(kind, INK), 1.0))
+            items.append(Box((edges[k], edges[n]), (s_a, s_b), kind, colour_of(kind), 1.0))
         k = n
     caption = f"zones: s = 0 (below) to {s[-1]:.5g} m, over t = {times[0]:.5g} … {times[-1]:.5g} s"
     x, y = Axis("t", "s", float(times[0]), float(times[-1])), Axis("s", "m", float(s[0]), float(s[-1]))
@@ -259,11 +262,6 @@ def _touchdown(result: Result) -> list[Item]:
 
 
 # ---- events ---------------------------------------------------------------------------------------
-
-
-def marked_events(result: Result, edges: np.ndarray) -> list[Event]:
-    """Where zones were split, merged or a step retried, within the times of a map."""
-    return [e for e in result.events if e.kind in ZONE_EVENTS and edges[0] <= e.t <= edges[-1]]
 
 
 def counted(result: Result) -> str:
