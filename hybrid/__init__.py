@@ -28,8 +28,8 @@ if TYPE_CHECKING:
     from hybrid.store.reader import open_result as open
     from hybrid.studies.tradeoff import trade
     from hybrid.view.plots import plot_summary as plot
+    from hybrid.view.plots import plot_zones
     from hybrid.view.report import write_report as report
-    from hybrid.view.zone_plot import plot_zones
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -47,7 +47,7 @@ _HOME = {
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
     "plot": ("hybrid.view.plots", "plot_summary"),
-    "plot_zones": ("hybrid.view.zone_plot", "plot_zones"),
+    "plot_zones": ("hybrid.view.plots", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
     "resume": ("hybrid.simulation.api", "resume"),
     "run": ("hybrid.simulation.api", "run"),

@@ -127,21 +127,8 @@ def build(
     that miss a zone boundary).
     """
     cable = material(scene)
-    plans = zone_plans(scene)
-    cuts = sorted({*cable.cuts, *corners(scene)})
     resolution = resolution or first_resolution(scene)
-    layout = None
-    if isinstance(mesh, Layout):
-        layout, s, zones = mesh, mesh.nodes, mesh.zones
-    elif mesh is not None:
-        s, zones = mesh
-    elif isinstance(scene.model, AdaptiveModel):
-        wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
-        edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
-        layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
-        s, zones = layout.nodes, layout.zones
-    else:
-        s, zones = _placed(scene, plans, cuts, resolution, DEFAULT_CELLS)
+    layout, s, zones = _nodes(scene, cable, resolution, mesh)
     n = s.size - 1
     middle = 0.5 * (s[:-1] + s[1:])
     zone_of = np.clip(np.searchsorted([z.s_b for z in zones], middle), 0, len(zones) - 1)
@@ -176,13 +163,10 @@ def build(
         start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
     ends, frames = ends_and_frames(scene, start.e, rod, sea)
     start.a1[:] = frames
-    others = []
-    for name, r in spare_shapes(scene, s) if shape is not None else from_joint(scene, s):
-        spare = blank_state(n)
-        spare.r[:], spare.T[:] = r, scale
-        spare.e[:] = np.diff(r, axis=0)
-        spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
-        others.append((name, spare))
+    others = [
+        (name, _spare_start(scene, r, rod, scale, sea))
+        for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
+    ]
     corrected = corrects(scene)
     follows = (resolution.follow or corrected) and followed(scene, zones, corrected).on
     plane, flat = in_plane(scene, start, others, ends.values)
@@ -199,6 +183,32 @@ def build(
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         plane=plane, corrected=corrected, follows_error=follows,
     )  # fmt: skip
+
+
+def _nodes(
+    scene: Scene, cable: Material, resolution: Resolution, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None
+) -> tuple[Layout | None, Floats, tuple[Zone, ...]]:
+    """Layout of a line whose zones move (else None), nodes (N+1,) m and zones; mesh: as of `build`."""
+    if isinstance(mesh, Layout):
+        return mesh, mesh.nodes, mesh.zones
+    if mesh is not None:
+        return None, *mesh
+    cuts = sorted({*cable.cuts, *corners(scene)})
+    if isinstance(scene.model, AdaptiveModel):
+        wanted = (*(scene.model.force_rod or ()), *(scene.model.force_catenary or ()))
+        edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
+        layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
+        return layout, layout.nodes, layout.zones
+    return None, *_placed(scene, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
+
+
+def _spare_start(scene: Scene, r: Floats, rod: np.ndarray, scale: float, sea: Surroundings) -> State:
+    """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
+    spare = blank_state(r.shape[0] - 1)
+    spare.r[:], spare.T[:] = r, scale
+    spare.e[:] = np.diff(r, axis=0)
+    spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
+    return spare
 
 
 # Base cells of a line whose zones move, when the scene does not say; rod cells as a part of (EI/w)^(1/3), the length

@@ -186,13 +186,13 @@ _SLACK = "what to do when a catenary zone loses its tension: stop, or warn and g
 class RodModel(Table):
     """The whole cable is a Kirchhoff rod."""
 
-    kind: Literal["rod"] = Field(default="rod", description="bending and torsion everywhere")
+    kind: Literal["rod"] = Field(default="rod", description="bending and torsion everywhere: a beam")
 
 
 class CatenaryModel(Table):
     """The whole cable is perfectly flexible."""
 
-    kind: Literal["catenary"] = Field(default="catenary", description="tension only")
+    kind: Literal["catenary"] = Field(default="catenary", description="tension only: a string")
     slack: Slack = Field(default="stop", description=_SLACK)
 
 
@@ -209,7 +209,7 @@ class CorrectedModel(Table):
 class ZonesModel(Table):
     """Rod and catenary zones in a row, spherical joints between them."""
 
-    kind: Literal["zones"] = Field(default="zones", description="rod and catenary zones")
+    kind: Literal["zones"] = Field(default="zones", description="rod and catenary zones: a hybrid")
     zones: tuple[Zone, ...] = Field(min_length=1, description="zones in order from s = 0 on; they fill the cable")
     slack: Slack = Field(default="stop", description=_SLACK)
 
@@ -293,7 +293,9 @@ Model = Annotated[
 class Mesh(Table):
     """How the cable is cut into cells: `cells` with `ratio`, or `nodes`."""
 
-    cells: Whole | None = Field(default=None, ge=2, description="number of cells; absent: chosen [-]")
+    cells: Whole | None = Field(
+        default=None, ge=2, description="number of cells (elements, segments); absent: chosen [-]"
+    )
     ratio: Positive | None = Field(default=None, description=_RATIO)
     nodes: tuple[Number, ...] | None = Field(
         default=None, min_length=3, description="arc length of every node, from 0 to the length of the cable [m]"
@@ -326,7 +328,7 @@ class Time(Table):
     duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
     step: Positive | None = Field(
         default=None,
-        description="fixed time step, shortened so that a whole number fits between outputs; with a tolerance, the "
+        description="fixed time step dt, shortened so that a whole number fits between outputs; with a tolerance, the "
         "largest; absent: steps follow the motion [s]",
     )
     tolerance: Positive | None = Field(

@@ -22,7 +22,7 @@ from hybrid.scene.base import (
 HEIGHT = "vertical extent, for the part under water at the surface; absent: that of a sphere of its volume [m]"
 Shape = Literal["sphere", "cylinder"]
 SHAPE = "how the part under water grows with the draught x of the height: sphere (3 x^2 - 2 x^3), upright cylinder (x)"
-DRAG_AREA = "drag coefficient x frontal area [m^2]"
+DRAG_AREA = "drag area CdA, drag coefficient x frontal area [m^2]"
 ADDED_MASS = "mass of the fluid that moves with it [kg]"
 
 
@@ -44,13 +44,13 @@ Lift = Annotated[Number, AfterValidator(_lifts), Field(json_schema_extra={"minim
 class Float(Table):
     """A float at a point of the cable: a mass and a displaced volume, drag and added mass."""
 
-    kind: Literal["float"] = Field(default="float", description="lifts the cable at a point")
-    at: NonNegative = Field(description="arc length at which it sits [m]")
+    kind: Literal["float"] = Field(default="float", description="lifts the cable at a point: a buoy")
+    at: NonNegative = Field(description="arc length s, its position on the cable [m]")
     buoyancy: Lift | None = Field(
         default=None, description="net lift under water: weight of the displaced fluid minus its own; or volume [N]"
     )
     volume: Positive | None = Field(default=None, description="displaced volume; or buoyancy [m^3]")
-    mass: NonNegative = Field(default=0.0, description="mass, in air [kg]")
+    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     height: Positive | None = Field(default=None, description=HEIGHT)
@@ -73,10 +73,10 @@ class Float(Table):
 class Clump(Table):
     """A weight at a point of the cable."""
 
-    kind: Literal["clump"] = Field(default="clump", description="weighs on the cable at a point")
-    at: NonNegative = Field(description="arc length at which it sits [m]")
-    mass: Positive = Field(description="mass, in air [kg]")
-    volume: NonNegative = Field(default=0.0, description="displaced volume [m^3]")
+    kind: Literal["clump"] = Field(default="clump", description="weighs on the cable at a point: a sinker, ballast")
+    at: NonNegative = Field(description="arc length s, its position on the cable [m]")
+    mass: Positive = Field(description="mass in air, its weight over gravity [kg]")
+    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     height: Positive | None = Field(default=None, description=HEIGHT)
@@ -105,7 +105,7 @@ class Modules(Table):
         "or volume [N/m]",
     )
     volume: Positive | None = Field(default=None, description="displaced volume per length; or buoyancy [m^3/m]")
-    mass: NonNegative = Field(default=0.0, description="mass per length, in air [kg/m]")
+    mass: NonNegative = Field(default=0.0, description="mass per length in air, the weight over gravity [kg/m]")
     drag_area: NonNegative = Field(
         default=0.0, description="normal drag coefficient x frontal area, per length [m^2/m]"
     )

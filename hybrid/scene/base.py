@@ -14,9 +14,10 @@ from __future__ import annotations
 import math
 import sys
 import warnings
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn
+from functools import partial
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, NoReturn, get_args
 
 from pydantic import (
     AliasChoices,
@@ -26,6 +27,7 @@ from pydantic import (
     Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
+    Tag,
 )
 from pydantic.fields import ComputedFieldInfo, FieldInfo
 from pydantic.functional_validators import AfterValidator
@@ -270,6 +272,17 @@ def by_kind(value: Any) -> str | None:
     return f"<{kind}>"
 
 
+def _tagged(union: Any) -> Iterator[tuple[type[Table], str]]:
+    """The tables of a union by kind, each with its tag."""
+    for arm in get_args(union):
+        table, *marks = get_args(arm)
+        yield table, next(mark.tag for mark in marks if isinstance(mark, Tag)).strip("<>")
+
+
+def _of_kind(table: type[Table]) -> str:
+    return table.model_fields["kind"].description or ""
+
+
 @dataclass(frozen=True)
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
@@ -282,7 +295,8 @@ class Kinds:
     implied: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        return core_schema.no_info_before_validator_function(self.check, handler(source))
+        said = {tag: _of_kind(table) for table, tag in _tagged(source)}
+        return core_schema.no_info_before_validator_function(partial(self.check, said=said), handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
@@ -292,7 +306,8 @@ class Kinds:
             return tables
         return {"anyOf": [tables, {"enum": alone, "description": "short for {kind: ...}"}]}
 
-    def check(self, value: Any) -> Any:
+    def check(self, value: Any, said: Mapping[str, str]) -> Any:
+        """`said`: of each kind what the schema says."""
         if isinstance(value, Table):
             if getattr(value, "kind", None) not in self.names:
                 self._refuse_table(f"a {type(value).__name__}")
@@ -310,7 +325,7 @@ class Kinds:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
         elif kind not in self.names:
-            refuse([Finding(("kind",), expected, nearest(str(kind), self.names) or "write one of these")])
+            refuse([Finding(("kind",), expected, nearest(str(kind), said) or "write one of these")])
         return value
 
     def _refuse_table(self, given: str | None) -> NoReturn:

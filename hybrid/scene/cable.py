@@ -26,14 +26,14 @@ from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurr
 class Fluid(Table):
     """The water (or air) around the whole cable; without this table there is none."""
 
-    density: Positive = Field(description="density of the fluid; gives buoyancy, drag and added mass [kg/m^3]")
+    density: Positive = Field(description="density rho of the fluid; gives buoyancy, drag and added mass [kg/m^3]")
     current: Current | None = Field(
         default=None,
-        description="velocity of the fluid, inertial frame: the same everywhere; or a list of {z, velocity}, linear "
-        "between its heights and constant beyond; or by kind; absent: still water [m/s]",
+        description="velocity of the fluid (of air: the wind), inertial frame: the same everywhere; or a list of "
+        "{z, velocity}, linear between its heights and constant beyond; or by kind; absent: still water [m/s]",
     )
     surface: Number | None = Field(
-        default=None, description="height of the still water level; absent: everything is under water [m]"
+        default=None, description="height of the still water (sea level, MSL); absent: everything is under water [m]"
     )
     waves: Waves | None = Field(default=None, description="waves on the surface; absent: none")
 
@@ -61,12 +61,15 @@ class Fluid(Table):
 class Environment(Table):
     """What acts on the cable from outside."""
 
-    gravity: NonNegative = Field(default=9.81, description="acceleration of gravity, along -z [m/s^2]")
+    gravity: NonNegative = Field(default=9.81, description="acceleration g of gravity, along -z [m/s^2]")
     fluid: Fluid | None = Field(
         default=None,
         description="the fluid around the cable: water, or air (density 1.225, the wind as current); absent: vacuum",
     )
-    seabed: Seabed | None = Field(default=None, description="the ground the cable can lie on; absent: none")
+    seabed: Seabed | None = Field(
+        default=None,
+        description="the ground (sea floor) at the depth of the water; absent: none",
+    )
 
     @property
     def waves(self) -> Waves | None:
@@ -86,7 +89,7 @@ class Environment(Table):
 class Drag(Table):
     """Morison drag per length: 1/2 density x diameter x coefficient x |u| u, normal and tangential part."""
 
-    normal: NonNegative = Field(default=0.0, description="normal drag coefficient, on the diameter [-]")
+    normal: NonNegative = Field(default=0.0, description="normal drag coefficient Cd, on the diameter [-]")
     tangential: NonNegative = Field(
         default=0.0, description="tangential drag coefficient, on the circumference pi x diameter [-]"
     )
@@ -95,7 +98,7 @@ class Drag(Table):
 class AddedMass(Table):
     """Fluid that moves with the cable, as a multiple of the displaced mass."""
 
-    normal: NonNegative = Field(default=0.0, description="added mass coefficient across the cable [-]")
+    normal: NonNegative = Field(default=0.0, description="added mass coefficient Ca = Cm - 1 across the cable [-]")
     tangential: NonNegative = Field(default=0.0, description="added mass coefficient along the cable [-]")
 
 
@@ -139,11 +142,13 @@ class Section(Table):
     """A stretch of cable with constant properties, per metre of unstretched length."""
 
     length: Positive = Field(description="unstretched length [m]")
-    mass: Positive = Field(description="mass per length, in air [kg/m]")
+    mass: Positive = Field(description="mass per length in air, the weight over gravity [kg/m]")
     diameter: Positive | None = Field(
-        default=None, description="outer diameter; needed by buoyancy, drag and added mass [m]"
+        default=None, description="outer diameter (OD); needed by buoyancy, drag and added mass [m]"
     )
-    axial_stiffness: Positive | None = Field(default=None, description="axial stiffness EA; absent: inextensible [N]")
+    axial_stiffness: Positive | None = Field(
+        default=None, description="axial stiffness EA (modulus E x area); absent: inextensible [N]"
+    )
     max_strain: Positive = Field(
         default=0.05,
         description="strain that the section bears; a computation that exceeds it stops; an inextensible section has "
@@ -151,7 +156,8 @@ class Section(Table):
     )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,
-        description="bending stiffness EI, or [about a1, about a2]; needed in rod zones [N m^2]",
+        description="bending stiffness EI (modulus E x second moment of area), or [about a1, about a2]; needed in "
+        "rod zones [N m^2]",
     )
     torsional_stiffness: NonNegative | None = Field(
         default=None, description="torsional stiffness GJ; absent: bending stiffness / 1.3 [N m^2]"
@@ -169,9 +175,9 @@ class Section(Table):
     intrinsic_curvature: Vector | None = Field(
         default=None, description="curvatures about a1 and a2 and twist of the unloaded cable, material axes [1/m]"
     )
-    drag: Drag | None = Field(default=None, description="drag coefficients; need a fluid and a diameter")
+    drag: Drag | None = Field(default=None, description="drag coefficients Cd; need a fluid and a diameter")
     added_mass: AddedMass | None = Field(
-        default=None, description="added mass coefficients; need a fluid and a diameter"
+        default=None, description="added mass coefficients Ca; need a fluid and a diameter"
     )
     damping: Annotated[Damping, PlainNumber(("mass",))] | None = Field(
         default=None, description="internal damping; a plain number is the mass-proportional part"

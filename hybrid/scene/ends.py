@@ -60,7 +60,7 @@ class Harmonic(Table):
     """amplitude x sin(2 pi t / period + phase)."""
 
     amplitude: Number = Field(description="amplitude; degrees for roll, pitch and yaw [m or deg]")
-    period: Positive = Field(description="period [s]")
+    period: Positive = Field(description="period, one over the frequency, 2 pi over omega [s]")
     phase: Number = Field(default=0.0, description="phase [deg]")
 
 
@@ -91,7 +91,8 @@ class Motion(Table):
     pitch: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial y axis, or a list")
     yaw: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial z axis, or a list")
     velocity: Vector | None = Field(
-        default=None, description="steady travel at this velocity, reached over `ramp`; inertial frame [m/s]"
+        default=None,
+        description="steady travel (tow) at this velocity or speed, reached over `ramp`; inertial frame [m/s]",
     )
     travel: Travel | None = Field(default=None, description="a smooth move to another place")
     follow: Literal["waves"] | None = Field(
@@ -254,7 +255,9 @@ def _given(**loads: Triple | Load | None) -> tuple[GivenLoad, ...]:
 class Pinned(EndTable):
     """Held at a point, free to turn."""
 
-    kind: Literal["pinned"] = Field(default="pinned", description="a ball joint")
+    kind: Literal["pinned"] = Field(
+        default="pinned", description="position fixed, free to turn: ball joint, hinge, anchor"
+    )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
 
@@ -278,7 +281,7 @@ class Pinned(EndTable):
 class Clamped(EndTable):
     """Held at a point and in a direction.  The tangent points along increasing s at either end."""
 
-    kind: Literal["clamped"] = Field(default="clamped", description="position and direction held")
+    kind: Literal["clamped"] = Field(default="clamped", description="position and direction fixed: built in")
     position: Vector = Field(description="position of the end, inertial frame [m]")
     tangent: Direction = Field(description=_TANGENT)
     normal: Direction | None = Field(default=None, description=_NORMAL)
@@ -367,14 +370,14 @@ class Free(EndTable):
 class Body(EndTable):
     """Carries a body, such as a vehicle or a buoy, that moves with the cable and is not held."""
 
-    kind: Literal["body"] = Field(default="body", description="free, with a body on it")
+    kind: Literal["body"] = Field(default="body", description="free, with a body on it: vehicle (ROV), vessel, buoy")
     initial_guess: Vector | None = Field(
         default=None,
         validation_alias=AliasChoices("initial_guess", "near"),
         description="where the search of the equilibrium puts the body first, inertial frame; absent: chosen [m]",
     )
-    mass: Positive = Field(description="mass, in air [kg]")
-    volume: NonNegative = Field(default=0.0, description="displaced volume [m^3]")
+    mass: Positive = Field(description="mass in air, its weight over gravity [kg]")
+    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
     height: Positive | None = Field(default=None, description=HEIGHT)
     shape: Shape = Field(default="sphere", description=SHAPE)
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)

@@ -66,7 +66,7 @@ class UniformCurrent(Table):
 class CurrentProfile(Table):
     """Velocities at heights: linear between them, constant above the highest and below the lowest."""
 
-    kind: Literal["profile"] = Field(default="profile", description="velocities at heights, linear between them")
+    kind: Literal["profile"] = Field(default="profile", description="a table of velocities, linear between heights")
     table: CurrentPoints = Field(description="heights, rising or falling, and the velocity at each")
     ramp: Positive | None = Field(default=None, description=_RAMP.format(what="current"))
 
@@ -132,14 +132,14 @@ Current = Annotated[
 
 # --- waves -------------------------------------------------------------------------------------
 
-_DIRECTION = "direction in which the waves travel, from x counter-clockwise seen from above [deg]"
+_DIRECTION = "direction (heading) in which the waves travel, from x counter-clockwise seen from above [deg]"
 _DEPTH = "depth of the water for the length of the waves; absent: down to the seabed, or deep without one [m]"
 
 
 class RegularWaves(Table):
     """Linear (Airy) waves of one period: elevation height / 2 x cos(k x - w t + phase) along their direction."""
 
-    kind: Literal["regular"] = Field(default="regular", description="one period")
+    kind: Literal["regular"] = Field(default="regular", description="one period, linear (Airy)")
     height: Positive = Field(description="height H from trough to crest [m]")
     period: Positive = Field(description="period T [s]")
     direction: Number = Field(default=0.0, description=_DIRECTION)
@@ -156,7 +156,7 @@ class RegularWaves(Table):
 class JonswapWaves(Table):
     """Irregular, long-crested waves: a sum of linear waves with random phases and a JONSWAP spectrum."""
 
-    kind: Literal["jonswap"] = Field(default="jonswap", description="a spectrum of periods")
+    kind: Literal["jonswap"] = Field(default="jonswap", description="a spectrum of periods: irregular waves")
     significant_height: Positive = Field(
         validation_alias=AliasChoices("significant_height", "height"),
         description="significant wave height Hs, four standard deviations of the elevation [m]",
@@ -216,8 +216,8 @@ def wavenumber(omega: float, depth: float | None, gravity: float) -> float:
 class Friction(Table):
     """Coulomb friction of the seabed on the cable; a plain number means both."""
 
-    axial: NonNegative = Field(description="friction coefficient along the cable [-]")
-    lateral: NonNegative = Field(description="friction coefficient across the cable [-]")
+    axial: NonNegative = Field(description="friction coefficient along the cable (tangential) [-]")
+    lateral: NonNegative = Field(description="friction coefficient across the cable (normal, transverse) [-]")
 
 
 class Seabed(Table):
@@ -232,7 +232,8 @@ class Seabed(Table):
         default=0.0, description="force per metre of cable and speed of penetration, in contact [N s/m per m]"
     )
     friction: Annotated[Friction, PlainNumber(("axial", "lateral"))] | None = Field(
-        default=None, description="friction on the bed; a plain number means axial and lateral; absent: none"
+        default=None,
+        description="friction on the bed (Coulomb, mu); a plain number means axial and lateral; absent: none",
     )
 
     def height(self, x: float, y: float) -> float:

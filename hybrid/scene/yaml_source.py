@@ -18,7 +18,7 @@ from ruamel.yaml.reader import ReaderError
 
 from hybrid.errors import Complaint
 from hybrid.scene.base import Place, Table, dotted
-from hybrid.scene.schema_messages import keys_at, shorthand_keys, tables_at
+from hybrid.scene.schema_walk import keys_at, shorthand_keys, tables_at
 from hybrid.scene.suggestions import decimal_comma, did_you_mean
 
 Spot = tuple[int, int]

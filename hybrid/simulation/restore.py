@@ -55,7 +55,8 @@ def refused(source: Path) -> Iterator[None]:
     try:
         yield
     except (ValueError, TypeError, KeyError, IndexError, AttributeError, ArithmeticError) as error:
-        detail = f"{type(error).__name__}: {error}".splitlines()[0]
+        kind = "" if type(error) is ValueError else f"{type(error).__name__}: "
+        detail = f"{kind}{error}".splitlines()[0]
         raise ResultError(
             f"{source} has a checkpoint that does not fit its scene\n    detail:   {detail}\n"
             "    try:      run its scene again"
@@ -73,7 +74,7 @@ def resolution_tree(resolution: Resolution) -> Tree:
 
 
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
-    """The resolution again.  ResultError or ValueError: it is none for this scene."""
+    """The resolution again.  ValueError: it is none for this scene."""
     first = first_resolution(scene)
     saved = matched(tree, resolution_tree(first) | {"grading": None}, "resolution")
     for name in ("fineness", "step", "local", "zones"):

@@ -20,6 +20,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
+from hybrid.store.integrity import stored
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
@@ -52,18 +53,36 @@ def create_slots(file: h5py.File, before: Tree) -> None:
     """Make room for checkpoints in a new file; before: what was found before the run, {} if nothing."""
     for name in SLOTS:
         file.create_dataset(name, (0,), "u1", maxshape=(None,), chunks=(_CHUNK,)).make_scale(name)
-    write_before(file, before)
-
-
-def write_before(file: h5py.File, before: Tree) -> None:
-    """Write what was found before the run.  A dataset is a scale of itself: programs look for dimensions."""
-    if before:
+    if before:  # a dataset is a scale of itself: programs look for dimensions
         file.create_dataset(BEFORE, data=np.frombuffer(pack(before), "u1")).make_scale(BEFORE)
 
 
 def read_before(file: h5py.File) -> Tree:
     """What was found before the run; {} when all is done."""
-    return unpack(file[BEFORE][()].tobytes()) if BEFORE in file else {}
+    data = _read(file, BEFORE)
+    try:
+        return unpack(data) if data else {}
+    except ValueError as error:
+        raise _unreadable(file, f"{BEFORE}: {error}") from None
+
+
+def _read(file: h5py.File, name: str) -> bytes:
+    """The bytes of a dataset of ours; none if it is not there.  ResultError: it is something else."""
+    data = stored(file, name)
+    if data is None:
+        return b""
+    if file.swmr_mode:
+        data.refresh()
+    if data.dtype != np.dtype("u1") or data.ndim != 1:
+        raise _unreadable(file, f"{name}: expected bytes in a row, found {data.dtype} of shape {data.shape}")
+    return bytes(data[()].tobytes())
+
+
+def _unreadable(file: h5py.File, detail: str) -> ResultError:
+    advice = "the file as hybrid wrote it, or run its scene again"
+    return ResultError(
+        f"{file.filename} has a checkpoint that cannot be read\n    detail:   {detail}\n    try:      {advice}"
+    )
 
 
 def write_slot(slots: Sequence[h5py.Dataset], number: int, data: bytes) -> None:
@@ -78,19 +97,16 @@ def read_checkpoint(file: h5py.File) -> Checkpoint:
     """The newest checkpoint that is whole and whose rows are all there.  ResultError if there is none."""
     points, why = [], "it is an equilibrium, was kept in memory first, or ended before its first output"
     for name in SLOTS:
-        if name in file:
-            if file.swmr_mode:
-                file[name].refresh()
-            data = file[name][()].tobytes()
-            try:
-                point = _checkpoint(unpack(data)) if data else None
-                if point is not None and _has_rows(file, point):
-                    points.append(point)
-            except ResultError as error:
-                why = str(error).split("detail:")[-1].splitlines()[0].strip()
+        try:
+            data = _read(file, name)
+            point = _checkpoint(unpack(data)) if data else None
+            if point is not None and _has_rows(file, point):
+                points.append(point)
+        except (ResultError, ValueError) as error:
+            why = str(error).split("detail:")[-1].splitlines()[0].strip()
     if not points:
         wrote, advice = plain_text(file.attrs.get("version_hybrid-cable", "")), "run its scene again"
-        if wrote != version("hybrid-cable") and any(name in file for name in SLOTS):
+        if wrote != version("hybrid-cable") and "checkpoint" in file:
             advice += f", or resume it with hybrid-cable {wrote}, which wrote it"
         raise ResultError(
             f"{file.filename} has no checkpoint to go on from\n    detail:   {why}\n    try:      {advice}"
@@ -108,14 +124,14 @@ def _checkpoint(tree: Tree) -> Checkpoint:
     matched(point.files, dict.fromkeys(point.files, "") if isinstance(point.files, dict) else {}, "files")
     zones = matched(point.zones, [["", 0.0, 0.0]] * (len(point.zones) if isinstance(point.zones, list) else 0), "zones")
     if min(point.number, *point.rows.values(), *point.happened.values()) < 0:
-        raise ResultError("the checkpoint cannot be read\n    detail:   a count is negative")
+        raise ValueError("a count is negative")
     return point._replace(zones=[tuple(zone) for zone in zones])
 
 
 def _has_rows(file: h5py.File, point: Checkpoint) -> bool:
     for scale, count in point.rows.items():
-        data = file.get(scale)
-        if not isinstance(data, h5py.Dataset) or not data.ndim:
+        data = stored(file, scale)
+        if data is None or not data.ndim:
             return False
         if file.swmr_mode:
             data.refresh()

@@ -14,6 +14,7 @@ import h5py
 import numpy as np
 
 from hybrid.store.format import plain_text
+from hybrid.store.integrity import check_stored
 
 _BLOCK = 1 << 22  # bytes that are copied at a time
 
@@ -54,6 +55,7 @@ def _copied_dataset(data: h5py.Dataset, new: h5py.File, name: str, kept: Mapping
     first = data.dims[0].label if data.ndim else ""
     count = min(kept.get(first, data.shape[0]), data.shape[0]) if data.ndim else 0
     shape = (count, *data.shape[1:]) if data.ndim else ()
+    check_stored(data, int(np.prod(shape, dtype=object)))
     grows = data.chunks is not None
     copy = new.create_dataset(
         name, shape, data.dtype, maxshape=data.maxshape if grows else None, chunks=data.chunks if grows else None

@@ -19,7 +19,9 @@ import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
+
+import h5py
 
 from hybrid.errors import ResultError
 
@@ -99,6 +101,45 @@ def _sum_of(file: BinaryIO, length: int) -> int:
         piece = file.read(min(left, _PIECE))
         found, left = zlib.crc32(piece, found), left - len(piece)
     return found
+
+
+def stored(file: h5py.File, name: str) -> h5py.Dataset | None:
+    """A dataset that is in the file itself; None if nothing has this name.  ResultError as of `check_stored`."""
+    item: Any = file
+    for part in name.split("/"):
+        link = item.get(part, getlink=True) if isinstance(item, h5py.Group) else None
+        if link is None:
+            return None
+        if not isinstance(link, h5py.HardLink):
+            raise _foreign(file, name, "is a link")
+        item = item[part]
+    if not isinstance(item, h5py.Dataset):
+        raise _foreign(file, name, "is no dataset")
+    check_stored(item, item.size or 0)
+    return item
+
+
+def check_stored(data: h5py.Dataset, count: int) -> None:
+    """ResultError unless the file holds the bytes of the first `count` numbers of a dataset, as they are.
+
+    Numbers in another file could be anybody's, and a few bytes can state a length, or unpack to one, that fills memory.
+    """
+    if data.shape is None:
+        raise _foreign(data.file, data.name, "has no values")
+    if data.is_virtual or data.external:
+        raise _foreign(data.file, data.name, "lies in another file")
+    if data.id.get_create_plist().get_nfilters():
+        raise _foreign(data.file, data.name, "is compressed")
+    there = min(data.id.get_storage_size(), data.file.id.get_filesize())
+    if count * data.dtype.itemsize > there:
+        raise _foreign(data.file, data.name, f"states {count} numbers, of which at most {there} bytes are there")
+
+
+def _foreign(file: h5py.File, name: str, why: str) -> ResultError:
+    return ResultError(
+        f"{file.filename} cannot be resumed\n    detail:   {name.lstrip('/')} {why}\n"
+        "    try:      the file as hybrid wrote it, or run its scene again"
+    )
 
 
 @contextmanager

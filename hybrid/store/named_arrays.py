@@ -16,8 +16,6 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.errors import ResultError
-
 MAGIC = b"hybrid checkpoint 2\n"
 DIGEST = 16  # bytes; it guards against a torn write, not against people
 DTYPES = {name: np.dtype(name) for name in ("<f8", "<i8", "<i4", "|i1", "|u1", "|b1")}
@@ -56,24 +54,24 @@ def pack(tree: Mapping[str, Any]) -> bytes:
 
 
 def unpack(data: bytes) -> Tree:
-    """The tree again; what follows it in `data` is not read.  ResultError if the bytes are none, or spoilt."""
+    """The tree again; what follows it in `data` is not read.  ValueError if the bytes are none, or spoilt."""
     begin = len(MAGIC) + DIGEST
     kind, _, number = data[: len(MAGIC)].rpartition(b" ")
     if kind == MAGIC.rpartition(b" ")[0] and data[: len(MAGIC)] != MAGIC:
         theirs, ours = number.decode("ascii", "replace").strip(), MAGIC.split()[-1].decode()
-        raise _spoilt(f"it has checkpoint format {theirs}; this program reads format {ours}")
+        raise ValueError(f"it has checkpoint format {theirs}; this program reads format {ours}")
     if not data.startswith(MAGIC):
-        raise _spoilt("it does not begin as a checkpoint does")
+        raise ValueError("it does not begin as a checkpoint does")
     body = data[begin : begin + 8 + int.from_bytes(data[begin : begin + 8], "little")]
     if hashlib.blake2b(body, digest_size=DIGEST).digest() != data[len(MAGIC) : begin]:
-        raise _spoilt("its digest is another: it was cut off, or has changed")
+        raise ValueError("its digest is another: it was cut off, or has changed")
     split = 16 + int.from_bytes(body[8:16], "little")
     try:
         found = _whole(json.loads(body[16:split]), memoryview(body)[split:])
-    except (ValueError, RecursionError) as error:  # no JSON, no text, or too deep
-        raise _spoilt(str(error)) from None
+    except RecursionError as error:
+        raise ValueError(str(error)) from None
     if not isinstance(found, dict):
-        raise _spoilt("it is no table of names")
+        raise ValueError("it is no table of names")
     return found
 
 
@@ -86,21 +84,21 @@ def _whole(x: Any, arrays: memoryview) -> Any:
             return _array(x[ARRAY], arrays)
         return {name: _whole(value, arrays) for name, value in x.items()}
     if isinstance(x, int) and x.bit_length() > 63:
-        raise _spoilt("a number has more than 64 bits")
+        raise ValueError("a number has more than 64 bits")
     return x
 
 
 def _array(said: Any, data: memoryview) -> np.ndarray:
     """An array; what is `said` of it: type, shape, where its bytes begin."""
     if not (isinstance(said, list) and len(said) == 3 and isinstance(said[0], str) and isinstance(said[1], list)):
-        raise _spoilt("an array has no type, shape and place")
+        raise ValueError("an array has no type, shape and place")
     name, shape, at = said
     counts = [*shape, at]
     if name not in DTYPES or len(shape) > MOST_DIMENSIONS or not all(type(x) is int and x >= 0 for x in counts):
-        raise _spoilt(f"an array of type {name!r:.20} and shape {shape!s:.60} is none")
+        raise ValueError(f"an array of type {name!r:.20} and shape {shape!s:.60} is none")
     end = at + math.prod(shape) * DTYPES[name].itemsize
     if end > len(data) or max(shape, default=0) > len(data):
-        raise _spoilt(f"an array of shape {shape!s:.60} has more numbers than are there")
+        raise ValueError(f"an array of shape {shape!s:.60} has more numbers than are there")
     array = np.frombuffer(data[at:end], DTYPES[name]).reshape(shape).copy()
     if name == "|b1":
         array = array.view(np.uint8) != 0  # any other byte than 0 and 1 would be neither true nor false
@@ -108,7 +106,7 @@ def _array(said: Any, data: memoryview) -> np.ndarray:
 
 
 def matched(saved: Any, template: Any, where: str = "") -> Any:
-    """`saved`, if it has the form of `template`: the same names, types and shapes; ResultError where it has not.
+    """`saved`, if it has the form of `template`: the same names, types and shapes; ValueError where it has not.
 
     Numbers must be finite where those of the template are.  None in the template stands for what its owner checks, and
     so does an array of no size.
@@ -140,10 +138,6 @@ def _finite(x: Any, template: Any) -> bool:
     return bool(np.isfinite(x).all() or not np.isfinite(template).all())
 
 
-def _odd(where: str, expected: str, given: Any) -> ResultError:
+def _odd(where: str, expected: str, given: Any) -> ValueError:
     what = f"{given.dtype} of shape {given.shape}" if isinstance(given, np.ndarray) else f"{given!r:.40}"
-    return _spoilt(f"{where or 'it'}: expected {expected}, found {what}")
-
-
-def _spoilt(detail: str) -> ResultError:
-    return ResultError(f"the checkpoint cannot be read\n    detail:   {detail}\n    try:      run the scene again")
+    return ValueError(f"{where or 'it'}: expected {expected}, found {what}")

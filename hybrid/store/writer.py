@@ -29,7 +29,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_before, write_slot
+from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_slot
 from hybrid.store.copying import copied, names_in
 from hybrid.store.format import (
     BLOCK,
@@ -129,14 +129,18 @@ class Recorder:
             advice = "its rows are not those of the file\n    try:      run its scene again"
             raise ResultError(f"{source.filename} has a checkpoint that does not fit\n    detail:   {advice}")
         ours = {f.name for f in fields}
-        later = {x for x in names_in(source, "errors") if x not in ours} | {BEFORE}  # known only when all is done
+        later = {x for x in names_in(source, "errors") if x not in ours} | {
+            BEFORE,
+            *SLOTS,
+        }  # known only when all is done
 
         def make(new: Path) -> None:
             with drafted(new) as file:
-                copied(source, file, at.rows, later)
+                copied(source, file, at.rows, {*later, BEFORE, *SLOTS})
                 set_status(file, "running", "")
                 write_texts(file, texts)
-                write_before(file, before)
+                create_slots(file, before)
+                write_slot([file[name] for name in SLOTS], at.number, pack(at._asdict()))
                 for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
                     del file.attrs[name]
 

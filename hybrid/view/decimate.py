@@ -53,13 +53,15 @@ def even(n: int, most: int) -> np.ndarray:
 
 
 def outline(values: np.ndarray, most: int = MOST_ON_CURVE) -> np.ndarray:
-    """Indices of a curve (n,) that keep its ends and, of every short stretch, its lowest and highest value."""
-    n = len(values)
+    """Indices of a curve (n,) that keep its ends and gaps and, of every short stretch, its lowest and highest value."""
+    n, known = len(values), np.isfinite(values)
     if n <= most:
         return np.arange(n)
+    low, high = np.where(known, values, np.inf), np.where(known, values, -np.inf)
     bounds = np.linspace(0, n, most // 2 + 1).astype(int)
-    found = [a + x for a, b in pairwise(bounds) for x in (values[a:b].argmin(), values[a:b].argmax())]
-    return np.unique([0, *found, n - 1])
+    found = [a + x for a, b in pairwise(bounds) for x in (low[a:b].argmin(), high[a:b].argmax())]
+    gaps = np.flatnonzero(np.diff(known))
+    return np.unique([0, *found, *gaps, *(gaps + 1), n - 1])
 
 
 class Store:

@@ -1,4 +1,4 @@
-"""Panels of a result, on your own Axes: shape, profiles along the cable, histories, touchdown.
+"""Panels of a result, as data: shape, curves along the cable and over time, energy.
 
 What a file has beside the cable is drawn, and nothing else: `seabed` (unit normal n and n . x on it), `surface` (z
 of the still water), `attached` (arc lengths of floats, clumps and bodies), `touchdown` and `contact`.
@@ -8,13 +8,14 @@ Points followed over time have colours of their own.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from itertools import cycle
 
 import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
-from hybrid.store.records import Zone
+from hybrid.view.decimate import Kept, even
+from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
 from hybrid.view.projections import (
     STILL,
     Numbers,
@@ -23,205 +24,352 @@ from hybrid.view.projections import (
     extent_in,
     free_edges,
     magnification,
+    pieces_of,
     telling_times,
     view_named,
     views_of,
     whole_zones,
 )
 from hybrid.view.style import (
+    ALARM,
     BED,
     BODY,
     DOUBT,
     GREY,
-    INK,
-    KIND_COLOURS,
     LEVEL,
     POINT_COLOURS,
     SAND,
-    SMALL,
     WATER,
     ZERO,
+    colour_of,
     earlier_grey,
-    mark,
-    open_up,
     prefix,
-    style,
     title_of,
 )
 
-if TYPE_CHECKING:
-    from matplotlib.axes import Axes
-
-_RANGE = "#E8E8E8"
 AXES = ("x", "y", "z")
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
+RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact")
+_SIZES = ("curvature", "bending_moment", "shear")  # quantities that are not below zero
+_ENDS = {"start": "#0072B2", "end": "#D55E00"}
+_PARTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7F7F7F")
 
 
-def plot_shape(
-    ax: Axes, result: Result, *, times: Numbers | None = None, view: Any = None, points: Numbers = ()
-) -> None:
+# ---- shape ----------------------------------------------------------------------------------------
+
+
+def shape(
+    result: Result,
+    *,
+    times: Numbers | None = None,
+    view: View | str | None = None,
+    points: Numbers = (),
+    most: int | None = None,
+) -> Panel:
     """The last shape, coloured by zones, over earlier ones and the area swept, in grey; the same scale both ways.
 
-    times: earlier times to show (s), else those whose shapes differ most.  view: None for the
-    plane of the largest extent, or two letters such as "xz".  points: arc lengths to mark (m).
+    times: earlier times to show (s), else those whose shapes differ most. view: None for the
+    plane of the largest extent, or two letters such as "xz". points: arc lengths to mark (m).
+    most: for a small drawing, so many points on a curve, and no area swept.
     A cable that is nearly straight is drawn with its deflection magnified, and says so.
     Seabed, water, what is attached and where the cable touches down: as the file has them.
     """
-    from matplotlib.collections import PolyCollection
-
     view = view_named(view) if isinstance(view, str) else view or views_of(result)[0]
-    position, last, s = result.position, result.position[-1], result.s
-    draw_sea(ax, view, result)
+    position = result.position
     earlier = telling_times(result) if times is None else np.asarray(times, dtype=float)
-    outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough to cover all
-    strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # there along one shape, back along the next
-    # Edges close the seams between strips; as pixels in a PDF, where each strip would weigh as much as a curve.
-    name = "range over time" * bool(np.ptp(position, axis=0).max() > STILL * np.ptp(position, axis=(0, 1)).max())
-    ax.add_collection(PolyCollection(list(strips), color=_RANGE, lw=0.4, zorder=0.4, rasterized=True, label=name))
-    for k, shape in enumerate(result.at(t=earlier, names=["position"])["position"]):
-        name = "_" * (k > 0) + "earlier shapes (later: darker)"
-        ax.plot(*view.project(shape), color=earlier_grey(k, len(earlier)), linewidth=0.7, zorder=1, label=name)
-    zones = whole_zones(result.zones[-1]) or [Zone("cable", float(s[0]), float(s[-1]))]
-    for zone in zones:
-        inside = s[(s > zone.s_a) & (s < zone.s_b)]
-        piece = place_along(np.array([zone.s_a, *inside, zone.s_b]), s, last)
-        ax.plot(*view.project(piece), color=KIND_COLOURS.get(zone.kind, INK), lw=2.0, zorder=3, label=zone.kind)
-    joints = np.array([z.s_b for z in zones[:-1]])
-    if len(joints):
-        ax.plot(*view.project(place_along(joints, s, last)), zorder=5, **mark("o", "white"), label="joint")
-    for k, marker in ((0, "s"), (-1, "^")):
-        ax.plot(*view.project(last[[k]]), zorder=4, **mark(marker), label="end" if k else "start")
-    if "attached" in result:
-        bodies = view.project(place_along(result["attached"], s, last))
-        ax.plot(*bodies, zorder=3.5, **mark("o", BODY) | {"markersize": 8}, label="float, clump, body")
-    if "touchdown_position" in result:
-        away = np.abs(result["touchdown"][-1] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own marks
-        places = view.project(result["touchdown_position"][-1][away])  # NaN, of a cable that hangs, is not away
-        ax.plot(*places, zorder=5, **mark("v", BED), label="touchdown" if away.any() else "_")
+    items = sea(result, view)
+    if most is None:
+        outputs = np.array(view.project(position[:: -1 - len(position) // 4000])).transpose(1, 2, 0)  # enough for all
+        strips = np.concatenate([outputs[:-1], outputs[1:, ::-1]], axis=1)  # along one shape, and back along the next
+        moves = np.ptp(position, axis=0).max() > STILL * np.ptp(position, axis=(0, 1)).max()
+        items.append(Area(strips, "#E8E8E8", "range over time" * bool(moves)))
+    chosen = even(len(result.s), most or len(result.s))
+    for k, then in enumerate(result.at(t=earlier, names=["position"])["position"]):
+        grey = earlier_grey(k, len(earlier))
+        items.append(Line(*view.project(then[chosen]), "earlier shapes (later: darker)" * (most is None), grey, 0.7))
+    items += cable(result, view, -1, joints=True)
     for k, point in enumerate(points):
-        ax.plot(*view.project(place_along(np.array([point]), s, last)), zorder=6, **_point(k), label="_")
+        at = view.project(_place(np.array([point]), result.s, position[-1]))
+        items.append(Marks(*at, "o", face=_colour(k), edge=_colour(k), size=3.0))
+    return framed(result, view, items, _at(result, -1))
+
+
+def framed(result: Result, view: View, items: list[Item], when: str = "") -> Panel:
+    """Items in the frame of a view: all outputs and what is near to them."""
     wider, taller = magnification(view, result)
     factors = zip((view.across_label.split(",")[0], view.up_label), (wider, taller), strict=True)
     stretch = "".join(f", {name} × {factor:g}" for name, factor in factors if factor > 1.0)
     above = "" if "z" in (view.across_label, view.up_label) else " from above"
-    style(ax, f"shape{above}{_at(result, -1)}{stretch}", f"{view.across_label} (m)", f"{view.up_label} (m)")
-    ax.update_datalim(extent_in(view, result).T)
-    ax.margins(0.06)
-    ax.set_aspect(taller / wider, adjustable="datalim")
+    box = extent_in(view, result)
+    margin = 0.06 * np.ptp(box, axis=1, keepdims=True) + (1e-6 * float(np.ptp(box)) or 0.5)
+    (left, right), (low, high) = (box + margin * [-1.0, 1.0]).tolist()
+    across, up = Axis(view.across_label, "m", left, right), Axis(view.up_label, "m", low, high)
+    size = " × ".join(f"{x:.4g}" for x in np.ptp(box, axis=1))
+    caption = f"{view.across_label} – {view.up_label}, {size} m{stretch}"
+    return Panel("shape", f"shape{above}{when}{stretch}", across, up, items, taller / wider, caption=caption)
 
 
-def plot_profiles(
-    ax: Axes, result: Result, names: str | Sequence[str], *, output: int = -1, times: Numbers = ()
-) -> None:
+def cable(result: Result, view: View, output: int, *, joints: bool = False) -> list[Item]:
+    """The cable at an output: its zones, its ends, what is attached, and where it touches down."""
+    s, position = result.s, result.position[output]
+    items, pieces = list[Item](), pieces_of(result, output)
+    for kind, where in pieces:
+        items.append(Line(*view.project(_place(where, s, position)), kind, colour_of(kind), 2.0))
+    if "attached" in result:
+        bodies = view.project(_place(result["attached"], s, position))
+        items.append(Marks(*bodies, "o", "float, clump, body", BODY, size=8.0))
+    items += [Marks(*view.project(position[[k]]), "s^"[k], ("start", "end")[k]) for k in (0, -1)]
+    if joints and len(pieces) > 1:
+        at = view.project(_place(np.array([where[-1] for _, where in pieces[:-1]]), s, position))
+        items.append(Marks(*at, "o", "joint", "#FFFFFF"))
+    if joints and "touchdown_position" in result:
+        away = np.abs(result["touchdown"][output] - s[[0, -1]]) > 0.005 * (s[-1] - s[0])  # the ends have their own
+        places = view.project(result["touchdown_position"][output][away])  # NaN, of a cable that hangs, is not away
+        items += [Marks(*places, "v", "touchdown", BED)] * bool(away.any())
+    return items
+
+
+def sea(result: Result, view: View) -> list[Item]:
+    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
+    bed, box = bed_in(view, result), extent_in(view, result)
+    middle, far = box.mean(axis=1), 30.0 * float(np.ptp(box, axis=1).max())  # more than any panel shows
+    x, deep = middle[0] + far * np.array([-1.0, 1.0]), middle[1] - far
+    top = int(np.argmax(view.project(result.position[-1])[1]))
+    aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
+    wet = "surface" in result and view.upright
+    planes = [(float(result["surface"]), 0.0, WATER, LEVEL, "still water", 2.0)] if wet else []
+    planes += [(*bed, SAND, BED, "seabed", -3.0)] if bed else []
+    items: list[Item] = []
+    for height, rise, fill, edge, name, lift in planes:
+        z, at = height + rise * x, float(box[0, aside])
+        corners = [(x[0], z[0]), (x[1], z[1]), (x[1], min(z[1], deep)), (x[0], min(z[0], deep))]
+        items += [Area(np.array([corners]), fill), Line(x, z, colour=edge, width=0.9)]
+        side, up = ("left", "right")[aside], "bottom" if lift > 0 else "top"
+        items.append(Text(at, height + rise * at, name, edge, (0.0, lift), side, up))
+    return items
+
+
+# ---- along the cable ------------------------------------------------------------------------------
+
+
+def profiles(
+    result: Result, names: str | Sequence[str], *, output: int = -1, times: Numbers = (), title: str = ""
+) -> Panel:
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
-    The zones of that output are shaded, and the estimated error is a band, if the file has one.  Further names after
-    the first are dashed, and left
-    out where nothing would be seen of them.  times: when else to show the first, in grey.
+    The zones of that output are shaded, and the estimated error is a band, if the file has one. Further names after
+    the first are dashed, and left out where nothing would be seen of them. times: when else to show the first, in grey.
     """
-    names = [names] if isinstance(names, str) else list(names)
-    for zone in result.zones[output]:
-        ax.axvspan(zone.s_a, zone.s_b, color=KIND_COLOURS.get(zone.kind, INK), alpha=0.10, linewidth=0, zorder=0)
-    ax.set_xlim(result.s[0], result.s[-1])
+    names, s = [names] if isinstance(names, str) else list(names), result.s
+    items: list[Item] = _zones_behind(result, output)
     drawn = [(name, _scalar(result, name)) for k, name in enumerate(names) if k == 0 or name in result]
     peak = float(np.abs(drawn[0][1]).max())
     drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(ZERO, 5e-3 * peak)]  # what can be seen
     peak = max(float(np.abs(v).max()) for _, v in drawn)
     factor, unit = prefix("m" if names[0] in AXES else result.units[names[0]], peak)
+    bottom: float | None = None
+    top: float | None = None
     for k, (name, values) in enumerate(drawn):
+        values = values * factor
         if len(values) > 1:
-            low, high = values.min(axis=0) * factor, values.max(axis=0) * factor
-            ax.fill_between(result.s, low, high, color=GREY, alpha=0.28 - 0.12 * k, linewidth=0, zorder=2)
-            usual = max(np.percentile(high, 90), values[output].max() * factor)
+            low, high = values.min(axis=0), values.max(axis=0)
+            items.append(Band(s, low, high, colour=GREY, opacity=0.28 - 0.12 * k))
+            usual = max(float(np.percentile(high, 90)), float(values[output].max()))
             if len(drawn) == 1 and 0.0 < 10.0 * usual < high.max():  # a spike would press all else to the ground
-                ax.set_ylim(low.min() - 0.1 * usual, 1.5 * usual)
-                spike = f"peak {high.max():.3g} {unit} at s = {result.s[high.argmax()]:.4g} m"
-                ax.text(0.03, 0.91, spike, transform=ax.transAxes, fontsize=SMALL, color=INK)
+                bottom, top = float(low.min()) - 0.1 * usual, 1.5 * usual
+                spike = f"peak {high.max():.3g} {unit} at s = {s[high.argmax()]:.4g} m"
+                items.append(Text(0.03, 0.91, spike, parts="xy"))
         for n, t in enumerate(times if k == 0 else ()):
             then = values[int(np.abs(result.times - t).argmin())]
-            ax.plot(result.s, then * factor, color=earlier_grey(n, len(times)), linewidth=0.7, zorder=2.5, label="_")
-        line: dict[str, Any] = {"color": INK, "linewidth": 1.3, "linestyle": (0, (4, 1.5)) if k else "-"}
-        ax.plot(result.s, values[output] * factor, zorder=3, label=title_of(name), **line)
+            items.append(Line(s, then, colour=earlier_grey(n, len(times)), width=0.7))
         error = error_of(result, name)
         if error is not None:
-            _band(ax, result.s, values[output] * factor, error[output] * factor, name)
+            items.append(_doubt(s, values[output], error[output] * factor, size=name in _SIZES))
+        items.append(Line(s, values[output], title_of(name), width=1.3, dash="dash" * bool(k)))
     short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
-    style(ax, (short if drawn[1:] else title_of(names[0])) + _at(result, output), "s (m)", f"{up} ({unit})")
-    if len(drawn) > 1:
-        ax.legend(fontsize=SMALL, frameon=False, handlelength=2.2)
-    open_up(ax, peak * factor)
+    title = title or (short if drawn[1:] else title_of(names[0])) + _at(result, output)
+    y = Axis(up, unit, bottom, top, peak * factor)
+    return Panel("-".join(names), title, _along(result), y, items, legend=len(drawn) > 1)
 
 
-def plot_history(
-    ax: Axes, result: Result, name: str, s: Numbers, *, component: int | None = None, legend: bool = True
-) -> None:
+def ranges(result: Result, shown: Kept) -> list[Panel]:
+    """Lowest, mean and highest value along the cable, over all outputs; with one output its profile."""
+    found = [name for name in RANGES if name in result and len(result.times)]
+    seen = [n for n in found if n in ("tension", "curvature") or np.abs(result[n]).max() > ZERO]  # else there is none
+    return [_range(result, name, shown) for name in seen]
+
+
+def _range(result: Result, name: str, shown: Kept) -> Panel:
+    values, s, several = result[name], result.s, len(result.times) > 1
+    factor, unit = prefix(result.units[name], float(np.abs(values).max()))
+    low, high = values.min(axis=0), values.max(axis=0)
+    items: list[Item] = []
+    error = error_of(result, name)
+    if error is not None:
+        outer = (values - error).min(axis=0), (values + error).max(axis=0)
+        below = np.maximum(outer[0], 0.0) if name in _SIZES else outer[0]
+        items.append(Band(s, below * factor, outer[1] * factor, "± error", DOUBT, 0.25))
+    if several:
+        items += [
+            Band(s, low * factor, high * factor, colour=GREY, opacity=0.22),
+            Line(s, high * factor, "highest", "#B84F04"),
+            Line(s, values.mean(axis=0) * factor, "mean", GREY, dash="dash"),
+            Line(s, low * factor, "lowest", "#2C72B6"),
+        ]
+    else:
+        items += _zones_behind(result, 0)
+    frames = values[np.ix_(shown.frames, shown.points)] * factor
+    items.append(Line(s[shown.points], frames[0], "now" * several, width=1.6, frames=frames if several else None))
+    if name == "curvature" and "min_bend_radius" in result:
+        items.append(Line(s, factor / result["min_bend_radius"], "allowed", ALARM, 1.6, "dot"))
+    title = title_of(name).replace("|", "")
+    label = title_of(name).replace("bending ", "").replace("contact ", "")
+    y = Axis(label, unit, peak=float(np.abs(values).max()) * factor)
+    return Panel(f"range-{name}", title, _along(result), y, items)
+
+
+def _along(result: Result) -> Axis:
+    return Axis("s", "m", float(result.s[0]), float(result.s[-1]))
+
+
+def _zones_behind(result: Result, output: int) -> list[Item]:
+    zones = whole_zones(result.zones[output])
+    return [Box((zone.s_a, zone.s_b), None, colour=colour_of(zone.kind)) for zone in zones]
+
+
+# ---- over time ------------------------------------------------------------------------------------
+
+
+def history(result: Result, name: str, s: Numbers, *, component: int | None = None, legend: bool = True) -> Panel:
     """A quantity over time at the arc lengths s (m).
 
     component: 0, 1, 2 for x, y, z of a vector, drawn as the change since the first output;
-    None for a scalar or the magnitude of a vector.  Dotted lines: the zones changed; bands: the estimated error.
+    None for a scalar or the magnitude of a vector. Dotted lines: the zones changed; bands: the estimated error.
     """
     if "s" not in result.dims(name):
         raise ResultError(f"'{name}' does not depend on s; plot it as result[{name!r}] over result.times")
     values = result.at(s=np.asarray(s, dtype=float), names=[name])[name]
     if component is not None:
         values = values[..., component] - values[0, ..., component]
-        label = f"Δ{'xyz'[component]}" if name == "position" else f"Δ{title_of(name)} {'xyz'[component]}"
+        label = f"Δ{AXES[component]}" if name == "position" else f"Δ{title_of(name)} {AXES[component]}"
+        title, caption = f"{label} since t = {result.times[0]:.4g} s", "Change since then, at the same points."
     else:
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
         label = title_of(name)
+        title, caption = f"{label} over time", "At some points of the cable."
     peak = float(np.abs(values).max())
     round_off = STILL * float(np.ptp(result.position, axis=(0, 1)).max()) if label.startswith("Δ") else 0.0
     factor, unit = prefix(result.units[name], max(peak, round_off))
+    error, items = error_of(result, name), list[Item]()
     for k, point in enumerate(s):
-        ax.plot(result.times, values[:, k] * factor, **_point(k), markevery=[-1], label=f"s = {point:.4g} m")
-    error = error_of(result, name)
+        if error is not None:
+            at = np.array([np.interp(point, result.s, row) for row in error])
+            size = component is None and name in _SIZES
+            items.append(_doubt(result.times, values[:, k] * factor, at * factor, size=size))
     for k, point in enumerate(s):
-        if error is None:
-            break
-        at = np.array([np.interp(point, result.s, row) for row in error])
-        _band(ax, result.times, values[:, k] * factor, at * factor, name if component is None else "")
+        width = max(1.8 - 0.4 * k, 1.0)  # later curves are thinner, so that coinciding ones all show
+        y, label_of = values[:, k] * factor, f"s = {point:.4g} m"
+        items.append(Line(result.times, y, label_of, _colour(k), width, symbol="o", last_only=True))
     changes = np.unique(result["zones/t"])[1:]
-    for k, t in enumerate(changes if len(changes) <= MOST_CHANGES else ()):
-        ax.axvline(t, color=GREY, lw=0.9, ls=":", zorder=1, label="_" * (k > 0) + "zones changed")  # one entry
-    title = f"{label} over time" if component is None else f"{label} since t = {result.times[0]:.4g} s"
-    style(ax, title, "t (s)", f"{label} ({unit})")
-    ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # room for the dots of the last shape
-    open_up(ax, peak * factor)
-    if peak < round_off:
-        ax.set_ylim(-round_off * factor, round_off * factor)
-    if legend:
-        ax.legend(fontsize=SMALL, framealpha=0.75, edgecolor="none", handlelength=1.2, borderpad=0.2)
+    if 0 < len(changes) <= MOST_CHANGES:
+        items.append(Rule("x", changes.tolist(), "zones changed"))
+    bound = round_off * factor if peak < round_off else None
+    up = Axis(label, unit, None if bound is None else -bound, bound, peak * factor)
+    key = name if component is None else "displacement" if name == "position" else f"{name}-{AXES[component]}"
+    return Panel(key, title, _time(result), up, items, legend=legend, caption=caption, cursor=True)
 
 
-def plot_touchdown(ax: Axes, result: Result) -> None:
+def end_forces(result: Result) -> Panel | None:
+    """Force at each end at every step, or where the file has none at every output."""
+    found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
+    for end in _ENDS:
+        if f"steps/end_force_{end}" in result and len(result["steps/t"]):
+            found[end] = (result["steps/t"], result[f"steps/end_force_{end}"])
+        elif f"reaction_{end}" in result:
+            found[end] = (result.times, np.linalg.norm(result[f"reaction_{end}"], axis=1))
+    peak = max((float(y.max()) for _, y in found.values()), default=0.0)
+    factor, unit = prefix("N", peak)
+    items: list[Item] = []
+    for end in found:
+        error = f"errors/total/end_force_{end}"
+        if error in result and f"reaction_{end}" in result:
+            middle = np.linalg.norm(result[f"reaction_{end}"], axis=1)
+            items.append(_doubt(result.times, middle * factor, result[error] * factor, size=True))
+    items += [Line(t, y * factor, f"at the {end}", _ENDS[end]) for end, (t, y) in found.items()]
+    y = Axis("force", unit, peak=peak * factor)
+    caption = "Force that holds or loads each end, at every step."
+    return Panel("pulls", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
+
+
+def touchdown(result: Result) -> Panel:
     """Between which arc lengths the cable lies on the seabed, over time: sand; nothing while it hangs free."""
-    edges, s = result["touchdown"], result.s
-    for k in free_edges(result):
-        ax.plot(result.times, edges[:, k], color=BED, linewidth=1.3, zorder=3, label=("first", "last")[k] + " contact")
-    style(ax, "touchdown over time", "t (s)", "s (m)")
-    ax.set_xlim(result.times[0], result.times[-1] + 0.025 * np.ptp(result.times))  # as the histories beside it
-    open_up(ax, float(s[-1]))
-    low, high = ax.get_ylim()
-    ax.fill_between(result.times, *edges.T, color=SAND, linewidth=0, zorder=0.2)
-    ax.set_ylim(low, high)
+    edges, s, free = result["touchdown"], result.s, free_edges(result)
+    named = zip(("first contact", "last contact"), edges.T, strict=True)
+    items: list[Item] = [Band(result.times, edges[:, 0], edges[:, 1], colour=SAND, opacity=1.0)]
+    items += [Line(result.times, y, name, BED) for k, (name, y) in enumerate(named) if k in free]
+    seen = edges[:, free][np.isfinite(edges[:, free])] if free else s[[0, -1]]
+    margin = 0.05 * float(np.ptp(seen)) or 0.05
+    y = Axis("s", "m", float(seen.min()) - margin, float(seen.max()) + margin, float(s[-1]))
+    caption = "Arc length where contact with the seabed begins or ends; a gap where nothing touches."
+    return Panel("touchdown", "touchdown over time", _time(result), y, items, caption=caption, cursor=True)
+
+
+def energy(result: Result, group: str) -> Panel | None:
+    """Where the energy is ("energy"), or where it came from ("work"), over time."""
+    title, caption = {
+        "energy": ("energy", "Change since the first output, of each kind and of all."),
+        "work": ("work", "Done on the cable since the start, by cause; below zero: taken out."),
+    }[group]
+    parts = energy_parts(result, group)
+    if not parts or len(result.times) < 2:
+        return None
+    total = np.sum(list(parts.values()), axis=0)
+    peak = max(float(np.abs(y).max()) for y in (*parts.values(), total))
+    factor, unit = prefix("J", peak)
+    seen = {name: y for name, y in parts.items() if np.abs(y).max() > 1e-4 * peak}
+    named = zip(seen.items(), cycle(_PARTS), strict=False)
+    items: list[Item] = [Line(result.times, y * factor, name, colour) for (name, y), colour in named]
+    items.append(Line(result.times, total * factor, "all", width=1.6, dash="dash"))
+    left = [name for name in parts if name not in seen]
+    if left:
+        caption += f" Too small to be seen: {', '.join(left)}."
+    y = Axis(group, unit, peak=peak * factor)
+    return Panel(group, title, _time(result), y, items, caption=caption, cursor=True)
+
+
+def energy_parts(result: Result, group: str) -> dict[str, np.ndarray]:
+    """Energies since the first output, or works, by name (nt,), J."""
+    if group not in result:
+        return {}
+    return {
+        name.replace("_", " "): result[f"{group}/{name}"] - (result[f"{group}/{name}"][0] if group == "energy" else 0.0)
+        for name in result[group]
+        if result.dims(f"{group}/{name}") == ("t",)
+    }
+
+
+def _time(result: Result) -> Axis:
+    first, last = float(result.times[0]), float(result.times[-1])
+    return Axis("t", "s", first, last + 0.025 * ((last - first) or 1.0))  # room for the dots of the last shape
+
+
+# ---- parts ----------------------------------------------------------------------------------------
 
 
 def error_of(result: Result, name: str) -> np.ndarray | None:
-    """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none.  Of x, y, z: of position."""
+    """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none. Of x, y, z: of position."""
     found = f"errors/total/{'position' if name in AXES else name}"
     return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
 
 
-def _band(ax: Axes, x: np.ndarray, values: np.ndarray, error: np.ndarray, name: str) -> None:
-    """The range in which the truth is estimated to lie; of sizes, not below zero."""
-    low, high = values - error, values + error
-    if name in ("curvature", "bending_moment"):
-        low = np.maximum(low, 0.0)
-    ax.fill_between(x, low, high, color=DOUBT, alpha=0.35, linewidth=0, zorder=2.8, label="estimated error")
+def _doubt(x: np.ndarray, values: np.ndarray, error: np.ndarray, *, size: bool) -> Band:
+    """The range in which the truth is estimated to lie; of a size, not below zero."""
+    low = np.maximum(values - error, 0.0) if size else values - error
+    return Band(x, low, values + error, "estimated error", DOUBT, 0.35)
 
 
-def place_along(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
+def _place(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
 
 
@@ -236,29 +384,5 @@ def _at(result: Result, output: int) -> str:
     return f" at t = {result.times[output]:.5g} s" if len(result.times) > 1 else ""
 
 
-def draw_sea(ax: Axes, view: View, result: Result) -> None:
-    """Water below its surface and sand below the bed, out to the rims of the panel, whatever these will be."""
-    from matplotlib.patches import Polygon
-
-    bed, box = bed_in(view, result), extent_in(view, result)
-    middle, far = box.mean(axis=1), 30.0 * float(np.ptp(box, axis=1).max())  # more than any panel shows
-    x, deep = middle[0] + far * np.array([-1.0, 1.0]), middle[1] - far
-    top = int(np.argmax(view.project(result.position[-1])[1]))
-    aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
-    wet = "surface" in result and view.upright
-    planes = [(float(result["surface"]), 0.0, WATER, LEVEL, "still water", 2)] if wet else []
-    planes += [(*bed, SAND, BED, "seabed", -3)] if bed else []
-    for n, (height, rise, fill, line, name, lift) in enumerate(planes):
-        z, at = height + rise * x, box[0, aside]
-        corners = [(x[0], z[0]), (x[1], z[1]), (x[1], min(z[1], deep)), (x[0], min(z[0], deep))]
-        ax.add_artist(Polygon(corners, facecolor=fill, edgecolor="none", zorder=0.1 + 0.1 * n))
-        ax.add_artist(Polygon(corners[:2], closed=False, edgecolor=line, linewidth=0.9, zorder=0.6))
-        ax.annotate(
-            name, (at, height + rise * at), (0, lift), textcoords="offset points", color=line, fontsize=SMALL,
-            ha=("left", "right")[aside], va="bottom" if lift > 0 else "top",
-        )  # fmt: skip
-
-
-def _point(k: int) -> dict[str, Any]:
-    width = max(1.8 - 0.5 * k, 0.8)  # later curves are thinner, so that coinciding ones all show
-    return {"color": POINT_COLOURS[k % len(POINT_COLOURS)], "linewidth": width, "marker": "o", "markersize": 3}
+def _colour(k: int) -> str:
+    return POINT_COLOURS[k % len(POINT_COLOURS)]

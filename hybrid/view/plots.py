@@ -1,7 +1,6 @@
-"""Draw a result: `plot_summary` makes one page of the panels in `panels`, arranged to suit the shape.
+"""Pages of a result: `plot_summary` arranges panels to suit the shape, `plot_zones` shows its zones over time.
 
-Plots read the file, through `read.Result`, and nothing else.  matplotlib is imported when
-something is drawn, and never pyplot: no window, no display, no state that outlives a call.
+Pages read the file, through `Result`, and nothing else. matplotlib is imported when something is drawn.
 """
 
 from __future__ import annotations
@@ -13,7 +12,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.store.reader import Result
-from hybrid.view.panels import plot_history, plot_profiles, plot_shape, plot_touchdown
+from hybrid.view.figure import Map, Page, Panel
+from hybrid.view.panels import history as over_time
+from hybrid.view.panels import profiles, shape, touchdown
 from hybrid.view.projections import (
     Numbers,
     aspect_of,
@@ -24,14 +25,12 @@ from hybrid.view.projections import (
     whole_zones,
 )
 from hybrid.view.save import save_figure
-from hybrid.view.style import legend_row, new_page
+from hybrid.view.style import NEWS
+from hybrid.view.summary import warnings_of
+from hybrid.view.zones import counted, share_of_rod, zone_map
 
 if TYPE_CHECKING:
-    from matplotlib.axes import Axes
     from matplotlib.figure import Figure
-
-_ENTRIES = 8  # of a legend, in a row
-
 
 # Pages for one view and for two: panels, widths of columns, heights of rows, and the width over height that these
 # leave for a shape.  s, S: views; p, P: profiles along s; h, H: histories (statics: more profiles).  Where the cable
@@ -69,43 +68,83 @@ def plot_summary(
     """One page: shape, tension and moment along the cable, and histories at some points.
 
     path: where to save it, as .png, .pdf or .svg; a file that hybrid did not make is replaced only with
-    overwrite.  times: which earlier shapes (s).  history:
+    overwrite. times: which earlier shapes (s). history:
     which arc lengths to follow (m); else those recorded as `history`, else the middle and
-    the ends that move.  A static result shows curvature and tangent in place of histories; a
+    the ends that move. A static result shows curvature and tangent in place of histories; a
     cable that touches a seabed also shows the force of contact and, over time, where it does.
     """
-    earlier = telling_times(result) if times is None else np.sort(np.asarray(times, dtype=float))
-    figure, foot = new_page(result, _facts(result, earlier))
+    from hybrid.view.matplotlib_backend import draw_page
+
+    return save_figure(draw_page(_summary(result, times, history)), path, overwrite=overwrite)
+
+
+def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: bool = False) -> Figure:
+    """One page: the zones along s over time, rods by their curvature and catenaries by their tension, and the share
+    of rod.
+
+    path: where to save it, as .png, .pdf or .svg (see plot_summary). Also drawn, where the file has them: where the
+    cable touches down, what is attached to it, and where zones were split, merged or a step retried.
+    """
+    from hybrid.view.matplotlib_backend import draw_page
+
+    more: dict[str, Any] = {}
     if len(result.times):
-        views, lies = views_of(result), touches_bed(result)
-        pages = (_ONE_VIEW_BED, _TWO_VIEWS_BED) if lies else (_ONE_VIEW, _TWO_VIEWS)
-        drawn = aspect_of(views, result)
-        panels, widths, heights, _ = min(pages[len(views) - 1], key=lambda page: abs(math.log(page[3] / drawn)))
-        axes = figure.subplot_mosaic(panels, width_ratios=widths, height_ratios=heights)
-        points = history_points(result, history) if len(result.times) > 1 else np.zeros(0)
-        for name, view in zip("sS", views, strict=False):
-            plot_shape(axes[name], result, times=earlier, view=view, points=points)
-        bent = "bending_moment" in result and not set(result["zones/kind"]) <= {"catenary"}
-        profiles: list[Any] = ["tension", ("bending_moment", "torque")] if bent else ["tension"]
-        angles = ("theta", "phi") if len(views) > 1 else ("theta" if views[0].up_label == "z" else "phi",)
-        profiles += [n for n in ("curvature", *angles) if n in result]
-        profiles += [views[-1].up_label.replace("across", "z"), "x", "y"]
-        profiles[2:2] = ["contact"] * lies
-        along, over = ("pPc", "hTH") if lies else ("pP", "hH")
-        for name, quantity in zip(along if len(points) else along + over, profiles, strict=False):
-            plot_profiles(axes[name], result, quantity, times=earlier if quantity == "contact" else ())
-        if len(points):
-            plot_history(axes["h"], result, "tension", points, legend=False)
-            moves = np.ptp(result.at(s=points, names=["position"])["position"], axis=0).max(axis=0)
-            plot_history(axes["H"], result, "position", points, component=int(moves.argmax()), legend=False)
-        if len(points) and lies:
-            plot_touchdown(axes["T"], result)
-        for upper, lower in zip(along + over, along[1:] + " " + over[1:] + " ", strict=True):
-            if lower in axes and axes[upper].get_position().x0 == axes[lower].get_position().x0:  # one axis of s or t
-                axes[upper].set_xlabel("")
-                axes[upper].tick_params(labelbottom=False)
-        _legends(figure, axes["s"], axes["h"] if len(points) else None, foot)
-    return save_figure(figure, path, overwrite=overwrite)
+        zones = zone_map(result)
+        rows = [["map", item.name] for item in zones.items if isinstance(item, Map)] or [["map", "."]]
+        more = {"panels": {"map": zones, "share": share_of_rod(result)}, "mosaic": [*rows, ["share", "."]]}
+        more |= {"widths": [1.0, 0.022], "legend": ["map"]}
+        more["heights"] = [*(3.0 / len(rows) for _ in rows), 0.8]
+    return save_figure(draw_page(page_of(result, [counted(result)], **more)), path, overwrite=overwrite)
+
+
+def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> Page:
+    earlier = telling_times(result) if times is None else np.sort(np.asarray(times, dtype=float))
+    if not len(result.times):
+        return page_of(result, _facts(result, earlier))
+    views, lies = views_of(result), touches_bed(result)
+    pages, drawn = (_ONE_VIEW_BED, _TWO_VIEWS_BED) if lies else (_ONE_VIEW, _TWO_VIEWS), aspect_of(views, result)
+    mosaic, widths, heights, _ = min(pages[len(views) - 1], key=lambda page: abs(math.log(page[3] / drawn)))
+    points = history_points(result, history) if len(result.times) > 1 else np.zeros(0)
+    panels: dict[str, Panel] = {
+        name: shape(result, times=earlier, view=view, points=points) for name, view in zip("sS", views, strict=False)
+    }
+    bent = "bending_moment" in result and not set(result["zones/kind"]) <= {"catenary"}
+    names: list[Any] = ["tension", ("bending_moment", "torque")] if bent else ["tension"]
+    angles = ("theta", "phi") if len(views) > 1 else ("theta" if views[0].up_label == "z" else "phi",)
+    names += [n for n in ("curvature", *angles) if n in result]
+    names += [views[-1].up_label.replace("across", "z"), "x", "y"]
+    names[2:2] = ["contact"] * lies
+    along, over = ("pPc", "hTH") if lies else ("pP", "hH")
+    for key, quantity in zip(along if len(points) else along + over, names, strict=False):
+        panels[key] = profiles(result, quantity, times=earlier if quantity == "contact" else ())
+    if len(points):
+        moves = np.ptp(result.at(s=points, names=["position"])["position"], axis=0).max(axis=0)
+        panels["h"] = over_time(result, "tension", points)
+        panels["H"] = over_time(result, "position", points, component=int(moves.argmax()), legend=False)
+        panels |= {"T": touchdown(result)} if lies else {}
+    legend = ["s", "h"] if len(points) else ["s"]
+    look = {"mosaic": mosaic, "widths": widths, "heights": heights, "legend": legend}
+    return page_of(result, _facts(result, earlier), panels=panels, **look)
+
+
+def page_of(result: Result, facts: list[str], **more: Any) -> Page:
+    """A page about a result: title and facts above the panels, warnings below."""
+    n, complete = len(result.times), result.status == "complete"
+    head = [] if complete else [result.status_text]
+    if n:
+        span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
+        head.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
+    found = warnings_of(result)
+    alarms = [(event, count) for event, count in found if event.kind not in NEWS]
+    note = "; ".join(dict.fromkeys(event.text for event, _ in (alarms[:1] or found)))
+    if alarms:
+        names = ", ".join(event.kind + f" (× {count})" * (count > 1) for event, count in alarms)
+        note = f"Warning: {names}; at t = {alarms[0][0].t:.4g} s: {note}"
+    elif found:
+        note = f"Note: {note}"
+    texts = "; ".join(filter(None, [*head, *facts]))
+    empty = "" if n else "no output was saved"
+    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(alarms)), empty=empty, **more)
 
 
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:
@@ -119,11 +158,3 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
     if len(earlier):
         facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
     return facts
-
-
-def _legends(figure: Figure, shape: Axes, history: Axes | None, foot: float) -> None:
-    """Two rows below the panels: what the shape shows, and under it what is left of that, and the histories."""
-    shown = [dict(zip(*ax.get_legend_handles_labels()[::-1], strict=True)) for ax in (shape, history) if ax]
-    first, rest = list(shown[0].items()), [entry for more in shown[1:] for entry in more.items()]
-    for row, y in ((first[:_ENTRIES], foot + 0.0275), ([*first[_ENTRIES:], *rest][:_ENTRIES], foot + 0.0025)):
-        legend_row(figure, y, row)

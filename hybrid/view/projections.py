@@ -80,6 +80,13 @@ def whole_zones(zones: list[Zone]) -> list[Zone]:
     return whole
 
 
+def pieces_of(result: Result, output: int) -> list[tuple[str, np.ndarray]]:
+    """Kinds of the zones at an output, and arc lengths along each (m): its ends and the points of the grid in it."""
+    s = result.s
+    zones = whole_zones(result.zones[output]) or [Zone("cable", float(s[0]), float(s[-1]))]
+    return [(kind, np.array([s_a, *s[(s > s_a) & (s < s_b)], s_b])) for kind, s_a, s_b in zones]
+
+
 def touches_bed(result: Result) -> bool:
     """Whether the cable ever touches a seabed."""
     return "contact" in result and "touchdown" in result and bool(np.isfinite(result["touchdown"]).any())

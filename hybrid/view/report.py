@@ -10,6 +10,7 @@ from __future__ import annotations
 import gzip
 import re
 from base64 import b64encode
+from collections.abc import Sequence
 from html import escape
 from importlib.resources import files
 from pathlib import Path
@@ -19,13 +20,16 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.decimate import MOST_ON_CURVE, Kept, Store, kept, script_json
-from hybrid.view.figures import energy, energy_parts, histories, ranges
+from hybrid.view.figure import Map, Panel
 from hybrid.view.notebook_card import picture
+from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges, touchdown
+from hybrid.view.plotly_backend import figure_of
+from hybrid.view.projections import free_edges, history_points
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.scenery import scenery
 from hybrid.view.style import prefix
 from hybrid.view.summary import CAUSES, Fact, amount, attention, facts_of, length_of, short
-from hybrid.view.zone_map import event_rows, shares, zone_map
+from hybrid.view.zones import event_rows, shares, zone_map
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
 
@@ -44,20 +48,11 @@ def html(result: Result) -> str:
     facts, store = facts_of(result), Store()
     shown = kept(result, [fact.t for fact in facts])
     scene = scenery(result, store, shown)
-    groups = {
-        "zones": zone_map(result, store, shown),
-        "histories": histories(result, store),
-        "ranges": ranges(result, store, shown),
-        "energy": energy(result, store),
-    }
-    numbered = {name: [] for name in groups}  # type: dict[str, list[tuple[int, dict[str, Any]]]]
-    figures: list[dict[str, Any]] = []
-    for name, group in groups.items():
-        for figure in group:
-            numbered[name].append((len(figures), figure))
-            figures.append(figure)
-    kept_keys = ("data", "layout", "cursor", "now", "bars")
-    index = {"scene": scene or None, "figures": [{k: f[k] for k in kept_keys if k in f} for f in figures]}
+    panels = _panels(result, shown)
+    figures = [figure_of(panel, store) for group in panels.values() for panel in group]
+    index = {"scene": scene or None, "figures": figures}
+    numbers = iter(range(len(figures)))
+    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in panels.items()}
     several = len(result.times) > 1
     parts = {
         "title": escape(result.title or "(no title)"),
@@ -78,12 +73,34 @@ def html(result: Result) -> str:
         "css": _file("report.css"),
         "js": _file("report.js"),
     }
-    # In one pass: nothing that is put in is looked at again.
-    return re.sub(r"\{\{(\w+)\}\}", lambda m: parts[m[1]], _file("report.html"))
+    return _filled("report.html", parts)
+
+
+def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
+    """The graphs of a page, by its sections."""
+    along = ranges(result, shown)
+    if len(result.times) < 2:
+        return {"zones": [], "histories": [], "ranges": along, "energy": []}
+    points = history_points(result, None)
+    moves = np.ptp(result.at(s=points, names=["position"])["position"], axis=0).max(axis=0)
+    over = [end_forces(result), history(result, "tension", points)]
+    over.append(history(result, "position", points, component=int(moves.argmax())))
+    over += [touchdown(result)] if free_edges(result) else []
+    return {
+        "zones": [zone_map(result, shown)] if any(result.zones) else [],
+        "histories": [panel for panel in over if panel],
+        "ranges": along,
+        "energy": [panel for panel in (energy(result, "energy"), energy(result, "work")) if panel],
+    }
 
 
 def _file(name: str) -> str:
     return (files("hybrid.view") / "page" / name).read_text(encoding="utf-8")
+
+
+def _filled(name: str, parts: dict[str, str]) -> str:
+    """A template with its parts, put in in one pass: nothing that is put in is looked at again."""
+    return re.sub(r"\{\{(\w+)\}\}", lambda m: parts[m[1]], _file(name))
 
 
 def _plotly() -> str:
@@ -141,61 +158,48 @@ def _facts(facts: list[Fact], several: bool) -> str:
 
 
 def _error_table(fact: Fact) -> str:
-    head = "".join(f'<th class="number">{name}</th>' for name in CAUSES.values())
-    rows = ""
+    rows = []
     for what, name, unit in (("position", "position", "m"), ("end_force", "end forces", "N")):
         cells = [fact.values.get(f"{cause}_{what}") for cause in CAUSES]
         factor, written = prefix(unit, max((x for x in cells if x is not None), default=0.0))
-        said = (f'<td class="number">{"–" if x is None else short(x * factor, 2)}</td>' for x in cells)
-        rows += f"<tr><td>{name} ({written})</td>{''.join(said)}</tr>"
-    return f'<div class="scroll"><table><tr><th>largest error by</th>{head}</tr>{rows}</table></div>'
+        rows.append([f"{name} ({written})", *("–" if x is None else short(x * factor, 2) for x in cells)])
+    return _table(rows, ["largest error by", *CAUSES.values()], numbers=len(CAUSES))
+
+
+def _table(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0) -> str:
+    """A table of texts, which are escaped; numbers: so many columns, the last, hold numbers."""
+
+    def row(cells: Sequence[str], tag: str) -> str:
+        looks = [""] * (len(cells) - numbers) + [' class="number"'] * numbers
+        return f"<tr>{''.join(f'<{tag}{look}>{escape(x)}</{tag}>' for x, look in zip(cells, looks, strict=True))}</tr>"
+
+    lines = row(head, "th") * bool(head) + "".join(row(cells, "td") for cells in rows)
+    return f'<div class="scroll"><table>{lines}</table></div>'
 
 
 def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
-    colours = "".join(
-        f'<button type="button" value="{k}" aria-pressed="{str(k == 0).lower()}">{escape(c["key"])}</button>'
-        for k, c in enumerate(scene["colours"])
-    )
-    colour = (
-        '<div><span class="quiet" id="by">colour</span><div class="switch" id="colour" role="group" '
-        f'aria-labelledby="by">{colours}</div></div>'
-    )
-    axes = (
-        '<div><span class="quiet" id="axes-by">axes</span><div class="switch" id="axes" role="group" '
-        'aria-labelledby="axes-by"><button type="button" value="equal" aria-pressed="true">equal</button>'
-        '<button type="button" value="stretched" aria-pressed="false">stretched</button></div></div>'
-    )
-    time = ""
-    if len(shown.frames) > 1:
-        usual = scene["speed"]
-        options = "".join(
-            f'<option value="{x:g}"{" selected" if x == usual else ""}>{x:g} × real time</option>'
-            for x in sorted({*_SPEEDS, usual})
-        )
-        time = (
-            '<div class="time"><button type="button" id="play" aria-pressed="false">Play</button>'
-            '<input type="range" id="time" min="0" max="0" value="0" step="1" aria-label="time">'
-            '<output id="now" for="time"></output>'
-            f'<select id="pace" aria-label="speed">{options}</select></div>'
-        )
-    notice = f'<p class="quiet" id="thinned">{escape(shown.notice)}</p>' if shown.notice else ""
-    poster = picture(result).replace("<svg ", '<svg class="poster" ', 1)
-    hint = (
-        "Drag to turn, pinch or scroll to zoom." if time else "Drag to turn, pinch or scroll to zoom; a static result."
-    )
-    return (
-        f'<section id="cable"><h2>The cable</h2><div class="controls">{colour}{axes}</div>'
-        f'<div class="plot" id="cable-plot">{poster}</div>{time}<div class="legend" id="cable-legend"></div>'
-        f'<p class="quiet"><span id="cable-said"></span> {hint}</p>{notice}'
-        "<noscript><p>The pictures need JavaScript; the texts do not.</p></noscript></section>"
-    )
+    moves, usual = len(shown.frames) > 1, scene["speed"]
+    speeds = sorted({*_SPEEDS, usual})
+    buttons = [
+        f'<button type="button" value="{k}" aria-pressed="{"false" if k else "true"}">{escape(colour["key"])}</button>'
+        for k, colour in enumerate(scene["colours"])
+    ]
+    options = [f'<option value="{x:g}"{" selected" * (x == usual)}>{x:g} × real time</option>' for x in speeds]
+    parts = {
+        "colours": "".join(buttons),
+        "poster": picture(result).replace("<svg ", '<svg class="poster" ', 1),
+        "time": _filled("time.html", {"speeds": "".join(options)}) if moves else "",
+        "static": "" if moves else "; a static result",
+        "notice": f'<p class="quiet" id="thinned">{escape(shown.notice)}</p>' if shown.notice else "",
+    }
+    return _filled("cable.html", parts)
 
 
-def _graphs(result: Result, groups: dict[str, list[tuple[int, dict[str, Any]]]], several: bool) -> str:
+def _graphs(result: Result, groups: dict[str, list[tuple[int, Panel]]], several: bool) -> str:
     out = ""
     if groups["zones"]:
         out += f'<section id="zones"><h2>Zones over time</h2><p class="quiet">{escape(shares(result))} '
-        out += "".join(f"{escape(f['said'])}</p>{_plot(k, f)}" for k, f in groups["zones"]) + "</section>"
+        out += "".join(f"{escape(f.caption)}</p>{_plot(k, f)}" for k, f in groups["zones"]) + "</section>"
     if groups["histories"]:
         figures = "".join(_figure(k, f) for k, f in groups["histories"])
         bands = any("errors/total" in name for name in result.names)
@@ -215,15 +219,16 @@ def _graphs(result: Result, groups: dict[str, list[tuple[int, dict[str, Any]]]],
     return out
 
 
-def _figure(k: int, figure: dict[str, Any]) -> str:
-    said = f"<figcaption>{escape(figure['said'])}</figcaption>" if figure["said"] else ""
-    return f"<figure><h3>{escape(figure['title'])}</h3>{said}{_plot(k, figure)}</figure>"
+def _figure(k: int, panel: Panel) -> str:
+    said = f"<figcaption>{escape(panel.caption)}</figcaption>" if panel.caption else ""
+    return f"<figure><h3>{escape(panel.title[:1].upper() + panel.title[1:])}</h3>{said}{_plot(k, panel)}</figure>"
 
 
-def _plot(k: int, figure: dict[str, Any]) -> str:
-    bars = f'<div class="legend" data-bars="{k}"></div>' if figure.get("bars") else ""
-    tall = " tall" if figure.get("tall") else ""
-    return f'{bars}<div class="plot{tall}" id="plot-{figure["key"]}" data-figure="{k}"></div>'
+def _plot(k: int, panel: Panel) -> str:
+    """The place of a graph; a map is taller, with its colour bars above."""
+    maps = any(isinstance(item, Map) for item in panel.items)
+    bars = f'<div class="legend" data-bars="{k}"></div>' if maps else ""
+    return f'{bars}<div class="plot{" tall" * maps}" id="plot-{panel.key}" data-figure="{k}"></div>'
 
 
 def _events(result: Result, several: bool) -> str:
@@ -247,7 +252,7 @@ def _events(result: Result, several: bool) -> str:
     )
 
 
-def _energy(result: Result, figures: list[tuple[int, dict[str, Any]]]) -> str:
+def _energy(result: Result, figures: list[tuple[int, Panel]]) -> str:
     if not len(result.times):
         return ""
     energies, works = energy_parts(result, "energy"), energy_parts(result, "work")
@@ -262,18 +267,16 @@ def _energy(result: Result, figures: list[tuple[int, dict[str, Any]]]) -> str:
     if not rows:
         return '<section id="energy"><h2>Energy</h2><p class="quiet">No energies were recorded.</p></section>'
     peak = max((abs(y) for _, _, y in rows), default=0.0)
-    cells = "".join(
-        f'<tr><td>{group if name[:4] != "all " else ""}</td><td>{escape(name)}</td><td class="number">'
-        f"{escape(amount(y, 'J') if abs(y) > 1e-12 * peak else '0')}</td></tr>"
+    cells = [
+        ["" if name.startswith("all ") else group, name, amount(y, "J") if abs(y) > 1e-12 * peak else "0"]
         for group, name, y in rows
-    )
+    ]
     graphs = f'<div class="grid">{"".join(_figure(k, f) for k, f in figures)}</div>' if figures else ""
-    open_ = "" if figures else " open"
     note = "The last line of work, “scheme”, is what no work accounts for: the time scheme's own." if works else ""
     return (
-        f'<section id="energy"><h2>Energy</h2>{graphs}<details{open_}><summary>The ledger at the last output</summary>'
-        f'<p class="quiet">{note}</p><div class="scroll"><table><tr><th></th><th>of</th><th class="number">J</th></tr>'
-        f"{cells}</table></div></details></section>"
+        f'<section id="energy"><h2>Energy</h2>{graphs}<details{"" if figures else " open"}><summary>The energy balance '
+        f'at the last output</summary><p class="quiet">{note}</p>{_table(cells, ["", "of", "J"], 1)}'
+        "</details></section>"
     )
 
 
@@ -296,10 +299,8 @@ def _settings(result: Result) -> str:
         low, high = f"{dt.min():.4g}", f"{dt.max():.4g}"
         rows.append(("steps", f"{len(dt)}, of {low} s" if low == high else f"{len(dt)}, of {low} to {high} s"))
     rows += [("version of " + name, version) for name, version in result.versions.items()]
-    cells = "".join(f"<tr><td>{escape(name)}</td><td>{escape(str(value))}</td></tr>" for name, value in rows)
-    return (
-        f'<details><summary>Settings and versions</summary><div class="scroll"><table>{cells}</table></div></details>'
-    )
+    cells = [[name, str(value)] for name, value in rows]
+    return f"<details><summary>Settings and versions</summary>{_table(cells)}</details>"
 
 
 def _footer() -> str:

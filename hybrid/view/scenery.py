@@ -11,14 +11,13 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
-from hybrid.view.figures import colour_scale
+from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.projections import STILL
-from hybrid.view.style import BED, BODY, INK, KIND_COLOURS, LEVEL, SAND, WATER, prefix
-from hybrid.view.zone_plot import COLOURS
+from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, WATER, colour_of, prefix
+from hybrid.view.zones import COLOURS, span_of
 
 # Pale shades would be lost on white: of nine, those from here on.
 _FROM_SHADE = 2
-_SPAN, _DECADES = 10.0, 2.0  # a curvature that varies by more is shown by its logarithm, over so many decades at most
 _THIN = 0.12  # of the largest extent: the least depth of the box around a flat cable, so that planes in it are seen
 _OPEN = 0.45  # of the largest extent: what a thin direction is opened to where axes are stretched
 _NEAR = 1.0  # of the largest extent: a seabed or a surface farther from the cable is not drawn
@@ -70,8 +69,8 @@ def _colours(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
     out: list[dict[str, Any]] = []
     if kinds:
         of = np.array([_kinds(result.zones[i], kinds, result.s[shown.points]) for i in shown.frames])
-        steps = [[(k + d) / len(kinds), KIND_COLOURS.get(kind, INK)] for k, kind in enumerate(kinds) for d in (0, 1)]
-        legend = [[kind, KIND_COLOURS.get(kind, INK)] for kind in kinds]
+        steps = [[(k + d) / len(kinds), colour_of(kind)] for k, kind in enumerate(kinds) for d in (0, 1)]
+        legend = [[kind, colour_of(kind)] for kind in kinds]
         out.append(
             {"key": "zone", "label": "zone", "values": store.add(of, "u1"), "scale": steps, "legend": legend}
             | {"low": -0.5, "high": len(kinds) - 0.5}
@@ -97,22 +96,6 @@ def _kinds(zones: list[Any], kinds: list[str], s: np.ndarray) -> np.ndarray:
     return order[np.searchsorted(ends + 1e-9 * s[-1], s)] if len(order) else np.zeros(len(s), int)
 
 
-def span_of(values: np.ndarray, *, bends: bool, straight: float = 0.0) -> tuple[float, float, bool]:
-    """From where to where colours run, and whether by the logarithm: bends that span much; tension from zero."""
-    seen = values[np.isfinite(values)]
-    if not len(seen):
-        return 0.0, 1.0, False
-    low, high = float(seen.min()), float(seen.max())
-    if bends:
-        if high <= straight:
-            return 0.0, straight or 1.0, False
-        usual = float(np.percentile(seen, 5))
-        return (max(usual, 10.0**-_DECADES * high), high, True) if usual < high / _SPAN else (0.0, high, False)
-    low = 0.0 if 0.0 < low < 0.5 * high else low
-    least = 1e-3 * max(abs(low), abs(high)) or 1.0  # less would show round-off
-    return low, max(high, low + least), False
-
-
 # ---- what is on the cable, and around it ----------------------------------------------------------
 
 
@@ -120,21 +103,15 @@ def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
     """Points that move with the cable: its ends, what is attached, touchdown."""
     s, position = result.s, result.position[shown.frames]
 
-    def at(where: np.ndarray) -> np.ndarray:
-        """Positions (nf, n, 3) at arc lengths, between grid points."""
-        k = np.clip(np.searchsorted(s, where), 1, len(s) - 1)
-        p = ((where - s[k - 1]) / (s[k] - s[k - 1]))[:, None]
-        return np.asarray(position[:, k - 1] * (1 - p) + position[:, k] * p)
-
     def mark(name: str, places: np.ndarray, symbol: str, colour: str, size: float) -> dict[str, Any]:
-        moves = places.transpose(2, 0, 1)
-        return {"name": name, "symbol": symbol, "colour": colour, "size": size} | {
-            axis: store.add(moves[k]) for k, axis in enumerate("xyz")
-        }
+        moves = {axis: store.add(places[..., k]) for k, axis in enumerate("xyz")}
+        return {"name": name, "symbol": symbol, "colour": colour, "size": size} | moves
 
     marks = [mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 5)]
     if "attached" in result and len(s) > 1:
-        marks.append(mark("float, clump, body", at(result["attached"]), "circle", BODY, 8))
+        where = np.clip(result["attached"], s[0], s[-1])  # output points may cover a part of the cable
+        places = result.at(s=where, names=["position"])["position"][shown.frames]
+        marks.append(mark("float, clump, body", places, "circle", BODY, 8))
     if "touchdown_position" in result:
         places, edges = result["touchdown_position"][shown.frames].copy(), result["touchdown"][shown.frames]
         places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
@@ -146,16 +123,13 @@ def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
 def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
     """Seabed and still water; the box (2, 3) grows to hold those that are near."""
     size = float(np.ptp(box, axis=0).max()) or 1.0
-    planes = []
-    if "seabed" in result:
-        *normal, offset = result["seabed"].tolist()
-        planes.append({"name": "seabed", "normal": normal, "offset": offset, "fill": SAND, "line": BED, "solid": 0.85})
+    found = [("seabed", result["seabed"].tolist(), SAND, BED, 0.85)] if "seabed" in result else []
     if "surface" in result:
-        surface = float(result["surface"])
-        planes.append(
-            {"name": "still water", "normal": [0.0, 0.0, 1.0], "offset": surface, "fill": WATER}
-            | {"line": LEVEL, "solid": 0.45}
-        )
+        found.append(("still water", [0.0, 0.0, 1.0, float(result["surface"])], WATER, LEVEL, 0.45))
+    planes: list[dict[str, Any]] = [
+        {"name": name, "normal": plane[:3], "offset": plane[3], "fill": fill, "line": line, "solid": solid}
+        for name, plane, fill, line, solid in found
+    ]
     for plane in planes:
         normal, offset = plane["normal"], plane["offset"]
         corners = [(offset - normal[0] * x - normal[1] * y) / normal[2] for x in box[:, 0] for y in box[:, 1]]
@@ -163,10 +137,9 @@ def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
         gap = max(box[0, 2] - high, low - box[1, 2], 0.0)
         plane["far"] = gap > _NEAR * size
         plane["text"] = f"{plane['name']} at z = {offset / normal[2]:.4g} m"
-    for plane in (x for x in planes if not x["far"]):
-        level = plane["offset"] / plane["normal"][2] if plane["normal"][:2] == [0.0, 0.0] else None
-        if level is not None:
-            box[:, 2] = min(box[0, 2], level), max(box[1, 2], level)
+    for plane in (x for x in planes if not x["far"] and x["normal"][:2] == [0.0, 0.0]):
+        level = plane["offset"] / plane["normal"][2]
+        box[:, 2] = min(box[0, 2], level), max(box[1, 2], level)
     return planes
 
 

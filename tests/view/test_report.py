@@ -129,7 +129,7 @@ def test_a_map_of_many_events_says_that_it_marks_the_worst() -> None:
     page = html(reported(events=events))
     assert "Of 2000 events the 600 that matter most are marked." in page and "1600 more are in the result file" in page
     marks = {t["name"]: t for f in index_of(page)["figures"] for t in f["data"] if t.get("mode") == "markers"}
-    assert len(marks["warning"]["x"]) == 20 and len(marks["change of zones"]["x"]) == 580
+    assert len(marks["warning"]["x"]) == 20 and len(marks["grow"]["x"]) == 580
 
 
 def test_thinning_keeps_ends_peaks_and_asked_moments() -> None:
@@ -137,6 +137,10 @@ def test_thinning_keeps_ends_peaks_and_asked_moments() -> None:
     y[77_777], y[22_222] = 5.0, -7.0
     k = outline(y, 400)
     assert len(k) <= 402 and {0, 100_000, 77_777, 22_222} <= set(k.tolist()) and (np.diff(k) > 0).all()
+    y[40_000:40_003] = np.nan  # a short gap stays one, with its rims, and hides no peak beside it
+    y[40_010] = 9.0
+    k = outline(y, 400)
+    assert len(k) <= 408 and {39_999, 40_000, 40_002, 40_003, 40_010} <= set(k.tolist())
     shown = kept(reported(outputs=1501, points=301), [3.215, None])
     assert {0, 1500} <= set(shown.frames.tolist()) and shown.points[[0, -1]].tolist() == [0, 300]
     assert 482 in shown.frames.tolist()  # t = 3.2133 s, the output nearest to 3.215 s

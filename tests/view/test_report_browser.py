@@ -151,7 +151,7 @@ def test_play_moves_time_and_stops_again(visit: Visit) -> None:
 
 def test_pointing_at_an_event_shows_what_happened(visit: Visit) -> None:
     visit.shown("#plot-zones")
-    for name, words in (("change of zones", "bend 1.05 > 1 at s = 49 to 51 m"), ("warning", "a <b>blow</b>")):
+    for name, words in (("split", "bend 1.05 > 1 at s = 49 to 51 m"), ("warning", "a <b>blow</b>")):
         place = """name => {
             const plot = document.getElementById('plot-zones'), box = plot.getBoundingClientRect();
             const trace = plot.data.find(t => t.name === name), {xaxis, yaxis} = plot._fullLayout;

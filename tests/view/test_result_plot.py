@@ -24,6 +24,7 @@ from hybrid.view import panels
 from hybrid.view import plots as plot
 from hybrid.view import projections as views
 from hybrid.view import style as look
+from hybrid.view.matplotlib_backend import draw_panel
 
 MIXED = [("catenary", 0.0, 75.0), ("rod", 75.0, 100.0)]
 
@@ -194,7 +195,7 @@ def test_a_catenary_shows_its_curvature_in_place_of_a_moment() -> None:
 
 def test_a_passing_spike_does_not_press_the_rest_to_the_ground() -> None:
     ax = Figure().subplots()
-    panels.plot_profiles(ax, made(sag, curvature=5.0), "curvature")
+    draw_panel(panels.profiles(made(sag, curvature=5.0), "curvature"), ax)
     assert 2e-3 < ax.get_ylim()[1] < 0.01 and ax.get_ylim()[0] > -0.01
     assert [t.get_text() for t in ax.texts] == ["peak 5 1/m at s = 97.5 m"]
 
@@ -223,8 +224,8 @@ def test_earlier_shapes_show_the_motion() -> None:
 
 def test_the_area_that_was_swept_is_shaded() -> None:
     ax = Figure().subplots()
-    panels.plot_shape(ax, made(swinging, nt=181), times=[])
-    (area,) = ax.collections
+    draw_panel(panels.shape(made(swinging, nt=181), times=[]), ax)
+    (area,) = (c for c in ax.collections if c.get_label() == "range over time")
     tips = np.array([path.vertices[40] for path in area.get_paths()])
     assert np.ptp(tips[:, 0]) == pytest.approx(2 * 100.0 * np.sin(0.5), rel=0.02)
 
@@ -297,8 +298,10 @@ def _sea(ax: Any) -> list[str]:
     return [t.get_text() for t in ax.texts]
 
 
-def _planes(ax: Any) -> list[Any]:
-    return [patch for patch in ax.patches if type(patch).__name__ == "Polygon"]
+def _planes(ax: Any) -> list[np.ndarray]:
+    """Corners of water and sand, whose rims are lines."""
+    areas = [c.get_paths() for c in ax.collections if type(c).__name__ == "PolyCollection"]
+    return [paths[0].vertices[:4] for paths in areas if len(paths) == 1]
 
 
 def _by_name(figure: Figure) -> dict[str, Any]:
@@ -311,8 +314,9 @@ def test_the_sea_is_drawn_as_far_as_the_file_has_it() -> None:
     assert set(axes) == set("spPchTH")
     shape = axes["s"]
     assert _sea(shape) == ["still water", "seabed"]
-    heights = [plane.get_xy()[:2, 1] for plane in _planes(shape)]
-    assert [h.tolist() for h in heights] == [[0, 0], [0, 0], [-40, -40], [-40, -40]]  # an area and its rim
+    assert [plane[:2, 1].tolist() for plane in _planes(shape)] == [[0, 0], [-40, -40]]
+    rims = {line.get_color(): line.get_ydata().tolist() for line in shape.lines if line.get_linewidth() == 0.9}
+    assert rims == {look.LEVEL: [0, 0], look.BED: [-40, -40]}
     marks = {line.get_label(): line for line in shape.lines}
     assert marks["touchdown"].get_xydata() == pytest.approx(np.array([[35.0, -40.0]]))  # its other edge is the anchor
     assert marks["float, clump, body"].get_xdata()[1] == pytest.approx(moored(np.array([100.0]), 10.0)[0][0])
@@ -355,11 +359,11 @@ def test_a_cable_that_lifts_off_and_comes_back_leaves_a_gap() -> None:
         return -40.0 + 0.01 * np.maximum(s - 20.0, 0.0) ** 2
 
     result = made(lambda s, t: (s, 0.0, height(s) + 3.0 * (2.0 < t < 6.0)), nt=41, bed=FLAT)
-    panels.plot_touchdown(ax, result)
+    draw_panel(panels.touchdown(result), ax)
     (line,) = ax.lines
     assert np.array_equal(np.isnan(line.get_ydata()), (result.times > 2.0) & (result.times < 6.0))
     both = Figure().subplots()
-    panels.plot_touchdown(both, made(lambda s, t: (s, 0.0, height(abs(s - 50.0))), bed=FLAT))
+    draw_panel(panels.touchdown(made(lambda s, t: (s, 0.0, height(abs(s - 50.0))), bed=FLAT)), both)
     assert [line.get_label() for line in both.lines] == ["first contact", "last contact"]
 
 
@@ -374,7 +378,7 @@ def test_a_sloping_bed_passes_under_the_cable(turn: float) -> None:
 
     figure = plot.plot_summary(made(lying, nt=5, bed=(*normal, -40.0 * normal[2]), surface=0.0))
     shape = _by_name(figure)["s"]
-    bed = _planes(shape)[-1].get_xy()
+    bed = _planes(shape)[-1][:2]
     (cable,) = (line for line in shape.lines if line.get_label() == "catenary")
     across, up = cable.get_xdata()[:15], cable.get_ydata()[:15]  # up to s = 35 m it lies
     assert np.interp(across, bed[:, 0], bed[:, 1]) == pytest.approx(up, abs=1e-9)
@@ -412,7 +416,7 @@ def test_zones_of_one_kind_are_one() -> None:
 
 def test_what_stands_still_is_a_straight_line_of_histories() -> None:
     ax = Figure().subplots()
-    panels.plot_history(ax, made(lambda s, t: (s, 0.0, 1e-10 * np.sin(t))), "position", [50.0], component=2)
+    draw_panel(panels.history(made(lambda s, t: (s, 0.0, 1e-10 * np.sin(t))), "position", [50.0], component=2), ax)
     assert ax.get_ylim() == pytest.approx((-0.1, 0.1)) and ax.get_ylabel() == "Δz (mm)"
 
 
@@ -457,8 +461,8 @@ def test_what_is_across_a_span_is_compared_with_its_sag_not_with_its_length() ->
     assert (above.get_ylabel(), above.get_title("left")) == ("y (m)", "shape from above, y × 20")
     assert "position y" in texts(figure) and "position z" not in texts(figure)
     still = Figure().subplots()
-    panels.plot_shape(still, made(blown))
-    assert still.get_legend_handles_labels()[1] == ["catenary", "rod", "joint", "start", "end"]  # no range over time
+    draw_panel(panels.shape(made(blown)), still)
+    assert still.get_legend_handles_labels()[1] == ["catenary", "rod", "start", "end", "joint"]  # no range over time
     slight = made(lambda s, t: (blown(s, t)[0], 0.05 * blown(s, t)[1], blown(s, t)[2]))
     assert len(views.views_of(slight)) == 1
     turned = made(lambda s, t: (0.6 * s - blown(s, t)[1], 0.6 * s + blown(s, t)[1], blown(s, t)[2]))
@@ -558,10 +562,10 @@ def test_parts_draw_on_axes_of_the_user() -> None:
     result = made(sag)
     figure = Figure(layout="constrained")
     a, b, c, d = figure.subplots(2, 2).ravel()
-    panels.plot_shape(a, result, times=[0.0, 2.5], view="yz")
-    panels.plot_profiles(b, result, "curvature", output=0)
-    panels.plot_history(c, result, "position", [0.0, 33.0])
-    panels.plot_history(d, result, "position", [33.0], component=2)
+    draw_panel(panels.shape(result, times=[0.0, 2.5], view="yz"), a)
+    draw_panel(panels.profiles(result, "curvature", output=0), b)
+    draw_panel(panels.history(result, "position", [0.0, 33.0]), c)
+    draw_panel(panels.history(result, "position", [33.0], component=2), d)
     assert a.get_xlabel() == "y (m)" and len(_earlier(a)) == 2
     assert b.get_ylabel() == "curvature (1/km)"
     assert c.lines[1].get_ydata() == pytest.approx(np.linalg.norm(result.at(s=33.0)["position"], axis=-1))
@@ -595,7 +599,7 @@ def test_units_get_sensible_prefixes(unit: str, peak: float, shown: str, factor:
 def test_round_off_does_not_fill_a_panel() -> None:
     ax = Figure().subplots()
     result = made(sag, tension=1000.0)
-    panels.plot_profiles(ax, result, "torque")
+    draw_panel(panels.profiles(result, "torque"), ax)
     assert ax.get_ylim() == (-1.0, 1.0)
 
 
@@ -612,17 +616,17 @@ def test_nonsense_is_refused(tmp_path: Path) -> None:
             plot.plot_summary(result, path)
     ax = Figure().subplots()
     with pytest.raises(ResultError, match="'xx' is not a plane"):
-        panels.plot_shape(ax, result, view="xx")
+        draw_panel(panels.shape(result, view="xx"), ax)
     with pytest.raises(ResultError, match="does not depend on s"):
-        panels.plot_history(ax, result, "t", [0.0])
+        draw_panel(panels.history(result, "t", [0.0]), ax)
     with pytest.raises(ResultError, match="did you mean tension"):
-        panels.plot_history(ax, result, "tenson", [0.0])
+        draw_panel(panels.history(result, "tenson", [0.0]), ax)
 
 
 def test_no_pyplot_and_no_matplotlib_before_something_is_drawn() -> None:
     code = (
-        "import sys, hybrid.view.plots as p, hybrid.view.zone_plot as z; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
-        "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw(); z.plot_zones(made(sag));"
+        "import sys, hybrid.view.plots as p, hybrid.view.report; assert 'matplotlib' not in sys.modules; sys.path.insert(0, sys.argv[1]);"
+        "from test_result_plot import made, sag; p.plot_summary(made(sag)).canvas.draw(); p.plot_zones(made(sag));"
         "assert 'matplotlib.pyplot' not in sys.modules and 'matplotlib' in sys.modules"
     )
     env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}

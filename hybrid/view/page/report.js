@@ -226,7 +226,7 @@
     const layout = figure.layout;
     layout.dragmode = touch ? false : "zoom";  // a finger scrolls the page
     if (element.clientWidth < 500) layout.legend.font.size = 11;
-    if (figure.cursor && times.length > 1) layout.shapes = [cursor()];
+    if (figure.cursor && times.length > 1) layout.shapes = [cursor(), ...(layout.shapes || [])];
     const data = revived(figure.data);
     for (const trace of data) if (trace.type === "heatmap") trace.zsmooth = false;
     await Plotly.newPlot(element, data, layout, config);

@@ -16,7 +16,10 @@ from test_result_plot import EVENTS, MIXED, assert_tidy, image, made, sag, texts
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
-from hybrid.view import zone_plot as zoneplot
+from hybrid.view import zones as zoneplot
+from hybrid.view.figure import Axis, Map, Panel
+from hybrid.view.matplotlib_backend import draw_panel
+from hybrid.view.plots import plot_zones
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 Zones = list[tuple[str, float, float]]
@@ -82,7 +85,7 @@ def check_values(result: Result, images: dict[str, Any], factors: dict[str, floa
 
 def test_what_is_drawn_is_what_is_in_the_file() -> None:
     result = made(sag, zones=moving, nt=21)
-    images = zoneplot.plot_zone_map(Figure().subplots(), result)
+    images = draw_panel(zoneplot.zone_map(result), Figure().subplots())
     assert [picture.get_label() for picture in images.values()] == ["rod: curvature (1/km)", "catenary: tension (kN)"]
     where = [*places(0, 60), 98.0, 99.0, 99.3, 0.01, 99.99]
     assert check_values(result, images, {"rod": 1e3, "catenary": 1e-3}, where) > 10
@@ -96,14 +99,14 @@ def test_zones_of_an_adaptive_run_are_drawn_as_they_were(tmp_path: Path) -> None
     assert len(np.unique(result["zones/t"])) > 3  # they do move
     figure = hybrid.plot_zones(hybrid.open(tmp_path / "run.h5"), tmp_path / "run.png")
     assert_tidy(figure)
-    images = zoneplot.plot_zone_map(Figure().subplots(), result)
+    images = draw_panel(zoneplot.zone_map(result), Figure().subplots())
     check_values(result, images, {"rod": 1.0, "catenary": 1.0}, [0.6 * s for s in places(1, 25)])
 
 
 def test_pixels_have_the_colours_of_the_values() -> None:
     """On the page as it is seen; away from the lines between zones, which are drawn over it."""
     result = made(sag, zones=lambda t: [("catenary", 0.0, 30.0 + 4.0 * t), ("rod", 30.0 + 4.0 * t, 100.0)], nt=11)
-    figure = zoneplot.plot_zones(result)
+    figure = plot_zones(result)
     pixels = image(figure)[:, :, :3] / 255.0
     ax = by_name(figure)["map"]
     images = {picture.get_label().split(":")[0]: picture for picture in ax.images}
@@ -123,7 +126,7 @@ def test_pixels_have_the_colours_of_the_values() -> None:
 def test_the_page_tells_zones_share_and_events(tmp_path: Path) -> None:
     events = [(2.0, "split", "a"), (4.0, "split", "b"), (5.0, "merge", "c"), (7.0, "retry", "d"), (12.0, "merge", "e")]
     result = made(sag, zones=moving, nt=41, events=events, attached=[20.0, 100.0])
-    figure = zoneplot.plot_zones(result, tmp_path / "zones.png")
+    figure = plot_zones(result, tmp_path / "zones.png")
     axes = by_name(figure)
     assert set(axes) == {"map", "rod", "catenary", "share"}
     text = texts(figure)
@@ -140,31 +143,32 @@ def test_the_page_tells_zones_share_and_events(tmp_path: Path) -> None:
     assert marks["split"].get_xydata().tolist() == [[2.0, 50.0], [4.0, 50.0]]  # the middle of where they were
     assert marks["retry"].get_xydata().tolist() == [[7.0, 50.0]]
     assert marks["merge"].get_xydata().tolist() == [[5.0, 50.0]]  # what came after the last output is off the page
-    assert marks["attached"].get_ydata() == [20.0, 20.0] and marks["_attached"].get_ydata() == [100.0, 100.0]
+    assert [list(marks[name].get_ydata()) for name in ("attached", "_attached")] == [[20.0, 20.0], [100.0, 100.0]]
     pixels = image(figure)
     assert pixels.shape == (900, 1200, 4) and (tmp_path / "zones.png").stat().st_size > 20_000
     assert_tidy(figure)
 
 
 def test_too_many_marks_are_left_out_and_the_page_says_so() -> None:
-    figure = zoneplot.plot_zones(made(sag, zones=moving, events=[(0.01 * k, "split", "") for k in range(251)]))
+    figure = plot_zones(made(sag, zones=moving, events=[(0.01 * k, "split", "") for k in range(251)]))
     assert "split × 251 (too many to mark)" in texts(figure)
     assert "split" not in [line.get_label() for line in by_name(figure)["map"].lines]
-    assert "too many" not in texts(zoneplot.plot_zones(made(sag, events=[(0.04 * k, "split", "") for k in range(250)])))
+    assert "too many" not in texts(plot_zones(made(sag, events=[(0.04 * k, "split", "") for k in range(250)])))
 
 
 def test_boundaries_are_where_the_file_has_them() -> None:
     """Along t at the place of the joint, not of the nearest output point; along s half way between two outputs."""
     ax = Figure().subplots()
     result = made(sag, nt=11, zones=lambda t: CATENARY if t < 3.5 else [("catenary", 0.0, 61.3), ("rod", 61.3, 100.0)])
-    zoneplot.plot_zone_map(ax, result)
-    (lines,) = (c for c in ax.collections if c.get_label() == "zone boundary")
-    ends = sorted(np.round(path.vertices, 9).tolist() for path in lines.get_paths())
+    draw_panel(zoneplot.zone_map(result), ax)
+    (line,) = ax.lines
+    assert line.get_label() == "zone boundary" and np.isnan(line.get_xydata()[2::3]).all()  # a gap after each
+    ends = sorted(np.round(line.get_xydata()[k : k + 2], 9).tolist() for k in range(0, len(line.get_xdata()), 3))
     assert ends == [[[3.5, 61.3], [3.5, 100.0]], [[3.5, 61.3], [10.0, 61.3]]]
     for whole in ([("rod", 0.0, 40.0), ("rod", 40.0, 100.0)], ROD, CATENARY):  # nothing happens between two of a kind
         ax = Figure().subplots()
-        zoneplot.plot_zone_map(ax, made(sag, zones=lambda t, whole=whole: whole))
-        assert not ax.collections
+        draw_panel(zoneplot.zone_map(made(sag, zones=lambda t, whole=whole: whole)), ax)
+        assert not ax.lines
 
 
 def test_the_share_of_rod_is_that_of_the_zones() -> None:
@@ -172,11 +176,11 @@ def test_the_share_of_rod_is_that_of_the_zones() -> None:
     share = zoneplot.rod_share(result)
     assert share[result.times < 2.0].tolist() == [0.0] * 4
     assert share[result.times >= 2.0] == pytest.approx(0.264)  # 5 + 20 + 1.4 m of 100
-    figure = zoneplot.plot_zones(result)
+    figure = plot_zones(result)
     title = by_name(figure)["share"].get_title("left")
     # four outputs of 0.5 s, the first of which holds for half of that: 1.75 s of 10 without any
     assert title == f"share of rod: {0.825 * 26.4:.3g} % of the cable on average, between 0 and 26.4 %"
-    assert "share of rod: 25 % of the cable\n" in texts(zoneplot.plot_zones(made(sag))) + "\n"
+    assert "share of rod: 25 % of the cable\n" in texts(plot_zones(made(sag))) + "\n"
 
 
 def touching(when: Sequence[bool]) -> Result:
@@ -192,25 +196,26 @@ def touching(when: Sequence[bool]) -> Result:
 def test_touchdown_has_gaps_where_nothing_touches() -> None:
     ax = Figure().subplots()
     result = touching([False, True, True, True, False, True, False, False, True, True, False])
-    zoneplot.plot_zone_map(ax, result)
-    first, alone, last, _ = ax.lines
-    assert first.get_label() == "touchdown" and last.get_label().startswith("_")
+    draw_panel(zoneplot.zone_map(result), ax)
+    first, alone, last, _ = [line for line in ax.lines if len(line.get_xdata()) in (1, len(result.times))]
+    assert first.get_label() == "touchdown" and last.get_label() == "_touchdown"
     for line, k in ((first, 0), (last, 1)):
         assert np.array_equal(line.get_ydata(), result["touchdown"][:, k], equal_nan=True)
         assert np.array_equal(line.get_xdata(), result.times)
     assert alone.get_xydata().tolist() == [[5.0, 30.0]]  # a line through one point would be none
     never = Figure().subplots()
-    zoneplot.plot_zone_map(never, touching([False] * 5))
-    assert len(never.lines) == 0
+    draw_panel(zoneplot.zone_map(touching([False] * 5)), never)
+    assert [line.get_label() for line in never.lines] == ["zone boundary"]
     for result in (touching([False] * 5), touching([False, True, False, False, True])):
-        assert_tidy(zoneplot.plot_zones(result))
+        assert_tidy(plot_zones(result))
 
 
 def test_a_touchdown_that_stays_at_an_end_is_not_drawn() -> None:
     ax = Figure().subplots()
     result = made(lambda s, t: (s, 0.0, -40.0 + 0.01 * np.maximum(s - 40.0 - t, 0.0) ** 2), bed=(0.0, 0.0, 1.0, -40.0))
-    zoneplot.plot_zone_map(ax, result)
-    assert np.array_equal(ax.lines[0].get_ydata(), result["touchdown"][:, 1]) and len(ax.lines) == 2
+    draw_panel(zoneplot.zone_map(result), ax)
+    (line,) = (line for line in ax.lines if "touchdown" in line.get_label())
+    assert np.array_equal(line.get_ydata(), result["touchdown"][:, 1])
 
 
 CASES: dict[str, dict[str, Any]] = {
@@ -230,7 +235,7 @@ CASES: dict[str, dict[str, Any]] = {
 
 @pytest.mark.parametrize("case", CASES)
 def test_every_kind_of_result_draws(case: str) -> None:
-    figure = zoneplot.plot_zones(made(sag, **CASES[case]))
+    figure = plot_zones(made(sag, **CASES[case]))
     axes = by_name(figure)
     kinds = {"catenary": {"catenary"}, "rod": {"rod"}, "straight rod": {"rod"}, "no zones": set()}
     assert set(axes) - {"map", "share"} == kinds.get(case, {"rod", "catenary"})
@@ -243,13 +248,16 @@ def test_every_kind_of_result_draws(case: str) -> None:
 
 
 def test_nothing_saved_still_gives_a_page() -> None:
-    figure = zoneplot.plot_zones(made(sag, nt=0, status="failed", message="singular at t = 0 s"))
+    figure = plot_zones(made(sag, nt=0, status="failed", message="singular at t = 0 s"))
     assert "no output was saved" in texts(figure) and figure.axes == []
 
 
 def norm_of(kind: str, values: Sequence[float]) -> Any:
-    array = np.ma.masked_array(np.array([values]), np.isnan(values))
-    return zoneplot._bends(array, 1e-8) if kind == "rod" else zoneplot._pulls(array)
+    """How an image of these values takes its colours."""
+    low, high, log = zoneplot.span_of(np.array(values), bends=kind == "rod", straight=1e-8)
+    edges, unit = np.arange(len(values) + 1.0), Axis("", "", 0.0, 1.0)
+    shown = Map(edges, np.array([0.0, 1.0]), np.array([values]), kind, "", "", zoneplot.COLOURS[kind], low, high, log)
+    return draw_panel(Panel("", "", unit, unit, [shown]), Figure().subplots())[kind].norm
 
 
 @pytest.mark.parametrize(
@@ -306,7 +314,7 @@ def test_kinds_of_zones_are_told_apart_by_all_eyes(eye: str) -> None:
 def test_nonsense_is_refused(tmp_path: Path) -> None:
     for name in ("no/zones.png", "zones.xyz"):
         with pytest.raises(ResultError, match=r"no folder|unknown file format"):
-            zoneplot.plot_zones(made(sag), tmp_path / name)
+            plot_zones(made(sag), tmp_path / name)
     (tmp_path / "bad.h5").write_text("no HDF5")
     with pytest.raises(ResultError, match="cannot be read as a result"):
         hybrid.plot_zones(hybrid.open(tmp_path / "bad.h5"))

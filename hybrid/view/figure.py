@@ -1,0 +1,205 @@
+"""A figure as plain data: panels with curves, bands, marks, maps and texts. A back end turns it into a picture.
+
+Coordinates are in the units that the axes name, sizes in points. Items are drawn in the order of their list, but
+`Area`, `Box` and `Map` lie behind the grid. An item without a label is not in the legend, and items of a
+panel with one label are one entry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.view.style import GREY, INK, ZERO
+
+
+class Line(NamedTuple):
+    """A curve, with a gap where x or y is not finite.
+
+    dash: "", "dash" or "dot"; casing: colour of a wider line below it; symbol: marks on its points, or, with
+    `last_only`, on the last one; frames (nf, n): its y at the times that a page can show.
+    """
+
+    x: np.ndarray
+    y: np.ndarray
+    label: str = ""
+    colour: str = INK
+    width: float = 1.3
+    dash: str = ""
+    casing: str = ""
+    symbol: str = ""
+    size: float = 3.0
+    last_only: bool = False
+    frames: np.ndarray | None = None
+
+
+class Marks(NamedTuple):
+    """Points, with matplotlib's names of symbols; texts: lines to read at each, if a page can, the first a heading."""
+
+    x: np.ndarray
+    y: np.ndarray
+    symbol: str
+    label: str = ""
+    face: str = INK  # "": hollow
+    edge: str = INK
+    edge_width: float = 0.8
+    size: float = 4.5
+    texts: Sequence[Sequence[str]] = ()
+
+
+class Band(NamedTuple):
+    """The area between two curves over x."""
+
+    x: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+    label: str = ""
+    colour: str = GREY
+    opacity: float = 0.2
+
+
+class Area(NamedTuple):
+    """Filled outlines (n, points, 2): water or sand, or the many strips that a curve has swept."""
+
+    outlines: np.ndarray
+    fill: str
+    label: str = ""
+
+
+class Box(NamedTuple):
+    """A shaded rectangle; None: all of the panel."""
+
+    x: tuple[float, float] | None
+    y: tuple[float, float] | None
+    label: str = ""
+    colour: str = GREY
+    opacity: float = 0.1
+
+
+class Rule(NamedTuple):
+    """Lines across the panel where x (or y) has certain values."""
+
+    axis: str
+    at: Sequence[float]
+    label: str = ""
+    colour: str = GREY
+    width: float = 0.9
+    dash: str = "dot"
+
+
+class Map(NamedTuple):
+    """A colour for every cell between edges; values (ny, nx), NaN where there is none; shades from `low` to `high`."""
+
+    x: np.ndarray
+    y: np.ndarray
+    values: np.ndarray
+    name: str
+    quantity: str
+    unit: str
+    shades: Sequence[str]
+    low: float
+    high: float
+    log: bool = False
+
+
+class Text(NamedTuple):
+    """A short text beside a place; a coordinate named in `parts` runs from 0 to 1 over the panel. offset: points."""
+
+    x: float
+    y: float
+    text: str
+    colour: str = INK
+    offset: tuple[float, float] = (0.0, 0.0)
+    across: str = "left"  # which side of the text is at the place: left or right,
+    up: str = "bottom"  # and bottom, baseline or top
+    size: float = 7.0
+    parts: str = ""
+
+
+Item = Line | Marks | Band | Area | Box | Rule | Map | Text
+
+
+class Axis(NamedTuple):
+    """What it shows and in which unit; from where to where (None: what the items span).
+
+    peak: the largest value of the quantity at any time; of round-off beside it a panel is not made full.
+    """
+
+    name: str
+    unit: str
+    low: float | None = None
+    high: float | None = None
+    peak: float | None = None
+    log: bool = False
+    ticks: tuple[float, ...] = ()
+
+    @property
+    def label(self) -> str:
+        return f"{self.name} ({self.unit})" if self.name else f"({self.unit})" if self.unit else ""
+
+
+class Panel(NamedTuple):
+    """One pair of axes. aspect: length of a unit of y over that of a unit of x, None: free; legend: inside the panel.
+
+    caption: a sentence for the reader of a page; cursor: x is the time, which a page can move.
+    """
+
+    key: str
+    title: str
+    x: Axis
+    y: Axis
+    items: list[Item]
+    aspect: float | None = None
+    legend: bool = False
+    grid: bool = True
+    fill: str = "#FFFFFF"
+    caption: str = ""
+    cursor: bool = False
+
+    def limits(self) -> tuple[tuple[float, float], tuple[float, float]]:
+        """From where to where x and y are shown: as given, else what curves, marks and bands span, and 5 % more."""
+        return _limits(self.x, self.items, "x"), _limits(self.y, self.items, "y")
+
+
+class Page(NamedTuple):
+    """Panels on a page with a head, a foot and legends.
+
+    mosaic, widths, heights: which panels (keys) stand where, lists in lists for blocks; a cell with the name of a `Map`
+    holds its colour bar. legend: for each row below the panels the panels it explains. note: at the foot.
+    """
+
+    title: str
+    facts: str
+    fact_lines: int = 1  # at most
+    panels: dict[str, Panel] = {}  # noqa: RUF012  never written to
+    mosaic: list[Any] = []  # noqa: RUF012
+    widths: Sequence[float] | None = None
+    heights: Sequence[float] | None = None
+    legend: Sequence[str] = ()
+    note: str = ""
+    alarm: tuple[bool, bool] = (False, False)  # facts and note in red
+    size: tuple[float, float] = (8.0, 6.0)  # inches
+    empty: str = ""  # what to say where there is no panel
+
+
+def _limits(axis: Axis, items: Sequence[Item], name: str) -> tuple[float, float]:
+    parts = [getattr(item, name) for item in items if isinstance(item, Line | Marks)]
+    bands = [item for item in items if isinstance(item, Band)]
+    parts += [y for band in bands for y in ((band.x,) if name == "x" else (band.low, band.high))]
+    values = np.concatenate([np.asarray(part, dtype=float) for part in parts] or [np.zeros(1)])
+    values = values[np.isfinite(values)]
+    low, high = (float(values.min()), float(values.max())) if len(values) else (0.0, 1.0)
+    low, high = low - 0.05 * (high - low), high + 0.05 * (high - low)
+    low, high = low if axis.low is None else axis.low, high if axis.high is None else axis.high
+    part, peak = (1e-9, max(abs(low), abs(high))) if axis.peak is None else (1e-3, axis.peak)
+    least = part * peak if peak > ZERO else 2.0  # of nothing some room on either side
+    if high - low < least:
+        low, high = 0.5 * (low + high - least), 0.5 * (low + high + least)
+    return low, high
+
+
+def changes_sign(low: float, high: float) -> bool:
+    """Whether zero is well inside an axis, and worth a line."""
+    return low < -0.1 * (high - low) < 0.1 * (high - low) < high

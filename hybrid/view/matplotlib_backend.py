@@ -1,0 +1,266 @@
+"""Figures for paper: pages, panels and films drawn by matplotlib.
+
+Never by pyplot: no window, no display, no state that outlives a call. This file is imported when something is drawn.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.collections import PolyCollection
+from matplotlib.colors import LinearSegmentedColormap, LogNorm, Normalize
+from matplotlib.figure import Figure
+from matplotlib.layout_engine import ConstrainedLayoutEngine
+from matplotlib.lines import Line2D
+from matplotlib.patheffects import Normal, Stroke
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter
+
+from hybrid.view.figure import Area, Band, Box, Item, Line, Map, Marks, Page, Panel, Rule, Text, changes_sign
+from hybrid.view.style import ALARM, GREY, INK, NORMAL, SMALL
+
+DPI = 150
+_DASHES: dict[str, Any] = {"": "-", "dash": (0, (4, 1.5)), "dot": ":"}
+_ENTRIES = 8  # of a legend, in a row
+_LEFT = 0.0125  # of the width of a page: where lines of text begin
+
+# ---- items ----------------------------------------------------------------------------------------
+
+
+def artists_of(ax: Axes, item: Item, label: str) -> list[Artist]:
+    """Draw one item; what was made for it, in the order of drawing."""
+    look: dict[str, Any]
+    match item:
+        case Line():
+            return [_line(ax, item, label)]
+        case Marks():
+            look = {"linestyle": "", "marker": item.symbol, "markersize": item.size, "label": label}
+            look |= {"markerfacecolor": item.face or "none", "markeredgecolor": item.edge}
+            return [ax.add_line(Line2D(item.x, item.y, markeredgewidth=item.edge_width, **look))]
+        case Band():
+            look = {"color": item.colour, "alpha": item.opacity, "linewidth": 0, "label": label}
+            return [ax.fill_between(item.x, item.low, item.high, **look)]
+        case Area():
+            # Edges close the seams; as pixels in a PDF, where each outline would weigh as much as a curve.
+            look = {"color": item.fill, "lw": 0.4, "rasterized": len(item.outlines) > 1, "label": label}
+            return [ax.add_collection(PolyCollection(list(item.outlines), **look), autolim=False)]
+        case Box():
+            return [_box(ax, item, label)]
+        case Rule():
+            draw = ax.axvline if item.axis == "x" else ax.axhline
+            look = {"color": item.colour, "linewidth": item.width, "linestyle": _DASHES[item.dash]}
+            return [draw(at, label="_" * (k > 0) + label, **look) for k, at in enumerate(item.at)]
+        case Map():
+            return [_map(ax, item)]
+        case Text():
+            look = {"ha": item.across, "va": item.up, "fontsize": item.size, "color": item.colour}
+            look["xycoords"] = tuple("axes fraction" if axis in item.parts else "data" for axis in "xy")
+            place = (item.x, item.y)
+            return [ax.annotate(item.text, place, xytext=item.offset, textcoords="offset points", **look)]
+
+
+def _line(ax: Axes, item: Line, label: str) -> Artist:
+    look: dict[str, Any] = {"color": item.colour, "linewidth": item.width, "linestyle": _DASHES[item.dash]}
+    if item.casing:
+        look["path_effects"] = [Stroke(linewidth=item.width + 1.4, foreground=item.casing), Normal()]
+    if item.symbol:
+        look |= {"marker": item.symbol, "markersize": item.size, "markevery": [-1] if item.last_only else None}
+    return ax.add_line(Line2D(item.x, item.y, label=label, solid_capstyle="round", **look))
+
+
+def _box(ax: Axes, item: Box, label: str) -> Artist:
+    look: dict[str, Any] = {"color": item.colour, "alpha": item.opacity, "linewidth": 0, "label": label}
+    if item.x is None:
+        return ax.axhspan(*(item.y or ax.get_ylim()), **look)
+    part = (0.0, 1.0) if item.y is None else np.interp(item.y, ax.get_ylim(), (0.0, 1.0))
+    return ax.axvspan(*item.x, *part, **look)
+
+
+def _map(ax: Axes, item: Map) -> Artist:
+    colours = LinearSegmentedColormap.from_list(item.name, item.shades)
+    norm = LogNorm(item.low, item.high, clip=True) if item.log else Normalize(item.low, item.high)
+    image = ax.pcolorfast(item.x, item.y, np.ma.masked_invalid(item.values), cmap=colours, norm=norm)
+    image.set_label(f"{item.name}: {item.quantity} ({item.unit})")
+    return image
+
+
+# ---- panels ---------------------------------------------------------------------------------------
+
+
+def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[str, Artist]:
+    """Draw a panel on any Axes; the images of its maps, by name. legend: inside, other than the panel says."""
+    (left, right), (bottom, top) = panel.limits()
+    _style(ax, panel)
+    free = panel.aspect is not None  # then the panel shows more than these limits, in one direction
+    ax.set_xlim(left, right, auto=free)
+    ax.set_ylim(bottom, top, auto=free)
+    seen: set[str] = set()
+    images = {}
+    for k, item in enumerate(panel.items):
+        label = getattr(item, "label", "") or "_"
+        artists = artists_of(ax, item, label if label not in seen else f"_{label}")
+        seen.add(label)
+        behind = isinstance(item, Area | Box | Map)  # the grid is at 0.5
+        for n, artist in enumerate(artists):
+            artist.set_zorder((0.1 if behind else 1.0) + 0.001 * k + 0.0001 * n)
+        if isinstance(item, Map):
+            images[item.name] = artists[0]
+    if panel.grid and not free and changes_sign(bottom, top):
+        ax.axhline(0.0, color=GREY, linewidth=0.6, zorder=0.9)
+    if panel.aspect is not None:
+        # Of its limits matplotlib may cut what is not data; water and sand reach farther and do not count.
+        x, y = 0.055 * (right - left), 0.055 * (top - bottom)
+        ax.dataLim.set_points(np.array([(left + x, bottom + y), (right - x, top - y)]))
+        ax.set_aspect(panel.aspect, adjustable="datalim")
+    if panel.legend if legend is None else legend:
+        ax.legend(fontsize=SMALL, framealpha=0.75, edgecolor="none", handlelength=2.0, borderpad=0.2)
+    return images
+
+
+def _style(ax: Axes, panel: Panel) -> None:
+    ax.set_title(panel.title, loc="left", fontsize=NORMAL, color=INK, fontweight="bold")
+    ax.set_facecolor(panel.fill)
+    ax.spines[["top", "right"]].set_visible(False)
+    ax.spines[["left", "bottom"]].set(linewidth=0.6, color=GREY)
+    if panel.grid:
+        ax.grid(color="#000000", alpha=0.07, linewidth=0.6)
+    ax.set_axisbelow(True)
+    axes: Any = ((ax.xaxis, panel.x, ax.set_xscale), (ax.yaxis, panel.y, ax.set_yscale))
+    for axis, of, scale in axes:
+        axis.set_label_text(of.label, fontsize=NORMAL)
+        if of.log:  # numbers that people write; over more decades only powers of ten have room
+            scale("log")
+            wide = of.high is not None and of.low is not None and of.high / of.low > 300.0
+            axis.set_major_locator(LogLocator(10.0, subs=(1.0,) if wide else (1.0, 2.0, 5.0), numticks=12))
+            axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+            axis.set_minor_formatter(NullFormatter())
+        else:
+            axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], min_n_ticks=3))
+            ax.ticklabel_format(axis=axis.axis_name, useOffset=False, scilimits=(-4, 5))
+            axis.get_offset_text().set_fontsize(SMALL)
+            if of.ticks:
+                axis.set_ticks(of.ticks)
+    _small_ticks(ax)
+
+
+def _small_ticks(ax: Axes) -> None:
+    ax.tick_params(labelsize=SMALL, width=0.6, length=2.5, color=GREY, labelcolor=INK)
+
+
+# ---- pages ----------------------------------------------------------------------------------------
+
+
+def draw_page(page: Page) -> Figure:
+    """A figure with all panels, named by their keys, and its texts."""
+    figure = Figure(figsize=page.size, dpi=DPI)
+    FigureCanvasAgg(figure)
+    inch = 1.0 / page.size[1]
+    _text(figure, 1.0 - 0.09 * inch, page.title, fontsize=10, fontweight="bold", color=INK)
+    look: dict[str, Any] = {"fontsize": NORMAL, "color": ALARM if page.alarm[0] else GREY}
+    lines = _text(figure, 1.0 - 0.3 * inch, page.facts, page.fact_lines, **look)
+    foot = 0.0
+    if page.note:
+        look = {"fontsize": SMALL, "color": ALARM if page.alarm[1] else GREY}
+        foot = (0.108 + 0.12 * _text(figure, 0.048 * inch, page.note, 2, "bottom", **look)) * inch
+    top, bottom = 1.0 - (0.34 + 0.14 * lines) * inch, foot + 0.33 * inch  # the legend is below, the head above
+    body = (0.0, bottom, 1.0, top - bottom)
+    figure.set_layout_engine(ConstrainedLayoutEngine(w_pad=0.06, h_pad=0.05, wspace=0.02, hspace=0.02, rect=body))
+    if page.empty:
+        figure.text(0.5, 0.5, page.empty, ha="center", fontsize=NORMAL, color=GREY)
+    if page.panels:
+        axes = figure.subplot_mosaic(page.mosaic, width_ratios=page.widths, height_ratios=page.heights)
+        for key, panel in page.panels.items():
+            images = draw_panel(panel, axes[key], legend=False if key in page.legend else None)
+            for name in axes.keys() & images.keys():
+                _colour_bar(figure, axes[name], images[name])
+        _share_labels([(axes[key], panel) for key, panel in page.panels.items()])
+        if page.legend:
+            _legends(figure, axes, page, foot)
+    return figure
+
+
+def _share_labels(panels: Sequence[tuple[Axes, Panel]]) -> None:
+    """Of panels above one another with one axis, of s or t, only the lowest names it, and numbers it if it can."""
+    for ax, panel in panels:
+        here = ax.get_position()
+        for other, below in panels:
+            there = other.get_position()
+            column = abs(here.x0 - there.x0) < 1e-6 and there.y0 < here.y0
+            if column and panel.aspect is None and panel.x.label == below.x.label:
+                ax.set_xlabel("")
+                ax.tick_params(labelbottom=panel.limits()[0] != below.limits()[0])
+
+
+def _legends(figure: Figure, axes: dict[str, Axes], page: Page, foot: float) -> None:
+    """Rows below the panels; what has no room in one goes to the next."""
+    first, *others = [list(zip(*axes[key].get_legend_handles_labels(), strict=True)) for key in page.legend]
+    second = [*first[_ENTRIES:], *(entry for more in others for entry in more)]
+    rows = [row[:_ENTRIES] for row in (first, second) if row]
+    heights = (0.165, 0.015) if len(rows) > 1 else (0.09,)[: len(rows)]
+    look: dict[str, Any] = {"fontsize": SMALL, "handlelength": 1.6, "columnspacing": 1.5, "borderaxespad": 0.0}
+    look |= {"loc": "lower center", "ncols": _ENTRIES, "frameon": False, "borderpad": 0.1, "labelcolor": INK}
+    for row, y in zip(rows, heights, strict=True):
+        figure.legend(*zip(*row, strict=True), bbox_to_anchor=(0.5, foot + y / page.size[1]), **look)
+
+
+def _colour_bar(figure: Figure, ax: Axes, image: Any) -> None:
+    look: dict[str, Any] = {}
+    if isinstance(image.norm, LogNorm):
+        look = {"ticks": LogLocator(subs=(1.0, 2.0, 5.0)), "format": "%g", "extend": "min", "extendfrac": 0.03}
+    bar = figure.colorbar(image, cax=ax, **look)
+    bar.set_label(image.get_label(), fontsize=NORMAL)
+    bar.outline.set(linewidth=0.6, edgecolor=GREY)
+    _small_ticks(ax)
+    ax.minorticks_off()
+
+
+def _text(figure: Figure, y: float, text: str, most: int = 1, va: str = "top", **look: Any) -> int:
+    """At most so many lines from the left edge, cut to the width of the page; how many. A $ in them is a $."""
+    rest, rows = " ".join(text.split()), list[str]()
+    line = figure.text(_LEFT, y, "", va=va, parse_math=False, **look)
+    while rest and len(rows) < most:
+        end, cut = len(rest), " …" * (len(rows) == most - 1)
+        line.set_text(rest)
+        while (share := (1.0 - 2.0 * _LEFT) * figure.bbox.width / max(1.0, line.get_window_extent().width)) < 1.0:
+            end = min(int(share * end), end - 1)
+            end = end if cut else max(rest.rfind(" ", 0, end + 1), 0) or end  # lines end between words
+            line.set_text(rest[:end].rstrip() + cut)
+        rows, rest = [*rows, line.get_text()], rest[end:].lstrip()
+    line.set_text("\n".join(rows))
+    return len(rows)
+
+
+# ---- films ----------------------------------------------------------------------------------------
+
+Moving = Callable[[int], tuple[str, dict[str, list[Item]]]]
+
+
+def film(page: Page, moving: Moving, frames: Iterable[int], dpi: int) -> Iterator[np.ndarray]:
+    """Pixels (height, width, 4) of every frame: the page, which is drawn once, and on it what moves.
+
+    moving: the time in words, and by the keys of their panels the items of a frame.
+    """
+    figure = draw_page(page)
+    figure.set_dpi(dpi)
+    canvas: Any = figure.canvas
+    axes = {ax.get_label(): ax for ax in figure.axes}
+    look: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "color": INK, "animated": True}
+    clock = figure.text(0.985, 0.985, "", ha="right", va="top", **look)
+    canvas.draw()
+    figure.set_layout_engine("none")
+    canvas.draw()
+    still = canvas.copy_from_bbox(figure.bbox)
+    for i in frames:
+        canvas.restore_region(still)
+        text, parts = moving(int(i))
+        for key, items in parts.items():
+            for artist in [artist for item in items for artist in artists_of(axes[key], item, "_")]:
+                axes[key].draw_artist(artist)
+                artist.remove()
+        clock.set_text(text)
+        figure.draw_artist(clock)
+        yield np.asarray(canvas.buffer_rgba()).copy()

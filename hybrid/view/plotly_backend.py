@@ -1,0 +1,152 @@
+"""Figures for a page: panels as plotly's dictionaries, with references into a `Store` in place of arrays.
+
+Texts may come from a scene and are escaped: plotly reads tags in them. Long curves keep the lowest and highest value
+of every short stretch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from hybrid.view.decimate import Store, outline
+from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel, Rule
+from hybrid.view.style import INK
+
+Spec = dict[str, Any]
+# Of matplotlib's names of marks, plotly's. Screens are coarser than paper: marks and lines are larger there.
+_SYMBOLS = {
+    "o": "circle", "s": "square", "^": "triangle-up", "v": "triangle-down", "D": "diamond", "+": "cross", "x": "x",
+    "X": "x",
+}  # fmt: skip
+_LARGER, _WIDER = 2.7, 1.25
+_FONT = "system-ui, sans-serif"
+
+
+def figure_of(panel: Panel, store: Store) -> Spec:
+    """What the page's script draws: data and layout, colour bars, and which curve moves with time."""
+    (left, right), (low, high) = panel.limits()
+    figure: Spec = {"data": [], "layout": _layout(panel, (left, right), (low, high))}
+    bars, readable = [], not any(isinstance(item, Map) for item in panel.items)
+    for item in panel.items:
+        if isinstance(item, Line) and item.frames is not None:
+            figure["now"] = {"trace": len(figure["data"]), "frames": store.add(item.frames)}
+        if isinstance(item, Box | Rule):
+            figure["layout"].setdefault("shapes", []).extend(_shapes(item))
+        else:
+            figure["data"] += _traces(item, store, panel.y.unit if readable else None)
+        if isinstance(item, Map):
+            bars.append(
+                {"label": f"{item.name}: {item.quantity}", "shades": item.shades, "low": item.low, "high": item.high}
+                | {"unit": item.unit, "log": item.log}
+            )
+    seen: set[str] = set()
+    for trace in (trace for trace in (*figure["data"], *figure["layout"].get("shapes", ())) if "name" in trace):
+        trace["showlegend"] = bool(trace["name"]) and trace["name"] not in seen
+        trace["legendgroup"] = trace["name"]
+        seen.add(trace["name"])
+    return figure | ({"bars": bars} if bars else {}) | ({"cursor": True} if panel.cursor else {})
+
+
+def colour_scale(colours: Sequence[str]) -> list[list[Any]]:
+    return [[k / (len(colours) - 1), colour] for k, colour in enumerate(colours)]
+
+
+def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) -> Spec:
+    def axis(of: Axis, limits: tuple[float, float]) -> Spec:
+        return {
+            "title": {"text": escape(of.label), "standoff": 6}, "range": list(limits), "showgrid": panel.grid,
+            "zeroline": False, "gridcolor": "#EDEDED", "linecolor": "#BDBDBD", "ticks": "outside", "ticklen": 4,
+            "tickcolor": "#BDBDBD", "automargin": True, "exponentformat": "SI",
+        }  # fmt: skip
+
+    return {
+        "font": {"family": _FONT, "size": 13, "color": INK},
+        "margin": {"l": 56, "r": 22, "t": 8, "b": 44},
+        "paper_bgcolor": "#FFFFFF", "plot_bgcolor": panel.fill,
+        "hovermode": "closest" if any(isinstance(item, Map) for item in panel.items) else "x",
+        "xaxis": axis(panel.x, across), "yaxis": axis(panel.y, up),
+        "legend": {"orientation": "h", "tracegroupgap": 0, "x": 0, "y": 1.02, "yanchor": "bottom"}
+        | {"font": {"size": 12}},
+        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}
+        | {"font": {"size": 12, "color": INK, "family": _FONT}},
+    }  # fmt: skip
+
+
+def _traces(item: Item, store: Store, unit: str | None) -> list[Spec]:
+    """unit: of values that are read off a curve; None: on a map its cells and marks are to be read, no curves."""
+    match item:
+        case Line():
+            return _line(item, store, unit)
+        case Marks():
+            marker = {"symbol": _SYMBOLS[item.symbol], "color": item.face, "size": _LARGER * item.size}
+            marker["line"] = {"color": item.edge, "width": 1}
+            texts = ["<br>".join([f"<b>{escape(head)}</b>", *map(escape, lines)]) for head, *lines in item.texts]
+            hover = {"text": texts, "hovertemplate": "%{text}<extra></extra>"} if texts else {"hoverinfo": "skip"}
+            # with no point at all, an entry of the legend alone
+            x, y = (values.tolist() if len(values) else [None] for values in (item.x, item.y))
+            trace = {"type": "scatter", "mode": "markers", "name": escape(item.label), "marker": marker, "x": x, "y": y}
+            return [trace | {"cliponaxis": False} | hover]
+        case Band():
+            known = np.flatnonzero(np.isfinite(item.low) & np.isfinite(item.high))
+            known = known[np.union1d(outline(item.low[known]), outline(item.high[known]))]
+            x, low, high = item.x[known], item.low[known], item.high[known]
+            around = {"x": store.add(np.append(x, x[::-1])), "y": store.add(np.append(low, high[::-1]))}
+            look = {
+                "mode": "lines",
+                "fill": "toself",
+                "fillcolor": _rgba(item.colour, item.opacity),
+                "line": {"width": 0},
+            }
+            return [{"type": "scatter", "name": escape(item.label), "hoverinfo": "skip"} | around | look]
+        case Map():
+            values = store.add(item.values)
+            low, high = (float(np.log10(x)) if item.log else x for x in (item.low, item.high))
+            told = f"{item.name}: {item.quantity} %{{customdata:.4g}} {item.unit}<br>t = %{{x:.5g}} s, s = %{{y:.4g}} m"
+            return [
+                {"type": "heatmap", "x": store.add(item.x), "y": store.add(item.y), "z": values | {"log": item.log}}
+                | {"customdata": values, "colorscale": colour_scale(item.shades), "showscale": False, "zmin": low}
+                | {"zmax": high, "hovertemplate": f"{told}<extra>{item.name}</extra>"}
+            ]
+    raise TypeError(f"a page does not draw {type(item).__name__}")
+
+
+def _line(item: Line, store: Store, unit: str | None) -> list[Spec]:
+    k = outline(item.y) if np.isfinite(item.x).all() else np.arange(len(item.x))  # of pieces every one is needed
+    around = {"type": "scatter", "mode": "lines", "x": store.add(item.x[k]), "y": store.add(item.y[k])}
+    look: Spec = {"color": item.colour, "width": _WIDER * item.width} | ({"dash": item.dash} if item.dash else {})
+    line = around | {"name": escape(item.label), "line": look}
+    line |= {"hoverinfo": "skip"} if unit is None else {"hovertemplate": f"%{{y:.5g}} {unit}"}
+    if not item.casing:
+        return [line]
+    wider = line | {"line": look | {"color": item.casing, "width": look["width"] + 2.0}}
+    return [wider | {"name": ""}, line] if item.colour == INK else [wider, line | {"name": ""}]  # the dark one is named
+
+
+def _shapes(item: Box | Rule) -> list[Spec]:
+    if isinstance(item, Box):
+        fill = {
+            "type": "rect",
+            "fillcolor": item.colour,
+            "opacity": item.opacity,
+            "line": {"width": 0},
+            "layer": "below",
+        }
+        return [fill | _ends("x", item.x) | _ends("y", item.y)]
+    look = {"color": item.colour, "width": _WIDER * item.width, "dash": item.dash}
+    other = "y" if item.axis == "x" else "x"
+    line = {"type": "line", "line": look, "layer": "below", "name": escape(item.label)} | _ends(other, None)
+    return [line | _ends(item.axis, (at, at)) for at in item.at]
+
+
+def _ends(axis: str, ends: tuple[float, float] | None) -> Spec:
+    low, high = ends or (0, 1)
+    return {f"{axis}ref": axis if ends else "paper", f"{axis}0": low, f"{axis}1": high}
+
+
+def _rgba(colour: str, alpha: float) -> str:
+    red, green, blue = (int(colour[k : k + 2], 16) for k in (1, 3, 5))
+    return f"rgba({red},{green},{blue},{alpha:g})"
