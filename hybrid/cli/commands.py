@@ -69,7 +69,7 @@ def run(
         duration = asked.require_time().duration
         target = console.will_write(output or Path(f"{scene.stem}.h5"))
         picture = picture_beside(target, plot)
-        cold = console.compiling(_kernels(asked))
+        cold = console.compiling(asked)
         begin = clock.perf_counter()
         with console.progress() as tell:
             result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
@@ -97,7 +97,7 @@ def resume(
         target, changed = console.will_write(output or result), settings or []
         picture = picture_beside(target, plot)
         left = remaining_run(result.resolve(), until, changed, start)
-        cold = console.compiling(_kernels(left.scene))
+        cold = console.compiling(left.scene)
         begin = clock.perf_counter()
         with console.progress() as tell:
             more = hybrid.resume(result, output, until=until, settings=changed, start=start, progress=tell)
@@ -115,7 +115,7 @@ def static(
         asked = load(console, scene, settings)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
-        console.compiling(["newton.newton"])
+        console.compiling(asked)
         from hybrid.cli.progress_line import span
 
         begin = clock.perf_counter()
@@ -178,7 +178,7 @@ def trade(
         asked = load(console, scene, settings)
         folder = output or scene.with_suffix(".trade")
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
-        console.compiling()
+        console.compiling(asked)
         chosen = {"accuracies": accuracies} if accuracies else {}
         with console.study() as listener:
             table = hybrid.trade(
@@ -229,18 +229,6 @@ def schema() -> None:
 
 def _count(n: int, what: str) -> str:
     return f"{n} {what}{'s' * (n != 1)}"
-
-
-def _kernels(scene: Scene) -> list[str]:
-    """What a run of a scene needs compiled, by the last of each family: step, zones, model error."""
-    from hybrid.model.resolution import wants_errors
-
-    needed = ["newton.advance"]
-    if scene.model.kind == "adaptive":
-        needed.append("zone_criteria.weigh")
-    if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
-        needed.append("bending_error.advance_error")
-    return needed
 
 
 def _ended(

@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time as clock
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
@@ -21,6 +21,7 @@ from hybrid.errors import EXPECTED, weight_of_event
 
 if TYPE_CHECKING:
     from hybrid.errors import ComputationError, SceneError
+    from hybrid.scene.schema import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
     from hybrid.studies.runs import Doing
@@ -64,14 +65,15 @@ class Console:
         if not (self.quiet or self.as_json):
             self._err.print(text, style="yellow", soft_wrap=not self._err.is_terminal)
 
-    def compiling(self, kernels: Sequence[str] = ("newton.advance",)) -> bool:
-        """Whether kernels have to be compiled first, which takes long; if so, say it beforehand."""
+    def compiling(self, scene: Scene) -> bool:
+        """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand."""
         from hybrid.kernels.cache import is_warm
+        from hybrid.simulation.first_use import kernels_of
 
-        if is_warm(kernels):
+        if is_warm(kernels_of(scene)):
             return False
         self.json("compiling")
-        self.note("compiling the kernels for this machine (first use only, about half a minute) ...")
+        self.note("compiling the kernels for this machine (first use only, up to half a minute) ...")
         return True
 
     def show(self, content: Callable[[], Any]) -> None:

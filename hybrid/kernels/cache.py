@@ -49,7 +49,7 @@ def cache_folder() -> Path:
     return base / kernel_hash()
 
 
-def is_warm(kernels: Sequence[str] = ("newton.advance",)) -> bool:
+def is_warm(kernels: Sequence[str]) -> bool:
     """True when these kernels of this version, as file.function, were compiled on this machine before."""
     folder = cache_folder()
     return folder.is_dir() and all(any(folder.rglob(f"{name}-*.nbc")) for name in kernels)

@@ -1,6 +1,7 @@
 """What a correction does to the configuration: positions, chords, tensions, directors and rates.
 
-`plane` is the plane of a line that is computed in one, or None: numba drops what the other kind would need.
+`plane` is the plane of a line that is computed in one, else None; `space` is None for such a line, else 1.  numba
+drops what stands behind `is not None` of the one that is None, so what the other kind needs is not compiled.
 """
 
 from __future__ import annotations
@@ -15,15 +16,18 @@ from hybrid.kernels.rotations import dot, spin_about, transport
 
 
 @inner
-def carry_director(plane, a, e, en):
+def carry_director(plane, space, a, e, en):
     """Director a of a cell whose chord turns from e to en, without spin about it."""
-    if plane is None:
+    out = a
+    if space is not None:
         d, _, _ = chord(e)
         dn, _, _ = chord(en)
-        return transport(a, d, dn)
-    d, _, _ = chord2(inside2(plane, e))
-    dn, _, _ = chord2(inside2(plane, en))
-    return carried(plane, a, d, dn)
+        out = transport(a, d, dn)
+    if plane is not None:
+        p, _, _ = chord2(inside2(plane, e))
+        q, _, _ = chord2(inside2(plane, en))
+        out = carried(plane, a, p, q)
+    return out
 
 
 @inner
@@ -59,7 +63,7 @@ def turned_chord(e, de):
 
 
 @kernel
-def update(plane, line, state, cv, ca, part, turning, work):
+def update(plane, space, line, state, cv, ca, part, turning, work):
     """Apply `part` of the correction work.x to everything that depends on it.
 
     With `turning` chords are turned and stretched by the correction instead of shifted:
@@ -83,8 +87,8 @@ def update(plane, line, state, cv, ca, part, turning, work):
         state.T[i] += part * x[i + 1, 0]
         e[i, 0], e[i, 1], e[i, 2] = en
         if line.spin[i]:
-            a = carry_director(plane, get3(a1, i), ei, en)
-            if plane is None:
+            a = carry_director(plane, space, get3(a1, i), ei, en)
+            if space is not None:
                 dpsi = part * x[i, 4]
                 if dpsi != 0.0:
                     dn, _, _ = chord(en)

@@ -31,8 +31,8 @@ def _solve(
 ) -> tuple[int, int, float, int]:
     """As kernels.newton._solve, by the kernel for the line's kind."""
     if line.bits & PLANAR:
-        return solve_in_plane(line.plane, task, line, sea, ends, old, new, was, now, work)
-    return solve_in_space(None, task, line, sea, ends, old, new, was, now, work)
+        return solve_in_plane(line.plane, None, task, line, sea, ends, old, new, was, now, work)
+    return solve_in_space(None, 1, task, line, sea, ends, old, new, was, now, work)
 
 
 def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:

@@ -1,8 +1,7 @@
 """Newton's method for one step (in time, or one static solve): the only nonlinear loop of the package.
 
 Each iteration is one march along s and one substitution back (kernels.assembly), then an update of positions,
-tensions, frames and rates.  `plane` is the plane of a line that is computed in one, or None: numba drops what the
-other kind would need, so that neither is compiled for a scene that does not have it.
+tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.configuration).
 
 `_solve` is the one compiled entry to all that needs the march.  An entry for each would compile the march once more,
 and so does every function that stands between: they are inlined here.  kernels.entry has its faces for Python.
@@ -80,7 +79,7 @@ def noise_of(line, ca, scale):
     return min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
 
 
-def _solve(plane, task, line, sea, ends, old, new, was, now, work):
+def _solve(plane, space, task, line, sea, ends, old, new, was, now, work):
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
     STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
@@ -97,7 +96,7 @@ def _solve(plane, task, line, sea, ends, old, new, was, now, work):
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
         s = scheme(task.rho, task.before, task.dt)
-        turn, where = begin_step(plane, line, sea, old, new, work.u, s)
+        turn, where = begin_step(plane, space, line, sea, old, new, work.u, s)
         if not turn < LARGEST_STEP_TURN:
             return TURNED_TOO_FAR, 0, turn, where
     cv, ca = s.cv, s.ca
@@ -106,9 +105,10 @@ def _solve(plane, task, line, sea, ends, old, new, was, now, work):
     outcome, it, where = NOT_CONVERGED, 0, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1
-        if plane is None:
+        bad, good = -1, True
+        if space is not None:
             bad = march(line, sea, ends, old.r, new, cv, ca, work)
-        else:
+        if plane is not None:
             bad = march_planar(line, sea, ends, old.r, new, cv, ca, work)
         if bad >= 0:
             outcome, where = SINGULAR, bad
@@ -118,9 +118,9 @@ def _solve(plane, task, line, sea, ends, old, new, was, now, work):
         if task.what == ASSEMBLY:
             outcome = OK
             break
-        if plane is None:
+        if space is not None:
             good = substitute(work.X, work.x)
-        else:
+        if plane is not None:
             good = substitute_planar(plane, work.X, work.x)
         if not good:
             outcome, where = NOT_FINITE, first_bad(work.x, new.e)
@@ -136,7 +136,7 @@ def _solve(plane, task, line, sea, ends, old, new, was, now, work):
             part = LARGEST_TURN / turn
         if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
             part *= 0.5
-        update(plane, line, new, cv, ca, part, task.turning, work)
+        update(plane, space, line, new, cv, ca, part, task.turning, work)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         ratio = size / before
@@ -148,9 +148,9 @@ def _solve(plane, task, line, sea, ends, old, new, was, now, work):
                 outcome, left = OK, size
         before = size if part == 1.0 else math.inf
     if task.what == STEP:
-        find_rates(plane, line, sea, old, new, work.u, s)
+        find_rates(space, line, sea, old, new, work.u, s)
         if outcome == OK:
-            turn, cell = end_step(plane, line, sea, ends, old, new, s, task, was, now, work)
+            turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work)
             if not turn < LARGEST_STEP_TURN:
                 outcome, where = TURNED_TOO_FAR, cell
     return outcome, it, left, where

@@ -92,7 +92,7 @@ def predict_nodes(old, new, u, s):
 
 
 @inner
-def predict_cells(plane, line, old, new, u, s):
+def predict_cells(plane, space, line, old, new, u, s):
     """Chords, tensions, directors and spins that go with it."""
     dt, am, af, _, be, cv, ca = s
     for i in range(old.e.shape[0]):
@@ -103,8 +103,8 @@ def predict_cells(plane, line, old, new, u, s):
         new.w[i], new.wd[i] = 0.0, 0.0
         a = get3(old.a1, i)
         if line.spin[i]:
-            a = carry_director(plane, a, ei, en)
-            if plane is None:
+            a = carry_director(plane, space, a, ei, en)
+            if space is not None:
                 dpsi = dt * old.w[i] + 0.5 * dt * dt * old.wa[i]
                 new.w[i] = old.w[i] + dt * old.wa[i]
                 new.wd[i] = (am * old.wa[i] - af * old.wd[i]) / (1.0 - af) + ca * be * dt * dt * old.wa[i]
@@ -120,7 +120,7 @@ def predict_cells(plane, line, old, new, u, s):
 
 
 @inner
-def find_rates(plane, line, sea, old, new, u, s):
+def find_rates(space, line, sea, old, new, u, s):
     """Positions, algorithmic accelerations and elastic travel after the step.
 
     a' = (r' - rp)/(be dt^2) with rp = r + dt v + dt^2 (1/2 - be) a; likewise for the spin, through w'.
@@ -135,7 +135,7 @@ def find_rates(plane, line, sea, old, new, u, s):
                 new.slip[i, k] = sea.slid[i, k]
     for i in range(old.e.shape[0]):
         new.wa[i] = 0.0
-        if plane is None:
+        if space is not None:
             if line.spin[i]:
                 new.wa[i] = (new.w[i] - old.w[i] - dt * (1.0 - ga) * old.wa[i]) / (ga * dt)
 
@@ -156,7 +156,7 @@ def book_seabed(line, sea, old, new, u, report):
 
 
 @inner
-def begin_step(plane, line, sea, old, new, u, s):
+def begin_step(plane, space, line, sea, old, new, u, s):
     """Predict the end of a step from `old` into `new`, with the algorithmic acceleration kept.
 
     Returns the largest turn of a chord (rad) and its cell; beyond LARGEST_STEP_TURN the step is not begun.
@@ -164,7 +164,7 @@ def begin_step(plane, line, sea, old, new, u, s):
     predict_nodes(old, new, u, s)
     turn, cell = widest_turn(old.e, u)
     if turn < LARGEST_STEP_TURN:
-        predict_cells(plane, line, old, new, u, s)
+        predict_cells(plane, space, line, old, new, u, s)
         if line.bits & WAVES:  # at the predicted positions, which are right to third order
             stir(sea, old.r, u)
         if line.bits & FRICTION:
@@ -173,15 +173,15 @@ def begin_step(plane, line, sea, old, new, u, s):
 
 
 @inner
-def end_step(plane, line, sea, ends, old, new, s, task, was, now, work):
+def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work):
     """Report of a step that Newton has solved.  Returns its largest turn of a chord, rad, and its cell."""
     u, report, dt = work.u, work.report, s.dt
-    if plane is None:
-        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_space(
-            line, ends, new.e, new.T, new.a1
-        )
-    else:
-        report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharpest_in_plane(line, ends, new.e, new.T)
+    sharp = (0.0, -1, 0.0, -1)
+    if space is not None:
+        sharp = sharpest_in_space(line, ends, new.e, new.T, new.a1)
+    if plane is not None:
+        sharp = sharpest_in_plane(line, ends, new.e, new.T)
+    report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharp
     report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = unrest(old, new)
     _, _, _, _, slip = weights(task.rho, task.before / dt)

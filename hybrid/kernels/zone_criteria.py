@@ -61,20 +61,9 @@ def depth(sea, r, i):
     return sea.offset + 0.5 * sea.onset - dot(n, get3(r, i))
 
 
-@kernel
-def weigh(
-    line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
-    turn, twisting, ratios
-):  # fmt: skip
-    """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
-
-    Returns the largest ratio among base cells that are catenary and free to change.
-
-    tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
-    change since then goes on; EI, w, bent, node, floor: (N+1,) bending stiffness, weight per length, curvature without
-    stress, what sits there, tension floor; torque: of the whole line as far as its rods do not know it, N m;
-    free: (n,) of base cells; turn, twisting: (N+1,) turns, and torques, N m, of nodes (written).
-    """
+@inner
+def find_turns(line, tangents, e, a1, torque, turn, twisting):
+    """Turns of the nodes, rad, and torques of the nodes between cells, N m, into `turn` and `twisting`."""
     n = e.shape[0]
     turn[0], turn[n] = 0.0, 0.0
     d0 = get3(tangents, 0)
@@ -96,21 +85,58 @@ def weigh(
     if dot(d0, d0) > 0.0:
         x = sub(d1, d0)
         turn[n] = math.sqrt(dot(x, x))
+
+
+@inner
+def tensions_at(T, past, a, i):
+    """Lowest tension beside node i now, and as foreseen, N; -1 where one is not a number."""
+    n = T.shape[0]
+    c = min(i, n - 1)
+    now, ahead = T[c], T[c] + a * (T[c] - past[c])
+    if 0 < i < n:
+        before = T[i - 1] + a * (T[i - 1] - past[i - 1])
+        ahead = before if not ahead < before else ahead
+        now = T[i - 1] if not now < T[i - 1] else now
+        if not T[i] + before < math.inf:  # a NaN must not hide behind a number
+            now = -1.0
+    return now, min(now, ahead)
+
+
+@inner
+def kink_at(line, turn, i):
+    """Turn of node i, rad, without what the curvature on both sides of it makes of it."""
+    n = line.h.shape[0]
+    smooth = 0.0
+    if i > 1:
+        smooth = turn[i - 1] / line.hn[i - 1]
+    if i < n - 1:
+        smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if i > 1 else turn[i + 1] / line.hn[i + 1]
+    return max(turn[i] - smooth * line.hn[i], 0.0)
+
+
+@kernel
+def weigh(
+    line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
+    turn, twisting, ratios
+):  # fmt: skip
+    """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
+
+    Returns the largest ratio among base cells that are catenary and free to change.
+
+    tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
+    change since then goes on; EI, w, bent, node, floor: (N+1,) bending stiffness, weight per length, curvature without
+    stress, what sits there, tension floor; torque: of the whole line as far as its rods do not know it, N m;
+    free: (n,) of base cells; turn, twisting: (N+1,) turns, and torques, N m, of nodes (written).
+    """
+    n = e.shape[0]
+    find_turns(line, tangents, e, a1, torque, turn, twisting)
     whole = 0.0
     for i in range(n + 1):
         whole += turn[i]
     for i in range(n + 1):
         ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
         jb = base_of_cell[i] if i < n else base_of_cell[n - 1]
-        c = min(i, n - 1)
-        now, ahead = T[c], T[c] + a * (T[c] - past[c])
-        if 0 < i < n:
-            before = T[i - 1] + a * (T[i - 1] - past[i - 1])
-            ahead = before if not ahead < before else ahead
-            now = T[i - 1] if not now < T[i - 1] else now
-            if not T[i] + before < math.inf:  # a NaN must not hide behind a number
-                now = -1.0
-        ahead = min(now, ahead)
+        now, ahead = tensions_at(T, past, a, i)
         slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
         if not floor[i] <= slack * now:
             slack = floor[i] / now if now > 0.0 else MOST
@@ -119,30 +145,19 @@ def weigh(
         T1 = now if now > T1 else T1
         if i == 0 or i == n:
             put(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
+            continue
+        Mt = twisting[i]
+        loop = max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance)
+        put(ratios, TORSION, ja, jb, loop / (2.0 * T1))
+        if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+            put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink_at(line, turn, i) / tolerance)
         else:
             bend = EI[i] * (turn[i] / line.hn[i] + bent[i]) / (T1 * tolerance)
-            Mt = twisting[i]
-            put(
-                ratios,
-                TORSION,
-                ja,
-                jb,
-                max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance) / (2.0 * T1),
-            )
-            if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
-                smooth = 0.0  # what is left of the turn without what the curvature on both sides makes of it
-                if i > 1:
-                    smooth = turn[i - 1] / line.hn[i - 1]
-                if i < n - 1:
-                    smooth = min(smooth, turn[i + 1] / line.hn[i + 1]) if i > 1 else turn[i + 1] / line.hn[i + 1]
-                kink = max(turn[i] - smooth * line.hn[i], 0.0)
-                put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink / tolerance)
-            else:
-                put(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
-            if line.bits & SEABED:
-                p = depth(sea, r, i) > 0.0
-                if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
-                    put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+            put(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
+        if line.bits & SEABED:
+            p = depth(sea, r, i) > 0.0
+            if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
+                put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
     loudest = 0.0
     for i in range(n):
         j = base_of_cell[i]

@@ -34,6 +34,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_estimate import RunSample
 from hybrid.simulation.error_report import write_errors
+from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.refinement import Free
@@ -78,6 +79,7 @@ def run(
             return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
+    compile_beside(scene)
     case, target = Case(scene, criterion), _target(output, overwrite)
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
@@ -98,6 +100,7 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
 
         with locked(_path(output)):
             return static_shooting(scene, output, overwrite)
+    compile_beside(scene)
     case, begin = StaticCase(scene), clock.process_time()
     target, resolution = _target(output, overwrite), first_resolution(scene)
     with locked(_path(output)):

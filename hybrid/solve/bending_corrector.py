@@ -18,7 +18,7 @@ from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, no_sea
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, no_sea
 from hybrid.kernels.step import lay
 from hybrid.solve.stepper import Stepper
 
@@ -170,7 +170,7 @@ class Corrector:
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)
         entry.assembly(line, sea, ends, state._replace(v=still, vd=still, w=no_spin, wd=no_spin), 0.0, ca, work)
         self.slid[:] = 0.0
-        self._advance(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), work.X, work.W)
+        self.follow(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), work)
 
     def step(
         self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, before: float, rho: float,
@@ -178,12 +178,13 @@ class Corrector:
     ) -> None:  # fmt: skip
         """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
         work = stepper.work
-        self._advance(self.line, sea, ends, state, Step(work.u, dt, before, rho, torque), work.X, work.W)
+        self.follow(self.line, sea, ends, state, Step(work.u, dt, before, rho, torque), work)
 
-    def _advance(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, X: Floats, W: Floats) -> None:
+    def follow(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, work: Work) -> None:
+        """The error after `step`, with the factors of the matrix that stand in `work`."""
         self.sea = sea
         self.finite, self.clipped, self.where = advance_error(
-            line, sea, ends, self.bending, state, step, X, W, self.error, self._spare, self.most, self._arrays
+            line, sea, ends, self.bending, state, step, work.X, work.W, self.error, self._spare, self.most, self._arrays
         )
         if self.finite:
             self.error, self._spare = self._spare, self.error

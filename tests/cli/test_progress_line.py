@@ -5,11 +5,13 @@ from __future__ import annotations
 import io
 import sys
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
+import hybrid
 from hybrid.cli import console as commands_console
 from hybrid.cli.progress_line import ProgressLine, span, speed, zones_in_short
 from hybrid.model.mesh import Zone
@@ -114,13 +116,14 @@ def test_it_says_nothing_elsewhere(capsys: pytest.CaptureFixture[str]) -> None:
 def test_compilation_is_announced_before_it_happens(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
+    scene = hybrid.load_scene(Path(hybrid.__file__).parents[1] / "examples" / "02_suspension.yaml")
     monkeypatch.setattr("hybrid.kernels.cache.is_warm", lambda _: False)
-    assert commands_console.Console(as_json=False, quiet=False).compiling()
+    assert commands_console.Console(as_json=False, quiet=False).compiling(scene)
     assert capsys.readouterr().err.startswith("compiling the kernels for this machine (first use only")
-    assert commands_console.Console(as_json=True, quiet=False).compiling()
+    assert commands_console.Console(as_json=True, quiet=False).compiling(scene)
     assert capsys.readouterr().out == '{"event": "compiling"}\n'
     monkeypatch.setattr("hybrid.kernels.cache.is_warm", lambda _: True)
-    assert not commands_console.Console(as_json=False, quiet=False).compiling()
+    assert not commands_console.Console(as_json=False, quiet=False).compiling(scene)
     assert tuple(capsys.readouterr()) == ("", "")
 
 

@@ -117,7 +117,7 @@ def assembled(line, sea, ends, st, u, cv=CV, ca=CA):
 def residual_at(line, sea, ends, st, x):
     """Right-hand side after the configuration is moved by x (shape (N+1, 5))."""
     s, work = st.copy(), workspace(N)._replace(x=np.ascontiguousarray(x))
-    update(None, line, s, CV, CA, 1.0, False, work)
+    update(None, 1, line, s, CV, CA, 1.0, False, work)
     return assembled(line, sea, ends, s, work.u)[1]
 
 

@@ -149,7 +149,7 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
         if j % 3:
             x[j // 3, 1:4] = way * line.plane[j % 3 - 1]
         s, work = st.copy(), workspace(N)._replace(x=x)
-        update(line.plane, line, s, CV, CA, 1.0, False, work)
+        update(line.plane, None, line, s, CV, CA, 1.0, False, work)
         return dense(in_plane(line, sea, ends, s, work.u)[0])[1]
 
     for j in range(3 * N + 3):

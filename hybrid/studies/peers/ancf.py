@@ -117,89 +117,27 @@ class Exudyn:
     def march(self, line: Line, guest: Guest, times: list[float]) -> Answer:
         setattr(sys, "exudynFast", True)  # noqa: B010  Exudyn's own switch: no range checks
         with contextlib.redirect_stdout(None):
-            import exudyn  # type: ignore[import-not-found]
-            from exudyn import itemInterface as items
+            import exudyn
 
         interval = times[1] - times[0]
         if np.ptp(np.diff(times)) > 1e-6 * interval:
             raise Failed("outputs are not evenly spread")
         origin, e = _plane(line, times)
-
-        def flat(k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
-            q, v, _ = line.end(k, t)
-            return np.array([(q - origin) @ e, q[2]]), np.array([v @ e, v[2]])
-
-        shape = line.hanging(guest.elements)
-        places = np.stack([(shape - origin) @ e, shape[:, 2]], axis=1)
         step = line.length / guest.elements
-        reference = np.hstack([places, np.gradient(places, step, axis=0)])
-
         begin = clock.process_time()
         exudyn.config.printToConsole = False
         container = exudyn.SystemContainer()
         mbs = container.AddSystem()
-        nodes = [mbs.AddNode(items.NodePoint2DSlope1(referenceCoordinates=list(row))) for row in reference]
-        sunk = line.mass - line.density * math.pi / 4 * line.diameter**2
-        for i in range(guest.elements):
-            cable = mbs.AddObject(
-                items.ObjectANCFCable2D(
-                    length=step, massPerLength=line.mass, bendingStiffness=line.ei, axialStiffness=line.ea,
-                    nodeNumbers=[nodes[i], nodes[i + 1]], useReducedOrderIntegration=1, strainIsRelativeToReference=0.0,
-                )
-            )  # fmt: skip
-            marker = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=cable))
-            weight = [0.0, -sunk / line.mass * line.gravity, 0.0]
-            mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=weight))
-        share = np.full(guest.elements + 1, step)
-        share[[0, -1]] = 0.5 * step
-        sea, size = Sea(exudyn, line, reference, share), 4 * (guest.elements + 1)
-        empty = exudyn.MatrixContainer()
-        empty.SetWithSparseMatrix(np.array([[0.0, 0.0, 1e-12]]), size, size)
-        mbs.AddObject(
-            items.ObjectGenericODE2(
-                nodeNumbers=nodes, massMatrix=empty, stiffnessMatrix=empty, dampingMatrix=empty,
-                forceUserFunction=sea.force, massMatrixUserFunction=sea.mass, jacobianUserFunction=sea.jacobian,
-            )
-        )  # fmt: skip
-        ground = mbs.AddMarker(
-            items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0)
-        )
-        force, position = exudyn.OutputVariableType.Force, exudyn.OutputVariableType.Position
-        pulls = []
-        for k, node in ((0, nodes[0]), (1, nodes[-1])):
-            for axis in (0, 1):
-                marker = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis))
-                offset, offset_t = _driven(flat, k, axis)
-                held = mbs.AddObject(
-                    items.ObjectConnectorCoordinate(
-                        markerNumbers=[ground, marker], offsetUserFunction=offset, offsetUserFunction_t=offset_t
-                    )
-                )
-                sensor = items.SensorObject(objectNumber=held, outputVariableType=force, storeInternal=True)
-                pulls.append(mbs.AddSensor(sensor))
+        nodes = _elements(exudyn, mbs, line, guest.elements, origin, e)
+        position = exudyn.OutputVariableType.Position
+        pulls = _held_ends(exudyn, mbs, line, (nodes[0], nodes[-1]), origin, e)
         seen = [
-            mbs.AddSensor(items.SensorNode(nodeNumber=n, outputVariableType=position, storeInternal=True))
+            mbs.AddSensor(_items().SensorNode(nodeNumber=n, outputVariableType=position, storeInternal=True))
             for n in nodes
         ]
         mbs.Assemble()
-        how = exudyn.SimulationSettings()
-        how.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
-        how.linearSolver.reuseAnalyzedPattern = True
-        how.solution.file.write = False
-        how.staticSolver.numberOfLoadSteps, how.staticSolver.useLoadFactor = 1, False
-        how.staticSolver.newton.relativeTolerance, how.staticSolver.newton.maxIterations = 1e-8, 100
-        if not mbs.SolveStatic(how, updateInitialValues=True):
-            raise Failed("it finds no static equilibrium")
-        rest = np.asarray(mbs.systemData.GetAECoordinates(configuration=exudyn.ConfigurationType.Initial))
-        march = how.timeIntegration
-        per = max(1, math.ceil(interval * (guest.per_period or 1) / line.period - 1e-9))
-        march.endTime, march.numberOfSteps = times[-1], per * (len(times) - 1)
-        march.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
-        march.generalizedAlpha.computeInitialAccelerations = False
-        march.newton.relativeTolerance, march.minimumStepSize = NEWTON, SMALLEST_STEP
-        how.solution.sensors.writePeriod = interval
-        if not mbs.SolveDynamic(how, solverType=exudyn.DynamicSolverType.GeneralizedAlpha):
-            raise Failed("it stops on the way")
+        steps = max(1, math.ceil(interval * (guest.per_period or 1) / line.period - 1e-9)) * (len(times) - 1)
+        rest = _solved(exudyn, mbs, times, steps)
         cpu = clock.process_time() - begin
 
         def stored(sensor: Any) -> np.ndarray:
@@ -216,7 +154,92 @@ class Exudyn:
             force_on_line = pull[:, :1] * e + pull[:, 1:] * (0.0, 0.0, 1.0)
             # less what moves the end node's share of the line: the others do not count that either
             values[name] = force_on_line - 0.5 * step * line.mass * np.array([line.end(k, t)[2] for t in times])
-        return Answer(values, cpu, per * (len(times) - 1))
+        return Answer(values, cpu, steps)
+
+
+def _items() -> Any:
+    from exudyn import itemInterface
+
+    return itemInterface
+
+
+def _elements(exudyn: Any, mbs: Any, line: Line, count: int, origin: np.ndarray, e: np.ndarray) -> list[Any]:
+    """The line's elements with their weight and the sea, in the shape in which it hangs; their nodes."""
+    items, step, shape = _items(), line.length / count, line.hanging(count)
+    places = np.stack([(shape - origin) @ e, shape[:, 2]], axis=1)
+    reference = np.hstack([places, np.gradient(places, step, axis=0)])
+    nodes = [mbs.AddNode(items.NodePoint2DSlope1(referenceCoordinates=list(row))) for row in reference]
+    sunk = line.mass - line.density * math.pi / 4 * line.diameter**2
+    for i in range(count):
+        cable = mbs.AddObject(
+            items.ObjectANCFCable2D(
+                length=step, massPerLength=line.mass, bendingStiffness=line.ei, axialStiffness=line.ea,
+                nodeNumbers=[nodes[i], nodes[i + 1]], useReducedOrderIntegration=1, strainIsRelativeToReference=0.0,
+            )
+        )  # fmt: skip
+        marker = mbs.AddMarker(items.MarkerBodyMass(bodyNumber=cable))
+        weight = [0.0, -sunk / line.mass * line.gravity, 0.0]
+        mbs.AddLoad(items.LoadMassProportional(markerNumber=marker, loadVector=weight))
+    share = np.full(count + 1, step)
+    share[[0, -1]] = 0.5 * step
+    sea, size = Sea(exudyn, line, reference, share), 4 * (count + 1)
+    empty = exudyn.MatrixContainer()
+    empty.SetWithSparseMatrix(np.array([[0.0, 0.0, 1e-12]]), size, size)
+    mbs.AddObject(
+        items.ObjectGenericODE2(
+            nodeNumbers=nodes, massMatrix=empty, stiffnessMatrix=empty, dampingMatrix=empty,
+            forceUserFunction=sea.force, massMatrixUserFunction=sea.mass, jacobianUserFunction=sea.jacobian,
+        )
+    )  # fmt: skip
+    return nodes
+
+
+def _held_ends(
+    exudyn: Any, mbs: Any, line: Line, nodes: tuple[Any, Any], origin: np.ndarray, e: np.ndarray
+) -> list[Any]:
+    """Move both ends as the line says; sensors of the forces, horizontal and vertical, of each."""
+    items = _items()
+
+    def flat(k: int, t: float) -> tuple[np.ndarray, np.ndarray]:
+        q, v, _ = line.end(k, t)
+        return np.array([(q - origin) @ e, q[2]]), np.array([v @ e, v[2]])
+
+    ground = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))
+    force, pulls = exudyn.OutputVariableType.Force, []
+    for k, node in enumerate(nodes):
+        for axis in (0, 1):
+            marker = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis))
+            offset, offset_t = _driven(flat, k, axis)
+            held = mbs.AddObject(
+                items.ObjectConnectorCoordinate(
+                    markerNumbers=[ground, marker], offsetUserFunction=offset, offsetUserFunction_t=offset_t
+                )
+            )
+            sensor = items.SensorObject(objectNumber=held, outputVariableType=force, storeInternal=True)
+            pulls.append(mbs.AddSensor(sensor))
+    return pulls
+
+
+def _solved(exudyn: Any, mbs: Any, times: list[float], steps: int) -> np.ndarray:
+    """Equilibrium, then the motion; the constraint forces of the equilibrium."""
+    how = exudyn.SimulationSettings()
+    how.linearSolver.solverType = exudyn.LinearSolverType.EigenSparse
+    how.linearSolver.reuseAnalyzedPattern = True
+    how.solution.file.write = False
+    how.staticSolver.numberOfLoadSteps, how.staticSolver.useLoadFactor = 1, False
+    how.staticSolver.newton.relativeTolerance, how.staticSolver.newton.maxIterations = 1e-8, 100
+    if not mbs.SolveStatic(how, updateInitialValues=True):
+        raise Failed("it finds no static equilibrium")
+    rest = np.asarray(mbs.systemData.GetAECoordinates(configuration=exudyn.ConfigurationType.Initial))
+    march = how.timeIntegration
+    march.endTime, march.numberOfSteps = times[-1], steps
+    march.generalizedAlpha.spectralRadius = SPECTRAL_RADIUS
+    march.generalizedAlpha.computeInitialAccelerations = False
+    march.newton.relativeTolerance, march.minimumStepSize = NEWTON, SMALLEST_STEP
+    how.solution.sensors.writePeriod = times[1] - times[0]
+    if not mbs.SolveDynamic(how, solverType=exudyn.DynamicSolverType.GeneralizedAlpha):
+        raise Failed("it stops on the way")
+    return rest
 
 
 def _plane(line: Line, times: list[float]) -> tuple[np.ndarray, np.ndarray]:

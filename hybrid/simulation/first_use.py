@@ -1,0 +1,94 @@
+"""The first use on a machine: which kernels a scene calls, and their compilation in two processes."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybrid.kernels.cache import is_warm
+from hybrid.model.build import Model, build
+from hybrid.model.resolution import first_resolution, wants_errors
+from hybrid.scene.read import validate_scene
+from hybrid.scene.schema import Scene
+
+# What each process compiles, by the kernel that stands for it: the last that it compiles.
+SOLVER = ("newton.solve_in_plane", "newton.solve_in_space")
+OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_rules._plan", "bending_error.advance_error"
+
+# A cable for the second process to compile with; nothing is computed of it.
+SAMPLE = {
+    "cable": {"sections": [{"length": 10, "mass": 1, "axial_stiffness": 1e6, "bending_stiffness": 1}]},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}},
+    "initial": "equilibrium", "model": "adaptive", "mesh": {"cells": 8}, "time": {"duration": 0.1, "step": 0.1},
+}  # fmt: skip
+
+
+def kernels_of(scene: Scene) -> list[str]:
+    """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first."""
+    needed = [SOLVER[0], OUTPUTS]
+    if not is_warm(SOLVER) and build(scene).plane is None:
+        needed[0] = SOLVER[1]
+    if scene.time is not None and scene.model.kind == "adaptive":
+        needed.append(ZONES)
+    if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
+        needed.append(MODEL_ERROR)
+    return needed
+
+
+def compile_beside(scene: Scene) -> None:
+    """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
+
+    Does nothing where all is compiled, or where there is one core.
+    """
+    if is_warm((*SOLVER, OUTPUTS, ZONES, MODEL_ERROR)) or (os.cpu_count() or 1) < 2 or not sys.executable:
+        return
+    missing = [name for name in kernels_of(scene)[1:] if not is_warm([name])]
+    if missing:
+        command = [sys.executable, "-c", f"from hybrid.simulation.first_use import compile_all; compile_all({missing})"]
+        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+
+
+def compile_all(names: Sequence[str]) -> None:
+    """Compile kernels other than the solver, in this process."""
+    scene = validate_scene(SAMPLE)
+    model = build(scene)
+    if OUTPUTS in names:
+        _compile_outputs(model)
+    if ZONES in names:
+        _compile_zones(scene, model)
+    if MODEL_ERROR in names:
+        _compile_model_error(model)
+
+
+def _compile_outputs(model: Model) -> None:
+    from hybrid.kernels.energies import observe
+    from hybrid.kernels.seabed import stored
+
+    n, x = model.cells, model.start
+    observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4))
+    stored(model.line, model.sea.values, x.r)
+
+
+def _compile_zones(scene: Scene, model: Model) -> None:
+    from hybrid.simulation.initial_zones import manager_for
+
+    manager = manager_for(scene, model, first_resolution(scene), None)
+    manager.weigh(model.line, model.sea.values, model.ends.values, model.start, 0.0)
+    manager.first(model.start)
+    manager.remember(model.start)
+    manager.review(0.0, model.start)
+
+
+def _compile_model_error(model: Model) -> None:
+    from hybrid.kernels.bending_error import Step
+    from hybrid.kernels.entry import workspace
+    from hybrid.simulation.bending_correction import corrector_for
+
+    work = workspace(model.cells, keep=True)
+    step = Step(work.u, 0.0, 0.0, 0.0, 0.0)
+    with np.errstate(all="ignore"):
+        corrector_for(model).follow(model.line, model.sea.values, model.ends.values, model.start, step, work)
