@@ -9,6 +9,7 @@ from typing import Annotated, Any
 from pydantic import AfterValidator, BeforeValidator, Field, model_validator
 
 from hybrid.scene.base import Finding, Table, Words, refuse
+from hybrid.scene.suggestions import decimal_comma
 
 # Units in which a size may be given, what they measure, and how much of the SI unit they are.
 UNITS = {
@@ -40,15 +41,8 @@ def amount(text: str) -> tuple[str, float]:
 def _advice(text: str) -> str:
     """What to write instead."""
     if re.fullmatch(r"\s*[0-9]+,[0-9]+\s*\S+\s*", text):
-        return f"a decimal point: {text.replace(',', '.').replace(' ', '')}"
-    if " and " in text or "," in text:
-        return "for two outputs write {position: 3 cm, tension: 50 N}"
-    said = re.fullmatch(r"\s*([0-9.]+)\s*(percent|per cent|pct|ft|feet|in|inch|inches|lbf|kgf)\s*", text)
-    if said is not None:
-        known = {"ft": ("m", 0.3048), "feet": ("m", 0.3048), "lbf": ("N", 4.448), "kgf": ("N", 9.807)}
-        unit, size = known.get(said[2], ("m", 0.0254) if said[2].startswith("in") else ("%", 1.0))
-        return f"write {float(said[1]) * size:.3g}{'' if unit == '%' else ' '}{unit}"
-    return f"units are {', '.join(UNITS)}; 1% is usual"
+        return decimal_comma(text)
+    return f"a number with a unit: {', '.join(UNITS)}; for two outputs {{position: 3 cm, tension: 50 N}}"
 
 
 def _is_text(value: Any) -> Any:

@@ -6,7 +6,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 
 from __future__ import annotations
 
-from typing import Annotated, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
@@ -172,12 +172,6 @@ Loading = Annotated[
 ]
 
 
-def _normal_is_across(tangent: tuple[float, float, float], normal: tuple[float, float, float] | None) -> None:
-    if normal is not None and parallel(tangent, normal):
-        expected = "a direction across the tangent; this one is parallel to it"
-        refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
-
-
 class GivenLoad(NamedTuple):
     """A force [N] or moment [N m] that a scene gives at an end, inertial frame.
 
@@ -191,28 +185,38 @@ class GivenLoad(NamedTuple):
     ramp: float | None
 
 
+_LOADS: dict[str, Literal["force", "moment"]] = {"force": "force", "moment": "moment", "thrust": "force"}
+
+
 class EndTable(Table):
-    """What the program asks of an end, whatever its kind: a kind overrides what it holds, moves or carries."""
+    """What the program asks of an end, whatever its kind: by the keys of the kind, or by what it overrides."""
+
+    def _own(self, key: str) -> Any:
+        """The value of a key, None where the kind has none."""
+        return getattr(self, key) if key in type(self).model_fields else None
 
     @property
     def held_position(self) -> Triple | None:
         """Position that is held, inertial frame [m]."""
-        return None
+        position: Triple | None = self._own("position")
+        return position
 
     @property
     def first_position(self) -> Triple | None:
         """Where the search of the equilibrium puts the end first [m]."""
-        return self.held_position
+        return self.held_position or self._own("initial_guess")
 
     @property
     def held_tangent(self) -> Triple | None:
         """Direction that is held, of any length."""
-        return None
+        tangent: Triple | None = self._own("tangent")
+        return tangent
 
     @property
     def held_normal(self) -> Triple | None:
         """Direction of the material axis a1 that the scene gives, of any length."""
-        return None
+        normal: Triple | None = self._own("normal")
+        return normal
 
     @property
     def holds_twist(self) -> bool:
@@ -227,29 +231,33 @@ class EndTable(Table):
     @property
     def prescribed_motion(self) -> Motion | None:
         """How what is held moves."""
-        return None
+        motion: Motion | None = self._own("motion")
+        return motion
 
     @property
     def loads(self) -> tuple[GivenLoad, ...]:
         """Forces and moments given at the end."""
-        return ()
+        found = []
+        for key, what in _LOADS.items():
+            load = self._own(key)
+            if isinstance(load, Load):
+                found.append(GivenLoad(what, (key, "value"), load.value, load.until, load.ramp))
+            elif load is not None:
+                found.append(GivenLoad(what, (key,), load, None, None))
+        return tuple(found)
 
     @property
     def acts_by_moment(self) -> bool:
         """Whether a tangent is held or a moment given: a cable that ends in a catenary transmits neither."""
         return self.held_tangent is not None or any(load.what == "moment" for load in self.loads)
 
-
-def _given(**loads: Triple | Load | None) -> tuple[GivenLoad, ...]:
-    """The loads that are given, by the key of the end that gives them."""
-    found = []
-    for key, load in loads.items():
-        what: Literal["force", "moment"] = "moment" if key == "moment" else "force"
-        if isinstance(load, Load):
-            found.append(GivenLoad(what, (key, "value"), load.value, load.until, load.ramp))
-        elif load is not None:
-            found.append(GivenLoad(what, (key,), load, None, None))
-    return tuple(found)
+    @model_validator(mode="after")
+    def _normal_is_across(self) -> Self:
+        tangent, normal = self.held_tangent, self.held_normal
+        if tangent is not None and normal is not None and parallel(tangent, normal):
+            expected = "a direction across the tangent; this one is parallel to it"
+            refuse([Finding(("normal",), expected, "any direction not along the tangent will do")])
+        return self
 
 
 class Pinned(EndTable):
@@ -260,14 +268,6 @@ class Pinned(EndTable):
     )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
-
-    @property
-    def held_position(self) -> Triple:
-        return self.position
-
-    @property
-    def prescribed_motion(self) -> Motion | None:
-        return self.motion
 
     @model_validator(mode="after")
     def _turning_is_free(self) -> Pinned:
@@ -289,29 +289,8 @@ class Clamped(EndTable):
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
 
     @property
-    def held_position(self) -> Triple:
-        return self.position
-
-    @property
-    def held_tangent(self) -> Triple:
-        return self.tangent
-
-    @property
-    def held_normal(self) -> Triple | None:
-        return self.normal
-
-    @property
     def holds_twist(self) -> bool:
         return not self.swivel
-
-    @property
-    def prescribed_motion(self) -> Motion | None:
-        return self.motion
-
-    @model_validator(mode="after")
-    def _frame(self) -> Clamped:
-        _normal_is_across(self.tangent, self.normal)
-        return self
 
 
 class Guided(EndTable):
@@ -326,28 +305,11 @@ class Guided(EndTable):
     )
 
     @property
-    def held_tangent(self) -> Triple:
-        return self.tangent
-
-    @property
-    def held_normal(self) -> Triple | None:
-        return self.normal
-
-    @property
     def holds_twist(self) -> bool:
         return self.normal is not None
 
-    @property
-    def prescribed_motion(self) -> Motion | None:
-        return self.motion
-
-    @property
-    def loads(self) -> tuple[GivenLoad, ...]:
-        return _given(force=self.force)
-
     @model_validator(mode="after")
-    def _frame(self) -> Guided:
-        _normal_is_across(self.tangent, self.normal)
+    def _only_turns(self) -> Guided:
         if self.motion is not None:
             expected = "rotation only, because the position of a guided end is free"
             fix = "use roll, pitch or yaw here; kind: clamped can be moved"
@@ -361,10 +323,6 @@ class Free(EndTable):
     kind: Literal["free"] = Field(default="free", description="neither position nor direction held")
     force: Loading | None = Field(default=None, description="force on the end, inertial frame [N]")
     moment: Loading | None = Field(default=None, description="moment on the end, inertial frame [N m]")
-
-    @property
-    def loads(self) -> tuple[GivenLoad, ...]:
-        return _given(force=self.force, moment=self.moment)
 
 
 class Body(EndTable):
@@ -383,14 +341,6 @@ class Body(EndTable):
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")
-
-    @property
-    def first_position(self) -> Triple | None:
-        return self.initial_guess
-
-    @property
-    def loads(self) -> tuple[GivenLoad, ...]:
-        return _given(thrust=self.thrust)
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""

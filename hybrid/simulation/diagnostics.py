@@ -264,6 +264,8 @@ class Diagnostics:
 
     def stretch(self, state: State) -> Stop:
         """A section that is stretched beyond what it bears."""
+        if self._model.inextensible:
+            return None
         over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 

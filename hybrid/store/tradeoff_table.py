@@ -185,7 +185,7 @@ class TradeTable:
         lines = ["| " + " | ".join(head) + " |", "|---|---|" + "---:|" * 10 + "---|"]
         front, best = self.front(), self.recommended
         for row in self.rows:
-            mark = "**take this**" if row == best else "front" if row in front else ""
+            mark = "**recommended**" if row == best else "front" if row in front else ""
             status = row.status + (f": {row.cause}" if row.cause else "")
             cells = [row.name, status]
             for name, unit in (("position", "m"), ("pull", "N")):

@@ -50,15 +50,14 @@ def _page(table: TradeTable) -> Page:
         return Page(table.title or "(no title)", table.recommendation, 2, size=_SIZE, empty="no run came to an end")
     part = table.asked_for if table.asked_for.strip().endswith("%") else ""
     scale = float(part.strip().rstrip("%")) if part else 1.0
-    title = (
-        "error, the larger of position (of length) and pull (of largest)" if part else "error over what is asked for"
-    )
-    up = ("error", "%") if part else ("error / asked", "")
+    title, up = "error over what is asked for", ("error / asked", "")
+    if part:
+        title, up = "error, the larger of position (of length) and end force (of largest)", ("error", "%")
     asked = (scale, f"asked: {table.asked_for}")
     panels = {"score": _panel(table, title, up, lambda row: scale * table.score(row), asked, named=True)}
     for name, unit, bound in (("position", "m", table.bound_position), ("pull", "N", table.bound_pull)):
         if any(getattr(row, name) is not None for row in table.choices):
-            title = f"error of {'position' if name == 'position' else 'pull at the ends'}"
+            title = f"error of {'position' if name == 'position' else 'end forces'}"
             limit, doubt = (bound, ""), table.doubt(name)
             panels[name] = _panel(table, title, ("", unit), attrgetter(name), limit, doubt=doubt)
     mosaic = [["score", name if name in panels else "."] for name in ("position", "pull")]
@@ -100,7 +99,7 @@ def _panel(
             items.append(Text(x, y, said, colour, (side, lift), across, "baseline", SMALL - 1.0))
     front = [row for row in table.front() if figure_of(row)]
     best = [row for row in front if row == table.recommended]
-    for chosen, symbol, name, face, size in ((front, "o", "front", "", 10.0), (best, "*", "take this", STAR, 15.0)):
+    for chosen, symbol, name, face, size in ((front, "o", "front", "", 10.0), (best, "*", "recommended", STAR, 15.0)):
         items += [Marks(*_places(chosen, figure_of), symbol, name, face, INK, 0.9, size)] * bool(chosen)
     costs = [row.cpu for rows in groups.values() for row in rows if row.cpu]
     errors = [z for rows in groups.values() for row in rows if (z := figure_of(row))]

@@ -278,7 +278,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
         "it keeps force_rod",
     ):  # fmt: skip
         assert said in page, said
-    assert page.count("**take this**") == 1
+    assert page.count("**recommended**") == 1
     assert_drawn(tmp_path / "trade.png")
 
 
@@ -368,7 +368,7 @@ def test_the_picture_shows_every_run_at_its_place() -> None:
     lines = {line.get_label(): line for line in position.get_lines()}
     np.testing.assert_allclose(lines["rod"].get_xydata(), [(0.1, 2.0), (0.5, 0.5), (3.0, 0.03)])
     np.testing.assert_allclose(lines["MoorDyn"].get_xydata(), [(9.0, 0.2)])
-    np.testing.assert_allclose(lines["take this"].get_xydata(), [(0.3, 0.7)])
+    np.testing.assert_allclose(lines["recommended"].get_xydata(), [(0.3, 0.7)])
     assert lines["front"].get_xydata().shape == (4, 2)
     assert position.get_xscale() == position.get_yscale() == "log"
     (low, high), (left, right) = position.get_ylim(), position.get_xlim()

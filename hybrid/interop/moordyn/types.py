@@ -8,10 +8,8 @@ from dataclasses import dataclass
 
 from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, number, simple
+from hybrid.scene.cable import SECTION_DENSITIES
 
-# Mass over volume of a line, kg/m^3, of anything from foam to a chain whose diameter is that of its bar: 100 to 30 000.
-# A diameter in mm or inches, or a mass in t/m or g/m, is out by 10^3 or more.
-DENSITIES = (20.0, 2.0e5)
 # Speed of waves of tension sqrt(EA/m), m/s, from rubber to aramid: 100 to 12 000.  EA in kN is out by 30.
 SPEEDS = (20.0, 3.0e4)
 
@@ -117,9 +115,10 @@ def _damping(source: Source, row: Row, cell: str, notes: list[Note]) -> float:
 def _units(source: Source, row: Row, diameter: float, mass: float, ea: float) -> None:
     """Complain of values that only another unit explains."""
     density = mass / (math.pi / 4 * diameter**2) if diameter > 0.0 else math.nan
-    if density < DENSITIES[0] or density > DENSITIES[1]:
-        expected = f"a line of {DENSITIES[0]:g} to {DENSITIES[1]:g} kg/m^3; this one has {density:.3g} kg/m^3"
-        fix = "diameter in m and mass in kg/m; " + ("mm?" if density < DENSITIES[0] else "g/m, or a radius?")
+    least, most = SECTION_DENSITIES
+    if density < least or density > most:
+        expected = f"a line of {least:g} to {most:g} kg/m^3; this one has {density:.3g} kg/m^3"
+        fix = "diameter in m and mass in kg/m; " + ("mm?" if density < least else "g/m, or a radius?")
         source.complain("diameter and mass", f"{diameter:g} {mass:g}", expected, fix, row.line)
     speed = math.sqrt(ea / mass) if mass > 0.0 and ea > 0.0 else math.nan
     if speed < SPEEDS[0] or speed > SPEEDS[1]:
