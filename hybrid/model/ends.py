@@ -32,10 +32,12 @@ def transported(first: Floats, tangents: Floats) -> Floats:
     both = t[:-1] + t[1:]
     for i in range(1, len(t)):
         a, d = out[i - 1], t[i]
-        c = 1.0 + float(t[i - 1].dot(d))
-        # a fold has no smallest rotation: any director normal to both will do, and a rod refuses the fold later
-        b = a - a.dot(d) / c * both[i - 1] if c > 1e-12 else a
-        b = b - b.dot(d) * d
+        b, along = a, a.dot(d)
+        if along != 0.0:  # it is not, in a plane that the director is normal to
+            c = 1.0 + float(t[i - 1].dot(d))
+            # a fold has no smallest rotation: any director normal to both will do, and a rod refuses the fold later
+            b = a - along / c * both[i - 1] if c > 1e-12 else a
+            b = b - b.dot(d) * d
         out[i] = b / sqrt(b.dot(b))
     return out
 

@@ -197,11 +197,11 @@ def _points(out: Material, scene: Scene) -> None:
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     rho = fluid.density if fluid else 0.0
     everything = list(attachments_at(scene))
-    near = 1e-9 * scene.length
+    length = scene.length
     at: list[float] = []
     for x, _ in sorted(everything, key=lambda pair: pair[0]):
-        if not at or x - at[-1] > near:
-            at.append(min(x, scene.length))
+        if not at or x - at[-1] > 1e-9 * length:
+            at.append(min(x, length))
     out.at = np.array(at)
     out.lift = np.zeros(len(at))
     out.points = {name: np.zeros(len(at)) for name in POINT}

@@ -123,7 +123,8 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         _check_nodes(s, scene)
         zones = tuple(Zone(*zone) for zone in matched(zones, [["", 0.0, 0.0]] * len(zones), "zones"))
         known = all(x.kind in ("rod", "catenary") and x.s_a < x.s_b for x in zones)
-        if not (known and zones and {x.s_b for x in zones} <= set(s.tolist()) and zones[-1].s_b == s[-1]):
+        ends = [s[0], *(x.s_b for x in zones)]
+        if not (known and [x.s_a for x in zones] == ends[:-1] and set(ends) <= set(s.tolist()) and ends[-1] == s[-1]):
             raise ValueError("zones that no line has")
         first = model = build(scene, resolution, (s, zones))
     plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None

@@ -38,7 +38,14 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
         said = process.communicate()[1].decode()
         assert process.returncode == 0, said
     wall = time.monotonic() - begin
-    went = {"killed": 0, "before there was a file": 0, "opened": 0, "the same": 0, "outputs recomputed": 0}
+    went = {
+        "killed": 0,
+        "before there was a file": 0,
+        "before its first output": 0,
+        "opened": 0,
+        "the same": 0,
+        "outputs recomputed": 0,
+    }
     path = folder / "run.h5"
     while went["killed"] < count:
         for old in folder.glob("*run*"):
@@ -58,6 +65,12 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
                 break
             with hybrid.open(path) as result:
                 went["opened"] += 1
+                begun = len(result.times) > 0
+            if not begun:  # some 50 ms between the file and its first output: there is nothing to resume
+                went["before its first output"] += 1
+                path.unlink()
+                break
+            with hybrid.open(path) as result:
                 if result.status != "complete":  # else it was killed while its errors were estimated, or after
                     with opened(path) as file:
                         lost = int((result.times > read_checkpoint(file).t).sum())
