@@ -13,6 +13,8 @@ from hybrid.model.ledger import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.schema import Scene
 
+# Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance).
+IN_PLANE = 1e-8
 WHAT = "computed in a plane (3 unknowns a node)"
 
 
@@ -53,6 +55,11 @@ def _lies_in(plane: Floats, state: State, ends: Ends, tolerance: float) -> bool:
     tangents = ends.frame.reshape(2, 3, 3)[:, :, 2]
     groups: Iterable[Floats] = (state.r - state.r[0], state.v, tangents)
     return all(float(np.abs(x @ n).max()) <= tolerance * float(np.abs(x).max()) for x in groups)
+
+
+def leaves_plane(plane: Floats, state: State, length: float) -> bool:
+    """Whether nodes of a state are further from the plane (3, 3) than IN_PLANE of the length, m."""
+    return bool(np.abs((state.r - state.r[0]) @ plane[2]).max() > IN_PLANE * length)
 
 
 def planar(line: Line, plane: Floats) -> Line:

@@ -11,7 +11,7 @@ from hybrid.kernels.state import State
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
-from hybrid.model.plane import planar, untwist
+from hybrid.model.plane import leaves_plane, planar, untwist
 from hybrid.scene.schema import Scene
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium, solve_statics
@@ -43,7 +43,8 @@ def solve_model(
     """
     sea, ends = model.sea.at(t), model.ends.at(t)
     rest = model.length, model.tension_scale, model.slack_floor
-    if model.plane is not None and not model.line.bits & PLANAR:
+    in_space = model.plane is None or model.line.bits & PLANAR or leaves_plane(model.plane, start, model.length)
+    if model.plane is not None and not in_space:
         line, flat = planar(model.line, model.plane), start.copy()
         untwist(line, model.ends.values, model.cable.held_tangent, flat)
         try:

@@ -15,14 +15,14 @@ import numpy as np
 from hybrid.kernels.report import PUSH_ENERGY, WRONG_PIVOTS
 from hybrid.kernels.state import Floats, State
 from hybrid.model.build import Model
-from hybrid.model.plane import in_space, planar, untwist
+from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.scene.schema import Scene
 from hybrid.solve.plane_stability import GROWN, Push
 from hybrid.solve.stepper import Stepper
 
-# Of the length: how far an equilibrium may be out of the plane and count as in it (Newton's tolerance), and how far
-# the push displaces a cable that goes on in space (a hundred times that, and nothing that anybody would see).
-IN_PLANE, HANDED_ON = 1e-8, 1e-6
+# Of the length: how far the push displaces a cable that goes on in space (a hundred times what an equilibrium may be out
+# of the plane, and nothing that anybody would see).
+HANDED_ON = 1e-6
 
 Note = Callable[[int, str, str], None]
 
@@ -38,9 +38,9 @@ class PlaneMonitor:
         """The model that the motion begins with, in the plane if it is in one; what leaves the plane is noted."""
         if model.plane is None:
             return model
-        out = np.abs((state.r - state.r[0]) @ model.plane[2])
-        if not self.insists and out.max() > IN_PLANE * model.length:
+        if not self.insists and leaves_plane(model.plane, state, model.length):
             text = "the equilibrium found leaves the plane of the scene: it goes on in space"
+            out = np.abs((state.r - state.r[0]) @ model.plane[2])
             note(int(np.argmax(out)), "out of plane", text)
             return replace(model, plane=None)
         plane = model.plane
