@@ -14,6 +14,7 @@ import platform
 import shutil
 import tempfile
 from collections.abc import Sequence
+from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 
@@ -21,6 +22,7 @@ KERNELS = ("kernels/*.py", "adapt/zone_rules.py")
 KEPT_CACHES = 4  # older compilations are deleted; four let a few versions or branches live side by side
 
 
+@cache
 def kernel_hash(package: Path = Path(__file__).parents[1]) -> str:
     """Hash of all kernel sources and of the compiler's version."""
     digest = hashlib.sha256()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from collections.abc import Callable
 from pathlib import Path
 from types import FunctionType
@@ -26,6 +27,16 @@ class _Kernel(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """A constant counts as any other value of its type: f(x, 0) and f(x, 1) are compiled once."""
         return super().get_call_template([numba.types.unliteral(x) for x in args], kws)
+
+    def compile(self, sig: Any) -> Any:
+        """Compile, or load from disk, without searches for garbage: a fifth of the time."""
+        if not gc.isenabled():
+            return super().compile(sig)
+        gc.disable()
+        try:
+            return super().compile(sig)
+        finally:
+            gc.enable()
 
 
 class _Inner(_Kernel):

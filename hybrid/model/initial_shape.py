@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 import numpy as np
-from scipy.optimize import brentq
 
 from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
@@ -200,6 +199,8 @@ def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
     part = min(span / length, 1.0 - 1e-12)
     half = np.pi  # half the arc's angle; a full circle when the ends coincide
     if part > 0.0:
+        from scipy.optimize import brentq  # slow to import
+
         half = float(brentq(lambda x: np.sinc(x / np.pi) - part, 0.0, np.pi))
     radius = 0.5 * length / half
     angle = half * (2.0 * s / length - 1.0)

@@ -20,8 +20,8 @@ from hybrid.scene.schema import Scene
 from hybrid.solve.plane_stability import GROWN, Push
 from hybrid.solve.stepper import Stepper
 
-# Of the length: how far the push displaces a cable that goes on in space (a hundred times what an equilibrium may be out
-# of the plane, and nothing that anybody would see).
+# Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
+# out of the plane, and nothing that anybody would see.
 HANDED_ON = 1e-6
 
 Note = Callable[[int, str, str], None]

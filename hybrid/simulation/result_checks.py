@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from scipy.interpolate import CubicSpline
 
 from hybrid.errors import ZONE_EVENTS
 from hybrid.store.reader import Result
@@ -27,6 +26,8 @@ def undersampled_end_forces(result: Result, errors: Mapping[str, np.ndarray]) ->
     times, t = result.times, result["steps/t"] if "steps/t" in result else np.zeros(0)
     if len(times) < 4 or len(t) <= len(times):
         return out
+    from scipy.interpolate import CubicSpline  # slow to import
+
     largest = max(float(result[f"steps/end_force_{end}"].max()) for end in ("start", "end"))
     for end in ("start", "end"):
         name = f"end_force_{end}"

@@ -6,7 +6,6 @@ In a plane the stiffness falls apart in two, within the plane and across it.
 from __future__ import annotations
 
 import numpy as np
-from scipy.linalg import LinAlgError, cholesky_banded
 
 from hybrid.kernels import entry
 from hybrid.kernels.block_elimination import SIZE, WIDTH
@@ -60,6 +59,8 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray,
     axial: (N, 3, 3) N/m, of each cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q,
     normal, where the rows are those of a line in that plane.
     """
+    from scipy.linalg import cholesky_banded  # slow to import
+
     K = _stiffness(rows, axial, plane)
     n, _, m, _ = K.shape
     free = np.ones((n, m), bool)
@@ -83,7 +84,7 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray,
     band[0, held] = 1.0
     try:
         cholesky_banded(band, lower=True, check_finite=False)
-    except LinAlgError:
+    except np.linalg.LinAlgError:
         return False
     return True
 
