@@ -27,6 +27,9 @@ SAMPLE = {
 }  # fmt: skip
 
 
+_beside: list[subprocess.Popen[bytes]] = []  # processes that compile; each ends by itself
+
+
 def kernels_of(scene: Scene) -> list[str]:
     """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first."""
     needed = [SOLVER[0], OUTPUTS]
@@ -49,7 +52,8 @@ def compile_beside(scene: Scene) -> None:
     missing = [name for name in kernels_of(scene)[1:] if not is_warm([name])]
     if missing:
         command = [sys.executable, "-c", f"from hybrid.simulation.first_use import compile_all; compile_all({missing})"]
-        subprocess.Popen(command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        nothing = subprocess.DEVNULL
+        _beside.append(subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=nothing))
 
 
 def compile_all(names: Sequence[str]) -> None:

@@ -34,7 +34,7 @@ def far(a: Result, b: Result) -> np.ndarray:
     return np.asarray(np.linalg.norm(a["position"] - b["position"], axis=2).max(axis=1))
 
 
-@pytest.mark.parametrize("name", ["bending", "sagging"])
+@pytest.mark.parametrize("name", [pytest.param("bending", marks=pytest.mark.slow), "sagging"])
 def test_error_goes_on_across_changes_of_zones(name: str) -> None:
     """Estimated over true distance to the rod: 0.6 to 1.8 nine times in ten, through every change of zones.
 

@@ -30,9 +30,11 @@ CASES = {
     "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),
     "accuracy by a second result": ("touchdown", ["accuracy=0.3%", "time={duration: 5}"]),
 }
+# What they consist of others do too, together.
+LONG = ("friction, slack", "error figure", "accuracy by a second result", "adaptive in space")
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [pytest.param(x, marks=pytest.mark.slow) if x in LONG else x for x in CASES])
 def test_a_stopped_run_goes_on_bit_for_bit(name, tmp_path, monkeypatch):
     file, settings = CASES[name]
     scene = hybrid.load_scene(EXAMPLES / f"{file}.yaml", settings)

@@ -114,6 +114,7 @@ def test_it_opens_complete_and_without_complaint(visit: Visit) -> None:
     assert not upload, "plotly would offer to upload the picture"
 
 
+@pytest.mark.slow
 def test_its_pictures_are_not_blank(visit: Visit) -> None:
     for name in ("cable", "zones", "pulls", "range-tension", "energy"):
         assert visit.pixels("#cable-plot" if name == "cable" else f"#plot-{name}").std() > 5.0, name
@@ -165,6 +166,7 @@ def test_pointing_at_an_event_shows_what_happened(visit: Visit) -> None:
         assert words in visit.page.text_content("#plot-zones .hoverlayer").replace("\xa0", " ")
 
 
+@pytest.mark.slow
 def test_colours_and_axes_switch(visit: Visit) -> None:
     def look() -> tuple[list[float], dict[str, float]]:
         colours = visit.page.evaluate("Array.from(document.getElementById('cable-plot').data[1].line.color)")
@@ -186,6 +188,7 @@ def test_colours_and_axes_switch(visit: Visit) -> None:
     assert "Axes stretched: y ×" in visit.page.inner_text("#cable-said")
 
 
+@pytest.mark.slow
 def test_show_takes_the_reader_to_the_moment(visit: Visit) -> None:
     visit.page.click("#fact-tension button.show")
     assert visit.page.inner_text("#now") == "t = 2.50 s"
@@ -195,6 +198,7 @@ def test_show_takes_the_reader_to_the_moment(visit: Visit) -> None:
     assert visit.page.inner_text("#now") == "t = 7.00 s"
 
 
+@pytest.mark.slow
 def test_a_phone_shows_it_without_scrolling_sideways(browser: Any, page_file: Path) -> None:
     phone = {"viewport": {"width": 390, "height": 844}, "is_mobile": True, "has_touch": True}
     opened = Visit(browser, page_file, **phone)
@@ -214,9 +218,19 @@ def test_a_phone_shows_it_without_scrolling_sideways(browser: Any, page_file: Pa
 @pytest.mark.parametrize(
     "asked",
     [
-        {"outputs": 1},
+        pytest.param({"outputs": 1}, marks=pytest.mark.slow),
         {"outputs": 0, "status": "failed", "message": "nothing moved"},
-        {"rod": False, "seabed": False, "energy": False, "steps": False, "status": "interrupted", "message": "Ctrl-C"},
+        pytest.param(
+            {
+                "rod": False,
+                "seabed": False,
+                "energy": False,
+                "steps": False,
+                "status": "interrupted",
+                "message": "Ctrl-C",
+            },
+            marks=pytest.mark.slow,
+        ),
         {"title": "<script>window.evil = 1</script><img src=x onerror='window.evil = 1'>", "outputs": 3}
         | {
             "scene": "</script><script>window.evil = 1</script>",
