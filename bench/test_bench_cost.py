@@ -48,7 +48,7 @@ def moving(zones):
     stepper = Stepper(model.line, model.length, model.tension_scale)
     state = found.state.copy()
     state.v[:, 1] = 0.1 * np.sin(0.25 * np.pi * model.line.s)  # no turn at the guide, no speed at the pin
-    stepper.ignite(model.sea.at(np.inf), model.ends.at(np.inf), np.zeros((2, 3)), state)
+    stepper.consistent_accelerations(model.sea.at(np.inf), model.ends.at(np.inf), np.zeros((2, 3)), state)
     return model, stepper, state
 
 

@@ -195,7 +195,7 @@ def test_model_error_cost():
             old, new = rest.copy(), rest.copy()
             stepper, corrector = Stepper(m.line, m.length, m.tension_scale, keep=keep), corrector_for(m)
             corrector.rest(m.sea.at(0.0), m.ends.at(0.0), old)
-            stepper.ignite(m.sea.at(0.0), m.ends.at(0.0), m.ends.acceleration(0.0, 1e-3 * dt), old)
+            stepper.consistent_accelerations(m.sea.at(0.0), m.ends.at(0.0), m.ends.acceleration(0.0, 1e-3 * dt), old)
             took = []
             for k in range(150):
                 sea, ends = m.sea.at((k + 1) * dt), m.ends.at((k + 1) * dt)

@@ -81,7 +81,7 @@ class Line:
         if dimension == 2 and watched:
             self.stepper.push = Push(line, model.length, model.time_scale)
         self.start.v[:, 2] = 0.1 * np.sin(np.pi * model.line.s / model.length)
-        self.stepper.ignite(self.sea, self.ends, np.zeros((2, 3)), self.start)
+        self.stepper.consistent_accelerations(self.sea, self.ends, np.zeros((2, 3)), self.start)
         self.cells, self.each, self.iterations = model.cells, [], 0.0
 
     def time(self):

@@ -114,7 +114,9 @@ def motion(what: Scene, kick: Kick | None = None) -> Iterator[tuple[float, State
         ).state
     if kick:
         kick(old, model)
-    stepper.ignite(model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), old)  # held ends start from rest
+    stepper.consistent_accelerations(
+        model.sea.at(0.0), model.ends.at(0.0), np.zeros((2, 3)), old
+    )  # held ends start from rest
     new = old.copy()
     yield 0.0, old
     steps = round(time.duration / time.step)

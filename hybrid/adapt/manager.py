@@ -18,7 +18,7 @@ from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, 
 from hybrid.kernels.criteria import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import advance, shares
-from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, twist_of_rods, weigh
+from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, evaluate_criteria, twist_of_rods
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material, tension_floor
 
@@ -182,7 +182,7 @@ class DomainManager:
 
     # --- watching ------------------------------------------------------------------------------
 
-    def weigh(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float, t: float = 0.0) -> float:
+    def evaluate_criteria(self, line: Line, sea: Sea, ends: Ends, state: State, dt: float, t: float = 0.0) -> float:
         """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
 
         dt = 0: there was none, or it was on other nodes.
@@ -193,19 +193,19 @@ class DomainManager:
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
         ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
         self.torque = self._torque(line, ends, state) if self.twisted else 0.0
-        self.loudest = weigh(
+        self.loudest = evaluate_criteria(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
             self.EI, self.w, self.bent, self.node, self.floor, self.tolerance / self.left, self.torque,
             self.base_of_cell,
             self.free, self.turn, self.twisting, self.ratios,
         )  # fmt: skip
         if self.loaded:
-            self._weigh_moments(state)
+            self._evaluate_moments(state)
         if self.user is not None:
             self._ask_user(line, state, t)
         return self.loudest
 
-    def _weigh_moments(self, state: State) -> None:
+    def _evaluate_moments(self, state: State) -> None:
         """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does; of its full size.
 
         What of it turns about the cable is a torque, whether rods feel it already or not.
@@ -313,7 +313,7 @@ class DomainManager:
         return change
 
     def first(self, state: State) -> np.ndarray:
-        """Base cells that ask to be rod, whatever they are, after `weigh`; the ratios begin anew."""
+        """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
         n = self.layout.rod.size
         self._complete()
         rules = self.rules(state)

@@ -99,7 +99,7 @@ def get9(A, i):
 
 
 @inner
-def put(W, row, col, A, sign):
+def set_block(W, row, col, A, sign):
     """W[row:row+3, col:col+3] = sign * A."""
     for j in range(3):
         o = (row + j) * WIDTH + col
@@ -308,11 +308,11 @@ def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, 
         W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = hold, hold, hold
         rhs = scale(hold, rhs)
     else:
-        put(W, 1, 1, force_before.Nm, 1.0)
-        put(W, 1, 6, madd(force_before.Nm, node.G1), -1.0)
-        put(W, 1, 11, node.D, 1.0)
-        put(W, 1, 16, msub(node.G2, force.Np), 1.0)
-        put(W, 1, 20, force.Np, 1.0)
+        set_block(W, 1, 1, force_before.Nm, 1.0)
+        set_block(W, 1, 6, madd(force_before.Nm, node.G1), -1.0)
+        set_block(W, 1, 11, node.D, 1.0)
+        set_block(W, 1, 16, msub(node.G2, force.Np), 1.0)
+        set_block(W, 1, 20, force.Np, 1.0)
         for j in range(3):
             o = (j + 1) * WIDTH
             W[o + 4] = -force_before.nm[j]

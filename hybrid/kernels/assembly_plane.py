@@ -12,10 +12,8 @@ from hybrid.kernels.block_elimination_plane import WIDE, eliminate2, eliminate_c
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.node_forces_plane import loads2
+from hybrid.kernels.node_forces_plane import node_loads2
 from hybrid.kernels.plane import (
-    about_normal,
-    across2,
     angle_between,
     chord2,
     dot2,
@@ -24,9 +22,11 @@ from hybrid.kernels.plane import (
     mscale2,
     msub2,
     outer2,
-    part2,
     rotary2,
-    spread2,
+    row_along_normal,
+    row_in_plane,
+    stiffness_about_normal,
+    to_space,
     turning2,
 )
 from hybrid.kernels.report import (
@@ -98,10 +98,10 @@ def cell_at(line, state, i, cv):
     if i >= line.h.shape[0]:
         return Cell(Chord(Z2, 0.0, 0.0), Z2, Z2, 0.0, Z2, 0.0)
     plane, bits = line.plane, line.bits
-    d, l, il = chord2(part2(plane, state.e, i))
+    d, l, il = chord2(row_in_plane(plane, state.e, i))
     e1, turn, g1, tau = Z2, 0.0, Z2, 0.0
     if bits & (ROTARY | STIFFNESS_DAMPING):
-        v, vn = part2(plane, state.v, i), part2(plane, state.v, i + 1)
+        v, vn = row_in_plane(plane, state.v, i), row_in_plane(plane, state.v, i + 1)
         e1 = (vn[0] - v[0], vn[1] - v[1])
         turn, g1 = turning2(d, il, e1, cv)
     if bits & STIFFNESS_DAMPING:
@@ -113,11 +113,11 @@ def cell_at(line, state, i, cv):
 def element_at_start(line, ends, state, cell, report):
     """The element between the start and the first cell."""
     plane = line.plane
-    M, A = -across2(plane, ends.moment, 0), Z2
+    M, A = -row_along_normal(plane, ends.moment, 0), Z2
     if line.element[0]:
         d, tau = cell.chord.d, cell.tau
-        k, k0 = about_normal(plane, state.a1, 0, d, line.kb, line.k0, 0)
-        rate = cell.turn - across2(plane, ends.spin, 0) if line.bits & STIFFNESS_DAMPING else 0.0
+        k, k0 = stiffness_about_normal(plane, state.a1, 0, d, line.kb, line.k0, 0)
+        rate = cell.turn - row_along_normal(plane, ends.spin, 0) if line.bits & STIFFNESS_DAMPING else 0.0
         M = k * (angle_between(end_chord(plane, ends.frame, 0), d) - k0 + tau * rate)
         A = (k * (cell.g[0] + tau * cell.g1[0]), k * (cell.g[1] + tau * cell.g1[1]))
         report[STIFFNESS_DAMPING_POWER] += k * tau * rate * rate
@@ -130,14 +130,14 @@ def element_after(line, ends, state, i, cell, following, report):
     n, plane = line.h.shape[0], line.plane
     M, A, B = 0.0, Z2, Z2
     if i + 1 == n:
-        M = across2(plane, ends.moment, 1)
+        M = row_along_normal(plane, ends.moment, 1)
     if i < n and line.element[i + 1]:
         d, g, g1 = cell.chord.d, cell.g, cell.g1
-        k, k0 = about_normal(plane, state.a1, i, d, line.kb, line.k0, i + 1)
+        k, k0 = stiffness_about_normal(plane, state.a1, i, d, line.kb, line.k0, i + 1)
         after, late, rate = following.chord.d, 0.5 * (cell.tau + following.tau), following.turn - cell.turn
         if i + 1 == n:
             after, late = end_chord(plane, ends.frame, 1), cell.tau
-            rate = across2(plane, ends.spin, 1) - cell.turn
+            rate = row_along_normal(plane, ends.spin, 1) - cell.turn
         M = angle_between(d, after) - k0
         if line.bits & STIFFNESS_DAMPING:
             M += late * rate
@@ -178,7 +178,7 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
         N0 = madd2(N0, outer2(il, m, (there.B[0] + here.A[0], there.B[1] + here.A[1])))
         Nm, Np = outer2(-il, m, here.B), outer2(-il, m, there.A)
         if line.bits & ROTARY:
-            a, b = part2(line.plane, state.vd, i), part2(line.plane, state.vd, i + 1)
+            a, b = row_in_plane(line.plane, state.vd, i), row_in_plane(line.plane, state.vd, i + 1)
             e2 = (b[0] - a[0], b[1] - a[1])
             g, Dg = rotary2(d, il, cell.e1, e2, cell.turn, line.rotary[i], cv, ca)
             f, N0 = (f[0] + g[0], f[1] + g[1]), madd2(N0, Dg)
@@ -190,19 +190,19 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
     """The balance of node i between two cells and their forces."""
     n, plane = line.h.shape[0], line.plane
     before, after = cell_before.chord, cell.chord
-    F, D, GL, GR = loads2(line, sea, i, r, u, state, before, after, cv, ca, report)
+    F, D, GL, GR = node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report)
     F = (F[0] + force.f[0] - force_before.f[0], F[1] + force.f[1] - force_before.f[1])
     if i == 0:
-        f = part2(plane, ends.force, 0)
+        f = row_in_plane(plane, ends.force, 0)
         F = (F[0] + f[0], F[1] + f[1])
-        report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = spread2(plane, F)
+        report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = to_space(plane, F)
     if i == n:
-        f = part2(plane, ends.force, 1)
+        f = row_in_plane(plane, ends.force, 1)
         F = (F[0] + f[0], F[1] + f[1])
-        report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = spread2(plane, F)
+        report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = to_space(plane, F)
     if (i == 0 and ends.held[0]) or (i == n and ends.held[1]):
-        x, y = part2(plane, ends.position, 0 if i == 0 else 1), part2(plane, r, i)
-        f = part2(plane, u, i)
+        x, y = row_in_plane(plane, ends.position, 0 if i == 0 else 1), row_in_plane(plane, r, i)
+        f = row_in_plane(plane, u, i)
         b = (x[0] - y[0] - f[0], x[1] - y[1] - f[1])
         return Balance(Z4, Z4, Z2, (1.0, 0.0, 0.0, 1.0), Z2, Z4, Z4, b, 1.0)
     big = max(abs(F[0]), abs(F[1]))
@@ -256,7 +256,7 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
         force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, report)
         node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         if rows.shape[0] > 0:
-            keep_rows(rows, i, node, force_before)
+            store_block_row(rows, i, node, force_before)
         if not eliminate(node, force_before, X, i, bent or bent_before):
             return i
         if i == n - 1:
@@ -268,7 +268,7 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
 
 
 @inner
-def keep_rows(rows, i, node, force_before):
+def store_block_row(rows, i, node, force_before):
     """The block row of node i: columns dr_{i-2}, dr_{i-1}, dT_{i-1}, dr_i, dT_i, dr_{i+1}, dr_{i+2}, right side."""
     K, L, back, D, ahead, U, V, b, _ = node
     row, hck, gap = force_before.row, force_before.hck, force_before.gap

@@ -17,7 +17,7 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-from hybrid.kernels.block_elimination import again
+from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
@@ -258,7 +258,7 @@ def advance_error(line, sea, ends, bending, state, step, X, W, old, new, most, a
     if moving:
         predict_error(old, s, history)
     right_hand_side(line, sea, ends, chords, state, step.u, M, moving, history, arrays.b)
-    if not again(X, W, arrays.b, x):
+    if not solve_again(X, W, arrays.b, x):
         return False, 0, -1
     clipped, where, far = 0, -1, 0.0
     for i in range(n + 1):

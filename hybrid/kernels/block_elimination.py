@@ -14,7 +14,7 @@ relation that everything before node i imposes on what follows (docs/theory.md, 
 Rows without bending have four unknowns and take a path of their own in the same march.
 
 Where X has room for more than the X_i, the march keeps there what another right-hand side of the same
-matrix needs (`again`): KEPT numbers a block,
+matrix needs (`solve_again`): KEPT numbers a block,
 
     wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
     narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
@@ -35,7 +35,7 @@ KEPT = 64  # numbers kept of a block, for another right-hand side
 
 
 @inner
-def take(W, o, X, i, l1, l2, l3, l4):
+def subtract_block(W, o, X, i, l1, l2, l3, l4):
     """Subtract (l1..l3, l4) . (dr, dpsi rows of X_i) from the row of W whose block i+1 begins at column o.
 
     All is read before anything is written, here and below: that leaves the compiler free.
@@ -57,8 +57,8 @@ def take(W, o, X, i, l1, l2, l3, l4):
 
 
 @inner
-def take_tension(W, o, X, i, l0):
-    """As `take` for the dT row of X_i."""
+def subtract_tension_row(W, o, X, i, l0):
+    """As `subtract_block` for the dT row of X_i."""
     p = i * ROW
     t0, t1, t2 = W[o] - l0 * X[p], W[o + 1] - l0 * X[p + 1], W[o + 2] - l0 * X[p + 2]
     t3, t4, t5 = W[o + 3] - l0 * X[p + 3], W[o + 4] - l0 * X[p + 4], W[o + 6] - l0 * X[p + 5]
@@ -69,7 +69,7 @@ def take_tension(W, o, X, i, l0):
 
 
 @inner
-def row_minus(W, o, p, f):
+def subtract_row(W, o, p, f):
     """Subtract f times the row of W at p from the row at o, over the pivot block and all to its right."""
     t0 = W[o + 10] - f * W[p + 10]
     t1 = W[o + 11] - f * W[p + 11]
@@ -102,7 +102,7 @@ def row_minus(W, o, p, f):
 
 
 @inner
-def solved_minus(X, x, y, f):
+def subtract_solved_row(X, x, y, f):
     """Subtract f times the solved row of X at y from that at x."""
     t0 = X[x] - f * X[y]
     t1 = X[x + 1] - f * X[y + 1]
@@ -144,13 +144,13 @@ def solve_block(W, X, i):
                 W[o + j], W[p + j] = W[p + j], W[o + j]
         inverse = 1.0 / W[o + 10 + c]
         for r in range(c + 1, SIZE):
-            row_minus(W, r * WIDTH, o, W[r * WIDTH + 10 + c] * inverse)
+            subtract_row(W, r * WIDTH, o, W[r * WIDTH + 10 + c] * inverse)
     for c in range(SIZE - 1, -1, -1):
         o, x = c * WIDTH, i * ROW + c * SPAN
         for j in range(SPAN):
             X[x + j] = W[o + 15 + j]
         for r in range(c + 1, SIZE):
-            solved_minus(X, x, i * ROW + r * SPAN, W[o + 10 + r])
+            subtract_solved_row(X, x, i * ROW + r * SPAN, W[o + 10 + r])
         inverse = 1.0 / W[o + 10 + c]
         for j in range(SPAN):
             X[x + j] *= inverse
@@ -171,7 +171,7 @@ def eliminate_wide(W, X, i, kept, size):
     if i >= 2:
         for r in range(1, 4):  # only the balance of the node reaches back to block i-2
             o = r * WIDTH
-            W[o + 23] -= take(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
+            W[o + 23] -= subtract_block(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
     if kept > 0:
         for r in range(SIZE):
             for j in range(SIZE):
@@ -180,9 +180,9 @@ def eliminate_wide(W, X, i, kept, size):
         for r in range(SIZE):
             o = r * WIDTH
             l0 = W[o + 5]
-            W[o + 23] -= take(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
+            W[o + 23] -= subtract_block(W, o + 10, X, i - 1, W[o + 6], W[o + 7], W[o + 8], W[o + 9])
             if l0 != 0.0:  # the balance of the node, through block i-2
-                W[o + 23] -= take_tension(W, o + 10, X, i - 1, l0)
+                W[o + 23] -= subtract_tension_row(W, o + 10, X, i - 1, l0)
     if kept > 0:
         for r in range(SIZE):
             for j in range(SIZE):
@@ -205,10 +205,10 @@ def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
     if i >= 1:
         p = (i - 1) * ROW + SPAN
         q, s = p + SPAN, p + 2 * SPAN
-        A0 = less(A0, (-row[0], -row[1], -row[2]), X, p, q, s)
-        A1 = less(A1, (L[0], L[1], L[2]), X, p, q, s)
-        A2 = less(A2, (L[3], L[4], L[5]), X, p, q, s)
-        A3 = less(A3, (L[6], L[7], L[8]), X, p, q, s)
+        A0 = subtract_node_rows(A0, (-row[0], -row[1], -row[2]), X, p, q, s)
+        A1 = subtract_node_rows(A1, (L[0], L[1], L[2]), X, p, q, s)
+        A2 = subtract_node_rows(A2, (L[3], L[4], L[5]), X, p, q, s)
+        A3 = subtract_node_rows(A3, (L[6], L[7], L[8]), X, p, q, s)
     if kept > 0:
         for j in range(9):
             X[kept + j] = L[j]
@@ -231,64 +231,64 @@ def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
         B0, B3 = B3, B0
     f = 1.0 / B0[0]
     C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6], f * B0[7], f * B0[8])
-    C1, C2, C3 = first_gone(B1, C0), first_gone(B2, C0), first_gone(B3, C0)
+    C1, C2, C3 = eliminate8(B1, C0), eliminate8(B2, C0), eliminate8(B3, C0)
     if abs(C2[0]) > abs(C1[0]):
         C1, C2 = C2, C1
     if abs(C3[0]) > abs(C1[0]):
         C1, C3 = C3, C1
     f = 1.0 / C1[0]
     D1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5], f * C1[6], f * C1[7])
-    D0, D2, D3 = second_gone(C0, D1), second_gone(C2, D1), second_gone(C3, D1)
+    D0, D2, D3 = eliminate7(C0, D1), eliminate7(C2, D1), eliminate7(C3, D1)
     if abs(D3[0]) > abs(D2[0]):
         D2, D3 = D3, D2
     f = 1.0 / D2[0]
     E2 = (f * D2[1], f * D2[2], f * D2[3], f * D2[4], f * D2[5], f * D2[6])
-    E0, E1, E3 = third_gone(D0, E2), third_gone(D1, E2), third_gone(D3, E2)
+    E0, E1, E3 = eliminate6(D0, E2), eliminate6(D1, E2), eliminate6(D3, E2)
     f = 1.0 / E3[0]
     F3 = (f * E3[1], f * E3[2], f * E3[3], f * E3[4], f * E3[5])
     big = 0.0
-    big += keep(X, i * ROW, fourth_gone(E0, F3))
-    big += keep(X, i * ROW + SPAN, fourth_gone(E1, F3))
-    big += keep(X, i * ROW + 2 * SPAN, fourth_gone(E2, F3))
-    big += keep(X, i * ROW + 3 * SPAN, F3)
+    big += store_row(X, i * ROW, eliminate5(E0, F3))
+    big += store_row(X, i * ROW + SPAN, eliminate5(E1, F3))
+    big += store_row(X, i * ROW + 2 * SPAN, eliminate5(E2, F3))
+    big += store_row(X, i * ROW + 3 * SPAN, F3)
     return big < math.inf
 
 
 @inner
-def first_gone(b, c):
+def eliminate8(b, c):
     f = b[0]
     return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
             b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6], b[8] - f * c[7])  # fmt: skip
 
 
 @inner
-def second_gone(b, c):
+def eliminate7(b, c):
     f = b[0]
     return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3],
             b[5] - f * c[4], b[6] - f * c[5], b[7] - f * c[6])  # fmt: skip
 
 
 @inner
-def third_gone(b, c):
+def eliminate6(b, c):
     f = b[0]
     return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4], b[6] - f * c[5])
 
 
 @inner
-def fourth_gone(b, c):
+def eliminate5(b, c):
     f = b[0]
     return (b[1] - f * c[0], b[2] - f * c[1], b[3] - f * c[2], b[4] - f * c[3], b[5] - f * c[4])
 
 
 @inner
-def keep(X, x, row):
+def store_row(X, x, row):
     X[x], X[x + 1], X[x + 2], X[x + 3] = row[0], row[1], row[2], row[3]
     X[x + 8] = row[4]
     return abs(row[4])
 
 
 @inner
-def less(A, m, X, p, q, s):
+def subtract_node_rows(A, m, X, p, q, s):
     """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
     return (
         A[0] - m[0] * X[p] - m[1] * X[q] - m[2] * X[s],
@@ -381,7 +381,7 @@ def solve5(X, k, W, x, i):
 
 
 @kernel
-def again(X, W, b, x):
+def solve_again(X, W, b, x):
     """Solve with another right-hand side b (N+1, 5) and the factors that the last march kept behind the X_i.
 
     b: length of the cell before (m), balance of the node (N), spin of the cell after (N m), as the march assembles

@@ -12,9 +12,9 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.block_elimination import first_gone, fourth_gone, second_gone, third_gone
+from hybrid.kernels.block_elimination import eliminate5, eliminate6, eliminate7, eliminate8
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.plane import spread2
+from hybrid.kernels.plane import to_space
 
 COLUMNS = 6  # of a row of X_i
 TRIPLE = 3 * COLUMNS  # numbers of X_i
@@ -22,7 +22,7 @@ WIDE = 13  # of a block row before elimination (kernels.assembly_plane)
 
 
 @inner
-def less2(l, t, X, p):
+def block_times(l, t, X, p):
     """(l, t) . (dr, dT rows of the block of X at p): what it takes from dT, dr, the next dr, the right-hand side."""
     a, b, c = p + COLUMNS, p + 2 * COLUMNS, p
     return (
@@ -36,8 +36,8 @@ def less2(l, t, X, p):
 
 
 @inner
-def back_by_two(l, X, p):
-    """l . (dr rows of the block of X at p), as `less2` without its tension."""
+def node_rows_times(l, X, p):
+    """l . (dr rows of the block of X at p), as `block_times` without its tension."""
     a, b = p + COLUMNS, p + 2 * COLUMNS
     return (
         l[0] * X[a] + l[1] * X[b],
@@ -60,13 +60,13 @@ def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
     L1, L2, D1, D2, b1, b2 = (L[0], L[1]), (L[2], L[3]), (D[0], D[1]), (D[2], D[3]), b[0], b[1]
     if i >= 2:
         p = (i - 2) * TRIPLE
-        x, y = back_by_two((K[0], K[1]), X, p), back_by_two((K[2], K[3]), X, p)
+        x, y = node_rows_times((K[0], K[1]), X, p), node_rows_times((K[2], K[3]), X, p)
         t1, L1, D1, b1 = -x[0], (L1[0] - x[1], L1[1] - x[2]), (D1[0] - x[3], D1[1] - x[4]), b1 - x[5]
         t2, L2, D2, b2 = -y[0], (L2[0] - y[1], L2[1] - y[2]), (D2[0] - y[3], D2[1] - y[4]), b2 - y[5]
     x = y = z = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     if i >= 1:
         p = (i - 1) * TRIPLE
-        x, y, z = less2((-row[0], -row[1]), 0.0, X, p), less2(L1, t1, X, p), less2(L2, t2, X, p)
+        x, y, z = block_times((-row[0], -row[1]), 0.0, X, p), block_times(L1, t1, X, p), block_times(L2, t2, X, p)
     # rows of dT_{i-1}, dr_i | dT_i, dr_{i+1}, dr_{i+2} | right-hand side
     B0 = (-hck - x[0], row[0] - x[1], row[1] - x[2], 0.0, -x[3], -x[4], 0.0, 0.0, gap - x[5])
     B1 = (back[0] - y[0], D1[0] - y[1], D1[1] - y[2], ahead[0], U[0] - y[3], U[1] - y[4], V[0], V[1], b1 - y[5])
@@ -78,15 +78,15 @@ def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
         B0, B2 = B2, B0
     f = 1.0 / B0[0]
     C0 = (f * B0[1], f * B0[2], f * B0[3], f * B0[4], f * B0[5], f * B0[6], f * B0[7], f * B0[8])
-    C1, C2 = first_gone(B1, C0), first_gone(B2, C0)
+    C1, C2 = eliminate8(B1, C0), eliminate8(B2, C0)
     if abs(C2[0]) > abs(C1[0]):
         C1, C2 = C2, C1
     f = 1.0 / C1[0]
     E1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5], f * C1[6], f * C1[7])
-    E0, E2 = second_gone(C0, E1), second_gone(C2, E1)
+    E0, E2 = eliminate7(C0, E1), eliminate7(C2, E1)
     f = 1.0 / E2[0]
     F2 = (f * E2[1], f * E2[2], f * E2[3], f * E2[4], f * E2[5], f * E2[6])
-    F0, F1 = third_gone(E0, F2), third_gone(E1, F2)
+    F0, F1 = eliminate6(E0, F2), eliminate6(E1, F2)
     o = i * TRIPLE
     for k in range(COLUMNS):
         X[o + k], X[o + COLUMNS + k], X[o + 2 * COLUMNS + k] = F0[k], F1[k], F2[k]
@@ -94,7 +94,7 @@ def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
 
 
 @inner
-def less_chain(A, m, X, p, q):
+def subtract_chain(A, m, X, p, q):
     """A - m . (rows of dr_{i-1} in X), over dT_{i-1}, dr_i and the right-hand side."""
     return (
         A[0] - m[0] * X[p] - m[1] * X[q],
@@ -113,9 +113,9 @@ def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
     if i >= 1:
         p = (i - 1) * TRIPLE + COLUMNS
         q = p + COLUMNS
-        B0 = less_chain(B0, (-row[0], -row[1]), X, p, q)
-        B1 = less_chain(B1, (L[0], L[1]), X, p, q)
-        B2 = less_chain(B2, (L[2], L[3]), X, p, q)
+        B0 = subtract_chain(B0, (-row[0], -row[1]), X, p, q)
+        B1 = subtract_chain(B1, (L[0], L[1]), X, p, q)
+        B2 = subtract_chain(B2, (L[2], L[3]), X, p, q)
     G0 = (B0[0], B0[1], B0[2], 0.0, 0.0, 0.0, B0[3])
     G1 = (B1[0], B1[1], B1[2], ahead[0], U[0], U[1], B1[3])
     G2 = (B2[0], B2[1], B2[2], ahead[1], U[2], U[3], B2[3])
@@ -125,12 +125,12 @@ def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
         G0, G2 = G2, G0
     f = 1.0 / G0[0]
     C0 = (f * G0[1], f * G0[2], f * G0[3], f * G0[4], f * G0[5], f * G0[6])
-    C1, C2 = third_gone(G1, C0), third_gone(G2, C0)
+    C1, C2 = eliminate6(G1, C0), eliminate6(G2, C0)
     if abs(C2[0]) > abs(C1[0]):
         C1, C2 = C2, C1
     f = 1.0 / C1[0]
     E1 = (f * C1[1], f * C1[2], f * C1[3], f * C1[4], f * C1[5])
-    E0, E2 = fourth_gone(C0, E1), fourth_gone(C2, E1)
+    E0, E2 = eliminate5(C0, E1), eliminate5(C2, E1)
     f = 1.0 / E2[0]
     F2 = (f * E2[1], f * E2[2], f * E2[3], f * E2[4])
     a, c = E0[0], E1[0]
@@ -158,6 +158,6 @@ def substitute_planar(plane, X, x):
         b = X[s + 5] - X[s] * y[0] - X[s + 1] * y[1] - X[s + 2] * y[2] - X[s + 3] * z[0] - X[s + 4] * z[1]
         total += abs(t) + abs(a) + abs(b)
         x[i, 0], x[i, 4] = t, 0.0
-        x[i, 1], x[i, 2], x[i, 3] = spread2(plane, (a, b))
+        x[i, 1], x[i, 2], x[i, 3] = to_space(plane, (a, b))
         y, z = (t, a, b), (y[1], y[2])
     return total < math.inf

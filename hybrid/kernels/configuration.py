@@ -11,7 +11,7 @@ import math
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.plane import carried, chord2, inside2
+from hybrid.kernels.plane import carried, chord2, vector_in_plane
 from hybrid.kernels.rotations import dot, spin_about, transport
 
 
@@ -24,8 +24,8 @@ def carry_director(plane, space, a, e, en):
         dn, _, _ = chord(en)
         out = transport(a, d, dn)
     if plane is not None:
-        p, _, _ = chord2(inside2(plane, e))
-        q, _, _ = chord2(inside2(plane, en))
+        p, _, _ = chord2(vector_in_plane(plane, e))
+        q, _, _ = chord2(vector_in_plane(plane, en))
         out = carried(plane, a, p, q)
     return out
 

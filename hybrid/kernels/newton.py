@@ -69,7 +69,7 @@ LARGEST_TURN = 0.7
 
 
 @inner
-def noise_of(line, ca, scale):
+def round_off_tension(line, ca, scale):
     """What round-off of a cell's length makes of the tension, N, when inertia must account for it in a short step."""
     heavy = 0.0
     length = 0.0
@@ -101,7 +101,7 @@ def _solve(plane, space, task, line, sea, ends, old, new, was, now, work):
             return TURNED_TOO_FAR, 0, turn, where
     cv, ca = s.cv, s.ca
     before, left = math.inf, math.inf
-    noise = noise_of(line, ca, scale)
+    noise = round_off_tension(line, ca, scale)
     outcome, it, where = NOT_CONVERGED, 0, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1

@@ -13,13 +13,13 @@ from hybrid.kernels.plane import (
     dot2,
     drag2,
     friction2,
-    inside2,
     madd2,
     mscale2,
     msub2,
     outer2,
-    part2,
-    spread2,
+    row_in_plane,
+    to_space,
+    vector_in_plane,
 )
 from hybrid.kernels.report import ADDED_MASS_POWER, CONTACT_FORCE, DRAG_POWER, MASS_DAMPING_POWER, WAVE_POWER
 from hybrid.kernels.seabed import contact, pressure
@@ -108,22 +108,22 @@ def body_water2(line, i, up, z, eta, u, U1, vi, b, af, cv, ca, report):
 def seabed2(line, sea, i, r, u, v, e, cv, report):
     """Contact and friction at node i: F, D, GL, GR.  The bed's normal lies in the plane."""
     plane = line.plane
-    n = inside2(plane, sea.normal)
+    n = vector_in_plane(plane, sea.normal)
     p = sea.offset + 0.5 * sea.onset
     for k in range(3):
         p -= sea.normal[k] * (r[i, k] + u[i, k])
-    pd = -dot2(n, part2(plane, v, i))
+    pd = -dot2(n, row_in_plane(plane, v, i))
     N = DN = NL = NR = 0.0
     if i > 0:
-        po = p + dot2(n, part2(plane, e, i - 1))
+        po = p + dot2(n, row_in_plane(plane, e, i - 1))
         if p > 0.0 or po > 0.0:
-            vo, h = -dot2(n, part2(plane, v, i - 1)), line.h[i - 1]
+            vo, h = -dot2(n, row_in_plane(plane, v, i - 1)), line.h[i - 1]
             f, f0, f1, g0, g1 = contact(p, po, pd, vo, h, sea.stiffness, sea.damping, sea.onset)
             N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if i < line.h.shape[0]:
-        po = p - dot2(n, part2(plane, e, i))
+        po = p - dot2(n, row_in_plane(plane, e, i))
         if p > 0.0 or po > 0.0:
-            vo, h = -dot2(n, part2(plane, v, i + 1)), line.h[i]
+            vo, h = -dot2(n, row_in_plane(plane, v, i + 1)), line.h[i]
             f, f0, f1, g0, g1 = contact(p, po, pd, vo, h, sea.stiffness, sea.damping, sea.onset)
             N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if line.footing[i] > 0.0 and p > 0.0:
@@ -133,24 +133,24 @@ def seabed2(line, sea, i, r, u, v, e, cv, report):
     D = Z4
     report[CONTACT_FORCE] += N
     if line.bits & FRICTION and N > 0.0:
-        ui, slip = part2(plane, u, i), part2(plane, sea.slip, i)
+        ui, slip = row_in_plane(plane, u, i), row_in_plane(plane, sea.slip, i)
         w = dot2(n, ui)
         q = (slip[0] + ui[0] - w * n[0], slip[1] + ui[1] - w * n[1])
-        f, g, D, kept = friction2(q, N, part2(plane, sea.axis, i), sea.friction[0], sea.slip_length)
+        f, g, D, kept = friction2(q, N, row_in_plane(plane, sea.axis, i), sea.friction[0], sea.slip_length)
         F, slope, q = (F[0] + f[0], F[1] + f[1]), (n[0] + g[0], n[1] + g[1]), (kept * q[0], kept * q[1])
-    sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = spread2(plane, q)
-    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = spread2(plane, F)
+    sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = to_space(plane, q)
+    sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = to_space(plane, F)
     S = outer2(1.0, slope, n)
     return F, madd2(D, mscale2(-(DN + NL + NR), S)), mscale2(NL, S), mscale2(-NR, S)
 
 
 @inner
-def loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
+def node_loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
     """Force on node i but for the cells' own: F, and its derivatives D (dr_i), GL, GR (chord before, after)."""
     bits, plane = line.bits, line.plane
-    vi, vdi = part2(plane, state.v, i), part2(plane, state.vd, i)
+    vi, vdi = row_in_plane(plane, state.v, i), row_in_plane(plane, state.vd, i)
     m = line.mass[i]
-    F = part2(plane, line.force, i)
+    F = row_in_plane(plane, line.force, i)
     F = (F[0] - m * vdi[0], F[1] - m * vdi[1])
     c = -ca * m
     if bits & MASS_DAMPING:
@@ -169,10 +169,10 @@ def loads2(line, sea, i, r, u, state, before, after, cv, ca, report):
                 w[0] - plane[0, 0] * U[0] - plane[0, 1] * U[1] - plane[0, 2] * U[2],
                 w[1] - plane[1, 0] * U[0] - plane[1, 1] * U[1] - plane[1, 2] * U[2],
             )
-            U1 = inside2(plane, S)
+            U1 = vector_in_plane(plane, S)
         if bits & WAVES:
-            U = part2(plane, sea.flow, i)
-            af = inside2(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
+            U = row_in_plane(plane, sea.flow, i)
+            af = vector_in_plane(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
             w, b = (w[0] - U[0], w[1] - U[1]), (b[0] - af[0], b[1] - af[1])
             eta += sea.flow[i, 6]
         if i > 0:

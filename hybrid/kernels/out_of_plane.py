@@ -25,7 +25,16 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.generalized_alpha import scheme
 from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
-from hybrid.kernels.plane import about_normal, across2, angle_between, chord2, dot2, end_chord, inside2, part2
+from hybrid.kernels.plane import (
+    angle_between,
+    chord2,
+    dot2,
+    end_chord,
+    row_along_normal,
+    row_in_plane,
+    stiffness_about_normal,
+    vector_in_plane,
+)
 from hybrid.kernels.rotations import jacobian_functions
 from hybrid.kernels.water import current_at
 
@@ -76,7 +85,7 @@ def moment_stiffness(kappa, M, out, torsion, d):
 
 
 @inner
-def times2(A, x):
+def mat_vec2(A, x):
     return (A[0] * x[0] + A[1] * x[1], A[2] * x[0] + A[3] * x[1])
 
 
@@ -89,13 +98,16 @@ def loads_out_of_plane(line, sea, i, state):
     if bits & MASS_DAMPING:
         rate += line.damp[i]
     if bits & (DRAG | ADDED_MASS | BODIES):
-        u, b = part2(plane, state.v, i), part2(plane, state.vd, i)
+        u, b = row_in_plane(plane, state.v, i), row_in_plane(plane, state.vd, i)
         z, eta = state.r[i, 2], sea.surface
         if bits & FLOW:
-            U = inside2(plane, current_at(sea.z, sea.current, sea.now[1], z)[0])
+            U = vector_in_plane(plane, current_at(sea.z, sea.current, sea.now[1], z)[0])
             u = (u[0] - U[0], u[1] - U[1])
         if bits & WAVES:
-            U, A = part2(plane, sea.flow, i), inside2(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5]))
+            U, A = (
+                row_in_plane(plane, sea.flow, i),
+                vector_in_plane(plane, (sea.flow[i, 3], sea.flow[i, 4], sea.flow[i, 5])),
+            )
             u, b = (u[0] - U[0], u[1] - U[1]), (b[0] - A[0], b[1] - A[1])
             eta += sea.flow[i, 6]
         if not (bits & SURFACE and z > eta):
@@ -105,7 +117,7 @@ def loads_out_of_plane(line, sea, i, state):
                 c = i - 1 + side
                 if c < 0 or c >= e.shape[0]:
                     continue
-                d, _, _ = chord2(part2(plane, e, c))
+                d, _, _ = chord2(row_in_plane(plane, e, c))
                 d3, tilt = (d[0], d[1], 0.0), 0.0
                 if bits & DRAG:
                     _, B, L = half_cell_drag(u3, d3, 1.0, line.drag_n[c], line.drag_t[c])
@@ -124,7 +136,7 @@ def loads_out_of_plane(line, sea, i, state):
                 rate -= B[8]
                 inert += line.point_added[i]
     if bits & SEABED and bits & FRICTION:  # a small push does not slide
-        f, n = part2(plane, sea.bed, i), inside2(plane, sea.normal)
+        f, n = row_in_plane(plane, sea.bed, i), vector_in_plane(plane, sea.normal)
         stiff += sea.friction[1] * max(dot2(f, n), 0.0) / sea.slip_length
     return stiff, rate, inert, before, after
 
@@ -134,13 +146,13 @@ def first_joint(line, ends, a1, d):
     """The element at the start, before the chord d."""
     plane = line.plane
     if not line.element[0]:
-        return Joint(-across2(plane, ends.moment, 0), Z2, Z2, Z2, Z2, 0.0)
-    k, k0 = about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
+        return Joint(-row_along_normal(plane, ends.moment, 0), Z2, Z2, Z2, Z2, 0.0)
+    k, k0 = stiffness_about_normal(plane, a1, 0, d, line.kb, line.k0, 0)
     ghost = end_chord(plane, ends.frame, 0)
     kappa = angle_between(ghost, d)
     M = k * (kappa - k0)
     C, _ = moment_stiffness(kappa, M, line.kb[0, 0] + line.kb[0, 1] - k, line.kb[0, 2], ghost)
-    return Joint(M, Z2, Z2, times2(C, (d[1], -d[0])), times2(C, d), line.kb[0, 2])
+    return Joint(M, Z2, Z2, mat_vec2(C, (d[1], -d[0])), mat_vec2(C, d), line.kb[0, 2])
 
 
 @inner
@@ -148,15 +160,15 @@ def joint_after(line, ends, a1, c, d, dn):
     """The element after cell c with the chord d, before the chord dn."""
     plane, n = line.plane, a1.shape[0]
     if not line.element[c + 1]:
-        return Joint(across2(plane, ends.moment, 1) if c + 1 == n else 0.0, Z2, Z2, Z2, Z2, 0.0)
-    k, k0 = about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
+        return Joint(row_along_normal(plane, ends.moment, 1) if c + 1 == n else 0.0, Z2, Z2, Z2, Z2, 0.0)
+    k, k0 = stiffness_about_normal(plane, a1, c, d, line.kb, line.k0, c + 1)
     kappa = angle_between(d, dn if c + 1 < n else end_chord(plane, ends.frame, 1))
     M = k * (kappa - k0)
     C, CJ = moment_stiffness(kappa, M, line.kb[c + 1, 0] + line.kb[c + 1, 1] - k, line.kb[c + 1, 2], d)
     zn, pn = Z2, Z2
     if c + 1 < n:
-        zn, pn = times2(C, (dn[1], -dn[0])), times2(C, dn)
-    return Joint(M, times2(CJ, (-d[1], d[0])), times2(CJ, (-d[0], -d[1])), zn, pn, line.kb[c + 1, 2])
+        zn, pn = mat_vec2(C, (dn[1], -dn[0])), mat_vec2(C, dn)
+    return Joint(M, mat_vec2(CJ, (-d[1], d[0])), mat_vec2(CJ, (-d[0], -d[1])), zn, pn, line.kb[c + 1, 2])
 
 
 @inner
@@ -207,13 +219,13 @@ def assemble_cells(line, ends, e, T, a1, A):
     n = e.shape[0]
     plane = line.plane
     before = Cell(Z2, 0.0)
-    d, _, il = chord2(part2(plane, e, 0))
+    d, _, il = chord2(row_in_plane(plane, e, 0))
     cell = Cell(d, il)
     joint = first_joint(line, ends, a1, d)
     for c in range(n):
         after = Cell(Z2, 0.0)
         if c + 1 < n:
-            d, _, il = chord2(part2(plane, e, c + 1))
+            d, _, il = chord2(row_in_plane(plane, e, c + 1))
             after = Cell(d, il)
         next_joint = joint_after(line, ends, a1, c, cell.d, after.d)
         add_shear(A, c, n, T[c], before, cell, after, joint, next_joint)
@@ -257,11 +269,11 @@ def assemble_nodes(line, sea, ends, state, s, was, now, A):
         stiff, rate, inert, before, after = loads_out_of_plane(line, sea, i, state)
         A[o] -= stiff + cv * rate + ca * inert
         if before != 0.0:
-            _, _, x = chord2(part2(plane, state.e, i - 1))
+            _, _, x = chord2(row_in_plane(plane, state.e, i - 1))
             A[o] += before * x
             A[o - 2] -= before * x
         if after != 0.0:
-            _, _, x = chord2(part2(plane, state.e, i))
+            _, _, x = chord2(row_in_plane(plane, state.e, i))
             A[o] -= after * x
             A[o + 2] += after * x
         A[o + REACH + 1] = rate * (vp - cv * wp) + inert * (vdp - ca * wp)

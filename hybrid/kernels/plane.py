@@ -48,7 +48,7 @@ def mscale2(x, A):
 
 
 @inner
-def part2(plane, A, i):
+def row_in_plane(plane, A, i):
     """The two components of row i of A that lie in the plane."""
     x, y, z = A[i, 0], A[i, 1], A[i, 2]
     return (
@@ -58,7 +58,7 @@ def part2(plane, A, i):
 
 
 @inner
-def inside2(plane, a):
+def vector_in_plane(plane, a):
     """The two components of a vector of space that lie in the plane."""
     return (
         plane[0, 0] * a[0] + plane[0, 1] * a[1] + plane[0, 2] * a[2],
@@ -67,13 +67,13 @@ def inside2(plane, a):
 
 
 @inner
-def across2(plane, A, i):
+def row_along_normal(plane, A, i):
     """The component of row i of A along the normal."""
     return plane[2, 0] * A[i, 0] + plane[2, 1] * A[i, 1] + plane[2, 2] * A[i, 2]
 
 
 @inner
-def spread2(plane, a):
+def to_space(plane, a):
     """The vector of space that has the components a in the plane and none across it."""
     return (
         a[0] * plane[0, 0] + a[1] * plane[1, 0],
@@ -104,9 +104,9 @@ def end_chord(plane, frame, k):
 def carried(plane, a, d, dn):
     """Director a (normal to the chord d of space) when the chord turns within the plane to dn, in the plane."""
     x = plane[2, 0] * a[0] + plane[2, 1] * a[1] + plane[2, 2] * a[2]
-    m = spread2(plane, (-d[1], d[0]))
+    m = to_space(plane, (-d[1], d[0]))
     y = a[0] * m[0] + a[1] * m[1] + a[2] * m[2]
-    m = spread2(plane, (-dn[1], dn[0]))
+    m = to_space(plane, (-dn[1], dn[0]))
     return (x * plane[2, 0] + y * m[0], x * plane[2, 1] + y * m[1], x * plane[2, 2] + y * m[2])
 
 
@@ -131,14 +131,14 @@ def turning2(d, il, e1, cv):
 
 
 @inner
-def about_normal(plane, a1, c, d, kb, k0, i):
+def stiffness_about_normal(plane, a1, c, d, kb, k0, i):
     """Stiffness and stress-free angle of element i about n, for sections whose axes lie as in cell c with chord d.
 
     Sections that bend differently in two directions have one of them along n, or the scene is not planar.
     """
-    m = spread2(plane, (-d[1], d[0]))
+    m = to_space(plane, (-d[1], d[0]))
     y = a1[c, 0] * m[0] + a1[c, 1] * m[1] + a1[c, 2] * m[2]  # a1 = x n + y m, a2 = d x a1 = y n - x m
-    x = across2(plane, a1, c)
+    x = row_along_normal(plane, a1, c)
     return kb[i, 0] * x * x + kb[i, 1] * y * y, k0[i, 0] * x + k0[i, 1] * y
 
 

@@ -8,7 +8,7 @@ from hybrid.kernels.assembly import get9
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import kernel
 from hybrid.kernels.element import relative_rotation
-from hybrid.kernels.plane import angle_between, chord2, end_chord, part2
+from hybrid.kernels.plane import angle_between, chord2, end_chord, row_in_plane
 from hybrid.kernels.rotations import frame, log_rotation
 
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
@@ -21,12 +21,12 @@ def sharpest_in_plane(line, ends, e, T):
     """As `sharpest_in_space` for a cable in a plane: largest bend and its node; there is no twist."""
     bend, at = 0.0, -1
     n, plane = e.shape[0], line.plane
-    d, l, _ = chord2(part2(plane, e, 0))
+    d, l, _ = chord2(row_in_plane(plane, e, 0))
     for i in range(n + 1):
         before = d if i > 0 else end_chord(plane, ends.frame, 0)
         here = l
         if 0 < i < n:
-            d, l, _ = chord2(part2(plane, e, i))
+            d, l, _ = chord2(row_in_plane(plane, e, i))
         if not line.element[i]:
             continue
         x = abs(angle_between(before, d if i < n else end_chord(plane, ends.frame, 1)))

@@ -68,7 +68,7 @@ class Ends(NamedTuple):
 class Sea(NamedTuple):
     """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
 
-    The last five are work arrays: `flow` is filled by `kernels.water.stir`, `axis` and `slip` at the start of a
+    The last five are work arrays: `flow` is filled by `kernels.water.wave_kinematics`, `axis` and `slip` at the start of a
     step, `slid` and `bed` by the march.
     """
 

@@ -29,14 +29,14 @@ from hybrid.kernels.report import (
 from hybrid.kernels.resolution_checks import lowest, sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.rotations import dot, spin_about
 from hybrid.kernels.seabed import stored
-from hybrid.kernels.water import stir
+from hybrid.kernels.water import wave_kinematics
 
 # A step in which a chord turns (or is predicted to turn) by more than this, in rad, is repeated in parts.
 LARGEST_STEP_TURN = 1.0
 
 
 @inner
-def widest_turn(e, u):
+def largest_turn(e, u):
     """Largest change of a chord e by the displacements u, as a part of its length (an angle in rad), and its cell."""
     widest, where = 0.0, -1
     for i in range(e.shape[0]):
@@ -48,7 +48,7 @@ def widest_turn(e, u):
 
 
 @kernel
-def lay(sea, e, slip):
+def friction_axes(sea, e, slip):
     """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
     n, last = sea.normal, e.shape[0]
     for i in range(last + 1):
@@ -67,7 +67,7 @@ def lay(sea, e, slip):
 
 
 @inner
-def unrest(old, new):
+def acceleration_change(old, new):
     """Largest change of the algorithmic acceleration in a step, m/s2, and its node."""
     worst, where = 0.0, 0
     for i in range(old.a.shape[0]):
@@ -141,7 +141,7 @@ def find_rates(space, line, sea, old, new, u, s):
 
 
 @inner
-def book_seabed(line, sea, old, new, u, report):
+def seabed_work(line, sea, old, new, u, report):
     """Work of the seabed in the step, and what it stores."""
     normal = (sea.normal[0], sea.normal[1], sea.normal[2])
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
@@ -162,13 +162,13 @@ def begin_step(plane, space, line, sea, old, new, u, s):
     Returns the largest turn of a chord (rad) and its cell; beyond LARGEST_STEP_TURN the step is not begun.
     """
     predict_nodes(old, new, u, s)
-    turn, cell = widest_turn(old.e, u)
+    turn, cell = largest_turn(old.e, u)
     if turn < LARGEST_STEP_TURN:
         predict_cells(plane, space, line, old, new, u, s)
         if line.bits & WAVES:  # at the predicted positions, which are right to third order
-            stir(sea, old.r, u)
+            wave_kinematics(sea, old.r, u)
         if line.bits & FRICTION:
-            lay(sea, old.e, old.slip)
+            friction_axes(sea, old.e, old.slip)
     return turn, cell
 
 
@@ -183,14 +183,14 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work):
         sharp = sharpest_in_plane(line, ends, new.e, new.T)
     report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharp
     report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
-    change, place = unrest(old, new)
+    change, place = acceleration_change(old, new)
     _, _, _, _, slip = weights(task.rho, task.before / dt)
     report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place
     if line.bits & SEABED:
-        book_seabed(line, sea, old, new, u, report)
+        seabed_work(line, sea, old, new, u, report)
     if plane is not None:
         if was.shape[0] > 0:
             report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
                 line, sea, ends, new, dt, task.before, task.rho, was, now, work.X
             )
-    return widest_turn(old.e, u)
+    return largest_turn(old.e, u)

@@ -40,7 +40,7 @@ def shares(grown, leaving, haste, dt, base_of_cell, out):
 
 
 @kernel
-def still_lacking(lack, rate, since, keeps, t, duration, true, h):
+def length_defect(lack, rate, since, keeps, t, duration, true, h):
     """Lengths h (N,) m at t of cells on their way to their true ones; whether any is still under way.
 
     A quintic from value and rate at `since` to rest at nothing, or, where `keeps`, at the value, after `duration`.

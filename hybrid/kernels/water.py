@@ -48,7 +48,7 @@ def current_at(z, current, part, height):
 
 
 @kernel
-def stir(sea, r, u):
+def wave_kinematics(sea, r, u):
     """Fill sea.flow: velocity and acceleration of the waves at the positions r + u, and the elevation above them.
 
     A component is A cos(kx x + ky y - w t + phase) at the surface; everything is multiplied by the grown part of the

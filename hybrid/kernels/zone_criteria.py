@@ -40,7 +40,7 @@ def get3(A, i):
 
 
 @inner
-def put(ratios, c, ja, jb, x):
+def raise_ratio(ratios, c, ja, jb, x):
     """Raise a ratio of the base cells on both sides of a node; what is not a number is large."""
     if not x < MOST:
         x = MOST
@@ -115,7 +115,7 @@ def kink_at(line, turn, i):
 
 
 @kernel
-def weigh(
+def evaluate_criteria(
     line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
     turn, twisting, ratios
 ):  # fmt: skip
@@ -140,24 +140,24 @@ def weigh(
         slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
         if not floor[i] <= slack * now:
             slack = floor[i] / now if now > 0.0 else MOST
-        put(ratios, SLACK, ja, jb, slack)
+        raise_ratio(ratios, SLACK, ja, jb, slack)
         T1 = max(floor[i], 1e-300)
         T1 = now if now > T1 else T1
         if i == 0 or i == n:
-            put(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
+            raise_ratio(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
             continue
         Mt = twisting[i]
         loop = max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance)
-        put(ratios, TORSION, ja, jb, loop / (2.0 * T1))
+        raise_ratio(ratios, TORSION, ja, jb, loop / (2.0 * T1))
         if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
-            put(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink_at(line, turn, i) / tolerance)
+            raise_ratio(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink_at(line, turn, i) / tolerance)
         else:
             bend = EI[i] * (turn[i] / line.hn[i] + bent[i]) / (T1 * tolerance)
-            put(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
+            raise_ratio(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
         if line.bits & SEABED:
             p = depth(sea, r, i) > 0.0
             if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
-                put(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+                raise_ratio(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
     loudest = 0.0
     for i in range(n):
         j = base_of_cell[i]

@@ -38,14 +38,14 @@ class Correction:
         self._twisted = twisted or _TurnOfEnds(model)
         self.ends = model.ends.values
 
-    def begin(self, ends: Ends, state: State, at_rest: bool, rubbed: bool = False) -> None:
+    def begin(self, ends: Ends, state: State, at_rest: bool, with_friction: bool = False) -> None:
         """At the start of a run: the error of the equilibrium; a motion that starts from a given shape has none.
 
-        rubbed: whether friction took part in the equilibrium.
+        with_friction: whether friction took part in the equilibrium.
         """
         self.ends, self.corrector.sea = ends, self.model.sea.values
         if at_rest:
-            self.corrector.rest(self.model.sea.values, ends, state, self._twisted.torque(ends, state), rubbed)
+            self.corrector.rest(self.model.sea.values, ends, state, self._twisted.torque(ends, state), with_friction)
 
     def step(self, stepper: Stepper, ends: Ends, state: State, dt: float, before: float, rho: float) -> None:
         """After the step of dt, after one of `before`, that led to `state`, before anything else uses the stepper."""

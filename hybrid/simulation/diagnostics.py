@@ -142,7 +142,7 @@ class Diagnostics:
             s, tension = float(self._model.line.s[found.slack]), float(found.state.T[found.slack])
             text = f"the only equilibrium found has a tension of {tension:.3g} N in a catenary at s = {s:g} m"
             self.note(0.0, found.slack, "slack", f"{text}: it stands like a strut, which no cable does")
-        if self._model.line.bits & FRICTION and not found.rubbed:
+        if self._model.line.bits & FRICTION and not found.with_friction:
             text = "this equilibrium is the one without friction: say `initial: {kind: equilibrium, friction: settled}`"
             where = f"{text} for one that lies where it was laid"
             self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)

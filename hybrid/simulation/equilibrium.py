@@ -49,7 +49,7 @@ def solve_model(
         untwist(line, model.ends.values, model.cable.held_tangent, flat)
         try:
             found = solve_statics(line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True)
-            judged = line if found.rubbed else line._replace(bits=line.bits & ~FRICTION)
+            judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
             if is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
                 return found
         except ComputationError:  # there are more ways in space

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from threading import Thread
 
 import numpy as np
 
@@ -25,9 +26,6 @@ SAMPLE = {
     "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [9, 0, 0]}},
     "initial": "equilibrium", "model": "adaptive", "mesh": {"cells": 8}, "time": {"duration": 0.1, "step": 0.1},
 }  # fmt: skip
-
-
-_beside: list[subprocess.Popen[bytes]] = []  # processes that compile; each ends by itself
 
 
 def kernels_of(scene: Scene) -> list[str]:
@@ -53,7 +51,8 @@ def compile_beside(scene: Scene) -> None:
     if missing:
         command = [sys.executable, "-c", f"from hybrid.simulation.first_use import compile_all; compile_all({missing})"]
         nothing = subprocess.DEVNULL
-        _beside.append(subprocess.Popen(command, stdin=nothing, stdout=nothing, stderr=nothing))
+        streams = {"stdin": nothing, "stdout": nothing, "stderr": nothing}
+        Thread(target=subprocess.run, args=(command,), kwargs=streams, daemon=True).start()  # which waits for its end
 
 
 def compile_all(names: Sequence[str]) -> None:
@@ -81,7 +80,7 @@ def _compile_zones(scene: Scene, model: Model) -> None:
     from hybrid.simulation.initial_zones import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)
-    manager.weigh(model.line, model.sea.values, model.ends.values, model.start, 0.0)
+    manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)
     manager.first(model.start)
     manager.remember(model.start)
     manager.review(0.0, model.start)

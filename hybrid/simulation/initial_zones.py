@@ -72,7 +72,7 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.rubbed)
+        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.with_friction)
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -111,16 +111,16 @@ def _zones_within(
     """Zones that satisfy the criteria in their own equilibrium; None: all rod.  ComputationError: there is none."""
     assert model.layout is not None
     full = found.state
-    manager.weigh(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
+    manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
     rod = manager.first(full)
     for _ in range(MOST_ROUNDS):
         if rod[manager.given >= 0].all():
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.rubbed)
+        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.with_friction)
         manager.follow(layout)
-        manager.weigh(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
+        manager.evaluate_criteria(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
         more = rod | manager.first(answer.state)
         if (more == rod).all():
             return new, answer
@@ -135,14 +135,14 @@ def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: fl
     r = found.state.r
     if model.corrected:
         correction = Correction(model)
-        correction.begin(model.ends.at(t), found.state, at_rest=True, rubbed=found.rubbed)
+        correction.begin(model.ends.at(t), found.state, at_rest=True, with_friction=found.with_friction)
         r = r + correction.corrector.position
     return float(np.linalg.norm(full.r[layout.first] - r[model.layout.first], axis=1).max())
 
 
-def _equilibrium(model: Model, t: float, start: State, rubbed: bool) -> Equilibrium:
-    """rubbed: whether friction took part in what it is compared with."""
-    return solve_model(model, t, start, settle=rubbed)
+def _equilibrium(model: Model, t: float, start: State, with_friction: bool) -> Equilibrium:
+    """with_friction: whether friction took part in what it is compared with."""
+    return solve_model(model, t, start, settle=with_friction)
 
 
 def _on_fewer(state: State, s: Floats, line: Line) -> State:

@@ -85,7 +85,7 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
     if model.follows_error:
         model.sea.at(np.inf)
         correction = Correction(model)
-        correction.begin(ends, found.state, at_rest=True, rubbed=found.rubbed)
+        correction.begin(ends, found.state, at_rest=True, with_friction=found.with_friction)
         shift = correction.shift(found.state)
     return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
 

@@ -107,7 +107,7 @@ class Transient:
             self.state = model.start.copy()
             self._rotate_ends_in()
             if not self.state.v.any():
-                self.stepper.hold_on(model.sea.at(0.0), model.ends.at(0.0), self.state)
+                self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), self.state)
         else:
             self.state = equilibrium.state.copy()
         begun = self.plane_monitor.begin(model, self.state, self._note)
@@ -117,8 +117,8 @@ class Transient:
         if self.switching is not None:
             self.switching.begin(model.ends.values, self.state)
         if self.correction is not None:
-            rubbed = equilibrium is not None and equilibrium.rubbed
-            self.correction.begin(model.ends.at(0.0), self.state, equilibrium is not None, rubbed)
+            with_friction = equilibrium is not None and equilibrium.with_friction
+            self.correction.begin(model.ends.at(0.0), self.state, equilibrium is not None, with_friction)
         self.before = self.state.copy()
         self.power = self._powers()
 
@@ -143,7 +143,9 @@ class Transient:
         ends = self.model.ends
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
         self._stored = 0.0
-        taken = self.stepper.ignite(self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state)
+        taken = self.stepper.consistent_accelerations(
+            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state
+        )
         self.dt = 0.0
         if taken.outcome != Outcome.OK:
             raise StepFailed(taken, 0.0)
@@ -263,7 +265,7 @@ class Transient:
         if leaves:
             self._set_model(self.plane_monitor.leave(self.model, self.state))
             self.before = self.state.copy()
-            self.stepper.feel(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
+            self.stepper.evaluate_forces(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
             self.power = self._powers()
 
     def _forget_blow(self, dt: float) -> None:
@@ -303,7 +305,7 @@ class Transient:
         self._set_model(model)
         if self.correction is not None:
             self.correction.switch(model)
-        self.stepper.feel(model.sea.at(self.t), model.ends.at(self.t), self.state)
+        self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
         self._stored = self.stepper.told[SEABED_ENERGY]
         self.power = self._powers()
 

@@ -16,7 +16,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.stiffness_ramp import freed, soften, still_lacking
+from hybrid.kernels.stiffness_ramp import freed, length_defect, soften
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
@@ -110,14 +110,14 @@ class ZoneSwitching:
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""
         self.manager.begin()
-        self.weigh(0.0, 0.0, ends, state)
+        self.evaluate_criteria(0.0, 0.0, ends, state)
 
     def prepare_step(self, end: float, dt: float, state: State) -> None:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
         line = self.model.line
         if self.relaxing is not None:
             x = self.relaxing
-            self.letting_go = still_lacking(
+            self.letting_go = length_defect(
                 x.lack, x.rate, x.since, x.keeps, end, LETTING_GO * self.manager.pace, self.true, line.h
             )
         if self.manager.blending:
@@ -125,9 +125,9 @@ class ZoneSwitching:
         if self.joints is not None:
             self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.pace)
 
-    def weigh(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
+    def evaluate_criteria(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
         """Weigh the criteria after a step of dt to t; catenary cells that are beyond their hard bound."""
-        loudest = self.manager.weigh(self.model.line, self.model.sea.values, ends, state, dt, t)
+        loudest = self.manager.evaluate_criteria(self.model.line, self.model.sea.values, ends, state, dt, t)
         return self.manager.catenary_beyond if loudest > HARD else NONE
 
     def rescue(self, taken: Taken, end: float, dt: float, tried: State, rescues: int) -> Change | None:
@@ -137,7 +137,7 @@ class ZoneSwitching:
         """
         line, most = self.model.line, MOST_RESCUES
         if taken.outcome == Outcome.OK:
-            cells = self.weigh(end, dt, self.model.ends.values, tried)
+            cells = self.evaluate_criteria(end, dt, self.model.ends.values, tried)
             why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
         elif taken.outcome == Outcome.SLACK:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))

@@ -19,7 +19,7 @@ from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, no_sea
-from hybrid.kernels.step import lay
+from hybrid.kernels.step import friction_axes
 from hybrid.solve.stepper import Stepper
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
@@ -160,11 +160,11 @@ class Corrector:
         N = contact(*p, *rates, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0]
         return np.asarray(N * sea.normal)
 
-    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, rubbed: bool = False) -> None:
-        """The error of an equilibrium; rubbed: friction took part in it, so that a shift is felt as friction."""
-        line = self.line._replace(bits=self.line.bits & ~(WAVES if rubbed else FRICTION | WAVES))
+    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, with_friction: bool = False) -> None:
+        """The error of an equilibrium; with_friction: friction took part in it, so that a shift is felt as friction."""
+        line = self.line._replace(bits=self.line.bits & ~(WAVES if with_friction else FRICTION | WAVES))
         if line.bits & FRICTION:
-            lay(sea, state.e, state.slip)
+            friction_axes(sea, state.e, state.slip)
         work = workspace(line.h.size, keep=True)
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)

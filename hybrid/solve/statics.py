@@ -15,7 +15,7 @@ from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, 
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.step import lay
+from hybrid.kernels.step import friction_axes
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 
@@ -49,7 +49,7 @@ class Equilibrium:
     residual: float
     report: Floats
     slack: int  # a catenary cell without tension, or -1
-    rubbed: bool  # True when friction took part
+    with_friction: bool  # True when friction took part
     judged: bool  # False when its stability could not be judged (an end moment, or `blurred`)
     blurred: bool = False  # True when round-off of the bending of very short cells hides whether it buckles
 
@@ -84,7 +84,7 @@ class _Solver:
         for _ in range(BALANCING):
             self.work.u[:] = 0.0
             if line.bits & FRICTION:
-                lay(self.sea, new.e, new.slip)
+                friction_axes(self.sea, new.e, new.slip)
             outcome, iterations, _, where = entry.equilibrium(
                 line, sea or self.sea, ends, new, self.anchor, limits, turning, self.work
             )
@@ -118,7 +118,7 @@ class _Solver:
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
         if self.line.bits & FRICTION:
-            lay(self.sea, state.e, state.slip)
+            friction_axes(self.sea, state.e, state.slip)
         self.work.u[:] = 0.0
         bad = entry.assembly(self.line, self.sea, ends, state, 0.0, self.anchor, self.work)
         return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")
@@ -251,11 +251,11 @@ def _nudged(solver: _Solver, state: State) -> State:
 def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str, Outcome, int, State]:
     """Where friction alone keeps a line: let it settle from its start, with friction, then Newton from there."""
     rest = start.copy()
-    Stepper(solver.line, solver.length, solver.scale).hold_on(solver.sea, ends, rest)
+    Stepper(solver.line, solver.length, solver.scale).static_friction(solver.sea, ends, rest)
     return f"settled with friction from {shape}", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
 
 
-def _roads(
+def _attempts(
     solver: _Solver, ends: Ends, start: State, shape: str, others: Sequence[tuple[str, State]]
 ) -> Iterator[tuple[str, Outcome, int, State]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
@@ -315,7 +315,7 @@ def solve_statics(
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
     settle = bool(line.bits & FRICTION) and (settle or not ends.held.any())
-    roads = iter(()) if settle else _roads(solver, ends, start, shape, others)
+    roads = iter(()) if settle else _attempts(solver, ends, start, shape, others)
     if quick:
         roads = islice(roads, 1)
     for how, outcome, where, state in roads:
@@ -349,7 +349,7 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
     residual = solver.prove(ends, state)
     tension, cell = lowest(solver.line, state.T)
     slack = -1 if tension > solver.floor else cell
-    rubbed = bool(solver.line.bits & FRICTION)
+    with_friction = bool(solver.line.bits & FRICTION)
     blurred = solver.stability.blurred
     judged = (is_judged(solver.line, ends, solver.length) and not blurred) or not solver.line.element.any()
     return Equilibrium(
@@ -359,7 +359,7 @@ def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equili
         residual,
         solver.work.report.copy(),
         int(slack),
-        rubbed,
+        with_friction,
         judged,
         solver.stability.blurred,
     )

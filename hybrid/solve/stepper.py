@@ -16,8 +16,8 @@ from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.step import lay
-from hybrid.kernels.water import stir
+from hybrid.kernels.step import friction_axes
+from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.plane_stability import NOTHING, Push
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
@@ -48,7 +48,7 @@ class Taken:
     error: float = 0.0
 
 
-def travel_that_holds(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
+def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Floats:
     """Elastic travel (N+1, 3) m whose friction takes up the forces (N+1, 3) N along the seabed, or all it can of them.
 
     sea.axis must be that of the line.  Friction is -mu N travel/slip_length, along and across the line.
@@ -95,7 +95,7 @@ class Stepper:
             outcome, where = Outcome.SLACK, int(told[SLACKEST_CELL])
         return Taken(OUTCOMES[outcome], iterations, left, where, told[RESIDUAL], told[LOCAL_ERROR])
 
-    def hold_on(self, sea: Sea, ends: Ends, state: State) -> None:
+    def static_friction(self, sea: Sea, ends: Ends, state: State) -> None:
         """Give a line that lies still on the seabed the friction that keeps it there, as far as friction can."""
         if not self.line.bits & FRICTION:
             return
@@ -110,10 +110,10 @@ class Stepper:
         entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
         force = out_of_balance(line, rows)
         force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
-        lay(sea, state.e, state.slip)
-        state.slip[:] = travel_that_holds(self.line, sea, state.r, force)
+        friction_axes(sea, state.e, state.slip)
+        state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
 
-    def ignite(self, sea: Sea, ends: Ends, acceleration: Floats, state: State) -> Taken:
+    def consistent_accelerations(self, sea: Sea, ends: Ends, acceleration: Floats, state: State) -> Taken:
         """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
 
         One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
@@ -132,9 +132,9 @@ class Stepper:
         work.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u
         held = ends._replace(position=state.r[[0, -1]])
         if self.line.bits & WAVES:
-            stir(sea, state.r, self.work.u)
+            wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            lay(sea, state.e, state.slip)
+            friction_axes(sea, state.e, state.slip)
         bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
         if bad >= 0:
             return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
@@ -154,13 +154,13 @@ class Stepper:
         self.told = self.work.report.tolist()
         return Taken(Outcome.OK, 1, 0.0, -1, self.told[RESIDUAL])
 
-    def feel(self, sea: Sea, ends: Ends, state: State) -> None:
+    def evaluate_forces(self, sea: Sea, ends: Ends, state: State) -> None:
         """The forces and the report of a state as it is, for the books of the step that follows."""
         self.work.u[:] = 0.0
         if self.line.bits & WAVES:
-            stir(sea, state.r, self.work.u)
+            wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            lay(sea, state.e, state.slip)
+            friction_axes(sea, state.e, state.slip)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & SEABED:
             self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)

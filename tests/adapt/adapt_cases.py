@@ -186,7 +186,7 @@ def weighed(
     line = line or on(what, zones, bits)
     sea, ends = sea or no_sea(line.h.size), ends or still()
     if before is not None:
-        manager.weigh(line, sea, ends, before, 0.0)
+        manager.evaluate_criteria(line, sea, ends, before, 0.0)
         manager.ratios[:] = 0.0
-    manager.weigh(line, sea, ends, state, dt)
+    manager.evaluate_criteria(line, sea, ends, state, dt)
     return manager.ratios.copy()

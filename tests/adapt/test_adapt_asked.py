@@ -232,9 +232,9 @@ def test_far_beyond_is_no_tension_that_is_only_foreseen():
     manager = DomainManager(what, zones, 0.1, 1.0, np.zeros(10, int), 1.0)
     line, sea = on(what, zones), no_sea(10)
     for T, dt in ((400.0, 0.0), (100.0, 0.05)):
-        loudest = manager.weigh(line, sea, held(), state_on(line, lambda s: np.outer(s, X), T), dt)
+        loudest = manager.evaluate_criteria(line, sea, held(), state_on(line, lambda s: np.outer(s, X), T), dt)
     assert 1.0 < loudest < HARD and not manager.catenary_beyond.size
-    loudest = manager.weigh(line, sea, held(), state_on(line, lambda s: np.outer(s, X), -1.0), 0.05)
+    loudest = manager.evaluate_criteria(line, sea, held(), state_on(line, lambda s: np.outer(s, X), -1.0), 0.05)
     assert loudest > HARD and manager.catenary_beyond.size == 10
 
 

@@ -404,6 +404,6 @@ def test_force_catenary_wins():
     state = state_on(on(what, zones), along(), 1e-3 * FLOORED)  # slack everywhere
     given = np.array([0, 0, 0, 1, 1, 1, -1, -1, -1, 0, 0, 0])
     manager = DomainManager(what, zones, TOL, 0.5, given, 1.0)
-    manager.weigh(on(what, zones), no_sea(12), still(), state, 0.0)
+    manager.evaluate_criteria(on(what, zones), no_sea(12), still(), state, 0.0)
     change = manager.review(0.0, state)
     assert change is not None and change.rod.tolist() == (given >= 0).tolist()

@@ -10,7 +10,7 @@ from test_jacobian import BITS, CA, CV, ZONES, N, assembled, random_case
 
 import hybrid
 from hybrid.kernels.bending_error import History, right_hand_side
-from hybrid.kernels.block_elimination import again
+from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.entry import assembly, workspace
 from hybrid.kernels.forces import ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.neglected_moments import Bending, neglected_moments, tabulate_chords
@@ -40,7 +40,7 @@ def test_kept_factors_solve_any_right_hand_side(name, held):
         if held[k]:
             b[node, 1:4] = 0.0
     x = np.zeros((N + 1, 5))
-    assert again(work.X, work.W, b, x)
+    assert solve_again(work.X, work.W, b, x)
     expected = np.linalg.solve(J, b.ravel()).reshape(N + 1, 5)
     np.testing.assert_allclose(x, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
 

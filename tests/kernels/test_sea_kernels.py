@@ -20,7 +20,7 @@ import hybrid
 from hybrid.kernels import seabed, water
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import no_sea
-from hybrid.kernels.water import FADED, SAME_WETNESS, stir
+from hybrid.kernels.water import FADED, SAME_WETNESS, wave_kinematics
 from hybrid.model.sea import Surroundings, components, current_table, frequencies, jonswap, surroundings
 from hybrid.scene.sea import JonswapWaves, RegularWaves
 
@@ -138,7 +138,7 @@ def stirred(around: Surroundings, t: float, points) -> np.ndarray:
     """Velocity, acceleration, elevation (n, 7) at points (n, 3) and t."""
     r = np.atleast_2d(np.asarray(points, float))
     sea = around.at(t)._replace(flow=np.zeros((len(r), 7)))
-    stir(sea, 0.4 * r, 0.6 * r)  # r + u is what counts
+    wave_kinematics(sea, 0.4 * r, 0.6 * r)  # r + u is what counts
     return sea.flow
 
 

@@ -26,7 +26,7 @@ def motion(model, rho, steps, carried=True):
     old = solve_statics(
         made.line, made.sea.at(0.0), made.ends.at(0.0), made.start, made.length, made.tension_scale
     ).state
-    stepper.ignite(made.sea.at(0.0), made.ends.at(0.0), made.ends.acceleration(0.0, 1e-5), old)
+    stepper.consistent_accelerations(made.sea.at(0.0), made.ends.at(0.0), made.ends.acceleration(0.0, 1e-5), old)
     new = old.copy()
     t, before, out = 0.0, 0.0, {}
     for dt in steps:
