@@ -5,6 +5,7 @@ pytest bench -m bench -s
 
 import json
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -28,6 +29,49 @@ def test_import():
     whole = median(wall([sys.executable, "-c", "import hybrid"]) for _ in range(7))
     print(f"import hybrid: {whole - bare:.3f} s (python alone {bare:.3f} s)")
     assert whole - bare <= 0.4
+
+
+EXAMPLES = SCENE.parent
+
+
+def cost(folder, cache, *arguments):
+    """Processor and wall time, s, of a command and of the processes it starts, from the shell to its end."""
+    command = [str(Path(sys.executable).with_name("hybrid")), *arguments]
+    env = os.environ | {"HYBRID_CACHE_DIR": str(cache)}
+    before, begin = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    subprocess.run(command, check=True, capture_output=True, env=env, cwd=folder)
+    after, end = resource.getrusage(resource.RUSAGE_CHILDREN), time.perf_counter()
+    return after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime, end - begin
+
+
+@pytest.mark.parametrize(
+    "scenes",
+    [
+        (("02_suspension",), ("touchdown",), ("02_suspension", "--set", "dimension=3")),
+        (("touchdown",), ("02_suspension",), ("07_forced_taut_cable",)),
+    ],
+    ids=["suspension first", "touchdown first"],
+)
+def test_from_an_empty_cache(scenes, tmp_path):
+    """Each scene as a whole run, file written: the first compiles, the next what it needs more; then all again."""
+    for when in ("cold", "warm"):
+        for name, *settings in scenes:
+            arguments = ["run", str(EXAMPLES / f"{name}.yaml"), *settings, "-q", "-o", str(tmp_path / "run.h5")]
+            cpu, wall = cost(tmp_path, tmp_path / "cache", *arguments)
+            print(
+                f"{when} {name:22s} {' '.join(settings):18s} {cpu:5.1f} s of processor time, {wall:5.1f} s of wall time"
+            )
+
+
+def test_warm_commands(tmp_path):
+    run = ["run", str(SCENE), "-q", "-o", str(tmp_path / "run.h5")]
+    cost(tmp_path, tmp_path / "cache", *run)
+    for name, arguments, most in (("run", run, 1.2), ("plan", ["plan", str(SCENE)], 0.6)):
+        each = [cost(tmp_path, tmp_path / "cache", *arguments) for _ in range(5)]
+        cpu, wall = (median(x) for x in zip(*each, strict=True))
+        print(
+            f"hybrid {name} examples/{SCENE.name}: {wall:.2f} s of wall time, {cpu:.2f} s of processor time (asked: {most} s)"
+        )
 
 
 def first_step(folder, cache):

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.kernels.cache import is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.resolution import first_resolution, wants_errors
+from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
 
@@ -29,10 +30,21 @@ SAMPLE = {
 
 
 def kernels_of(scene: Scene) -> list[str]:
-    """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first."""
-    needed = [SOLVER[0], OUTPUTS]
-    if not is_warm(SOLVER) and build(scene).plane is None:
-        needed[0] = SOLVER[1]
+    """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first.
+
+    Whether it is computed in a plane is told by what is written in the scene; rarely its first shape leaves it.
+    """
+    beside = _beside_solver(scene)
+    tables = scene.environment, scene.cable, scene.ends, scene.initial
+    leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
+    in_space = scene.dimension == 3 or scene.solver != "elimination" or bool(leaves)
+    if scene.dimension is None and MODEL_ERROR in beside:
+        in_space = True  # what leaving bending out does is followed in space
+    return [SOLVER[in_space], *beside]
+
+
+def _beside_solver(scene: Scene) -> list[str]:
+    needed = [OUTPUTS]
     if scene.time is not None and scene.model.kind == "adaptive":
         needed.append(ZONES)
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
@@ -45,10 +57,8 @@ def compile_beside(scene: Scene) -> None:
 
     Does nothing where all is compiled, or where there is one core.
     """
-    if is_warm((*SOLVER, OUTPUTS, ZONES, MODEL_ERROR)) or (os.cpu_count() or 1) < 2 or not sys.executable:
-        return
-    missing = [name for name in kernels_of(scene)[1:] if not is_warm([name])]
-    if missing:
+    missing = [name for name in _beside_solver(scene) if not is_warm([name])]
+    if missing and (os.cpu_count() or 1) > 1 and sys.executable:
         command = [sys.executable, "-c", f"from hybrid.simulation.first_use import compile_all; compile_all({missing})"]
         nothing = subprocess.DEVNULL
         streams = {"stdin": nothing, "stdout": nothing, "stderr": nothing}
