@@ -2,6 +2,8 @@
 
 The laws are those of kernels.cell, kernels.element, kernels.loads and kernels.seabed for a configuration that lies in
 the plane of p and q; what is left of a rotation there is one angle.  Tests hold the two against each other.
+One source for both is slower: with the drag and added mass of space, called with a third component of zero, an iteration
+of 1000 catenary cells in a current takes 15 % more, one of rods 9 %.
 
     symbol   meaning                                              shape  unit     frame
     p, q, n  axes of the plane and its normal, p x q = n          3      -        inertial
