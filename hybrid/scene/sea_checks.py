@@ -19,6 +19,9 @@ STEEPEST = 0.142
 # How far under the seabed an end may be held, as part of the depth: a cable that rests there has sunk in a little.
 SUNK = 1e-3
 
+# s: beyond it waves are tides, and so long that the formulas lose their digits.
+LONGEST_PERIOD = 1e5
+
 # Two depths that differ by less than this part are the same: people write six digits.
 SAME_DEPTH = 1e-6
 
@@ -127,6 +130,11 @@ def waves(environment: Environment) -> Iterator[Finding]:
     if sea.depth is not None and depth is not None and abs(sea.depth - depth) > SAME_DEPTH * depth:
         expected = f"{depth:.8g} m, the depth of the seabed under the surface at x = y = 0"
         yield Finding((*_WAVES, "depth"), expected, "leave depth out; it follows from the seabed")
+    key = "period" if isinstance(sea, RegularWaves) else "peak_period"
+    if sea.main_period > LONGEST_PERIOD:
+        expected = f"at most {LONGEST_PERIOD:g} s: longer waves are tides"
+        yield Finding((*_WAVES, key), expected, "give a tide as environment.fluid.current; periods are in seconds")
+        return
     k = wavenumber(2 * math.pi / sea.main_period, depth, environment.gravity)
     length = 2 * math.pi / k if k > 0.0 else math.inf
     highest = STEEPEST * length * (math.tanh(k * depth) if depth is not None else 1.0)

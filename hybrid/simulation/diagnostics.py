@@ -148,7 +148,8 @@ class Diagnostics:
             self.events.event(0.0, 0.0, self._model.length, "static friction neglected", where)
         model = self._model
         line, sea, ends = model.line, model.sea.values, model.ends.values
-        if line.bits & PLANAR and not is_stable(line, sea, ends, found.state, model.length, model.tension_scale):
+        judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
+        if line.bits & PLANAR and not is_stable(judged, sea, ends, found.state, model.length, model.tension_scale):
             text = "this equilibrium holds within the plane alone: in space (`dimension: 3`) the cable would leave it"
             self.note(0.0, int(np.argmin(found.state.T)), "out of plane", text)
         if not found.judged:

@@ -50,7 +50,7 @@ section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_st
 scene = hybrid.validate_scene({
     "cable": {"sections": [section]},
     "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
-    "initial": "equilibrium", "model": "rod", "mesh": {"cells": 4},
+    "initial": "equilibrium", "model": "rod", "mesh": {"cells": 4}, "dimension": 3,
 })
 print(hybrid.static(scene).position[0, -1, 2])
 """

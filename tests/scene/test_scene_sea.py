@@ -474,3 +474,19 @@ def test_the_sea_is_refused_in_python_too() -> None:
 def test_all_mistakes_of_an_attachment_are_said_at_once() -> None:
     text = change(SEA, FLOAT, "{kind: float, at: -1, buoyancy: -60, mass: x, colour: red}")
     assert [c.where.rpartition(".")[2] for c in complaints(text)] == ["at", "buoyancy", "mass", "colour"]
+
+
+def test_waves_as_long_as_tides_are_refused() -> None:
+    """At 1.2e19 s the formulas of waves in shallow water have no digits left: the tension was not a number."""
+    waves = {"kind": "regular", "height": 2.0, "period": 1.2e19, "depth": 20.0}
+    with pytest.raises(SceneError, match=r"waves\.period[\s\S]*at most 100000 s[\s\S]*current"):
+        validate_scene(
+            {
+                "environment": {"fluid": {"density": 1025.0, "surface": 0.0, "waves": waves}},
+                "cable": {"sections": [{"length": 30, "mass": 1, "diameter": 0.03, "axial_stiffness": 1e6}]},
+                "ends": {
+                    "start": {"kind": "pinned", "position": [0, 0, -20]}, "end": {"kind": "pinned", "position": [5, 0, 5]},
+                },
+                "time": {"duration": 1, "step": 0.1},
+            }
+        )  # fmt: skip
