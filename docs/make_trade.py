@@ -2,8 +2,8 @@
 
     python docs/make_trade.py [-o FOLDER] [--accuracies 3%,1%,0.3%] [--peers] [name ...]
 
-What is done is kept in FOLDER (build/trade), so that a second call does what is missing.  With names, only these
-scenes are computed; the others keep what the folder has of them.
+Finished runs are stored in FOLDER (build/trade); a second call computes what is missing.  With names, only these
+scenes are computed; the sections of the others stay.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 import hybrid
 from hybrid.errors import HybridError
-from hybrid.studies.runs import Doing
+from hybrid.studies.runs import StudyProgress
 from hybrid.studies.tradeoff import ACCURACIES
 from hybrid.view.tradeoff import plot_trade
 
@@ -27,10 +27,10 @@ BEGIN, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 HEAD = """\
 # Error against cost
 
-What is paid for accuracy, and with which model it costs least: `hybrid trade scene.yaml` runs a ladder of models and
-accuracies on a scene and says which setting to take.
+`hybrid trade scene.yaml` computes a scene with every model at several accuracies, compares errors with CPU time, and
+recommends a setting.
 
-<!-- not run in CI: whole ladders, and other programs, take minutes; the README runs a short one -->
+<!-- not run in CI: all runs, and other programs, take minutes; the README runs a few -->
 ```bash
 hybrid trade scene.yaml                      # a folder scene.trade with trade.md, trade.csv and trade.png
 hybrid trade scene.yaml --for "3 cm"         # the cheapest setting for this accuracy
@@ -38,49 +38,48 @@ hybrid trade scene.yaml --models rod,adaptive --accuracies 3%,1% --repeat 3
 hybrid trade scene.yaml --peers              # other programs as well, those that are installed and can do the scene
 ```
 
-Every run is compared with a rod everywhere, at an accuracy of 0.03 % (or a third of the finest on the ladder). How
-converged that is, its own error figure says, and a run of the same model that was asked for three times its error.
-Errors are the largest over all outputs and points (position) or over both ends (pull, as vectors); parts are of the
-length of the cable and of the largest pull. The estimate is the run's own, and in brackets how many times the error it
-is. CPU time is that of the process from the scene to the result: coarser runs to compare with, the run that looks where
-cells belong, and the search for the equilibrium included; the kernels were loaded beforehand.
+Every run is compared with a rod everywhere, at an accuracy of 0.03 % (or a third of the finest accuracy of the study).
+Its own error estimate and a run of the same model at three times its error show how converged it is.
+Errors are the largest over all outputs and points (position) or over both ends (end force, as vectors); relative errors
+are of the length of the cable and of the largest end force. "Estimate" is the error estimate of the run itself; the
+factor in brackets is estimate / error (effectivity). CPU time is that of the process from the scene to the result, with
+coarser runs for the error estimate, the mesh pre-run and statics; kernels are loaded beforehand.
 
-On the front are runs than which no other is both cheaper and nearer to what is asked for, error of position or of pull,
-whichever is the larger part. A run is "missed" if its error exceeds what it was asked for by more than the reference
-may be wrong, or if it says itself that it did not get there. Of those that are near enough the cheapest is recommended.
-Runs of a tenth of a second differ by a few per cent of CPU time from one call to the next: `--repeat 3` takes the
-median of three.
+A run is on the Pareto front if no other is both cheaper and more accurate (error of position or of end force, the
+larger of the two relative to the accuracy). A run is "missed" if its error exceeds its accuracy by more than the error
+of the reference, or if its own estimate does. The cheapest run that meets the accuracy is recommended.
+CPU times of 0.1 s vary by a few per cent from call to call: `--repeat 3` takes the median of three.
 
-A finished run is kept in the folder `runs`, under a hash of the scene, the model, the accuracy and the package: a
-second call makes those that are missing, after Ctrl-C for instance. In Python:
+A finished run is stored in the folder `runs`, under a hash of scene, model, accuracy and package: a second call
+computes only the runs that are missing, for instance after Ctrl-C. In Python:
 
 ```python
 import hybrid
 
 scene = hybrid.load_scene("examples/s_tether.yaml", ["time.duration=6"])
-table = hybrid.trade(scene, "s_tether.trade", models=["catenary", "rod"], accuracies=["10%"], asked_for="10%")
+table = hybrid.trade(scene, "s_tether.trade", models=["catenary", "rod"], accuracies=["10%"], target="10%")
 print(table.recommendation)
 print(table.recommended, table.front(), table.rows)
 ```
 
 Other programs run in processes of their own (`hybrid/studies/peers/` has an adapter for each): a uniform line between
-two points, held or moved, in still water, on a level seabed. Their CPU time includes their statics.
+two points, fixed or moved, in still water, on a level seabed. Their CPU time includes their statics.
 
-The sections below are the pages that the program has written for example scenes, by `python docs/make_trade.py`.
+The sections below were written by `python docs/make_trade.py` for example scenes.
 """
 
 
 def section(name: str, folder: Path, accuracies: list[str], peers: bool) -> str:
     """Run one scene; its part of the page, and its picture."""
 
-    def told(doing: Doing) -> None:
-        if doing.part == 0.0:
-            print(f"{name}: {doing.done} of {doing.total}, {doing.what}", file=sys.stderr, flush=True)
+    def show(now: StudyProgress) -> None:
+        if now.part == 0.0:
+            print(f"{name}: {now.done} of {now.total}, {now.what}", file=sys.stderr, flush=True)
 
     command = f"hybrid trade examples/{name}.yaml --accuracies {','.join(accuracies)}" + (" --peers" if peers else "")
     scene = hybrid.load_scene(ROOT / "examples" / f"{name}.yaml")
     try:
-        table = hybrid.trade(scene, folder / name, accuracies=accuracies, peers=peers, told=told, command=command)
+        table = hybrid.trade(scene, folder / name, accuracies=accuracies, peers=peers, progress=show, command=command)
     except HybridError as error:
         return f"## {scene.title}\n\nNo table: {str(error).splitlines()[0]}\n\n"
     page = io.BytesIO()

@@ -174,7 +174,7 @@ def trade(
     reference: Annotated[
         str | None, typer.Option(metavar="A", help="Of the rod to compare with; else 0.03% or finer.")
     ] = None,
-    asked_for: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
+    target: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
     repeat: Annotated[int, typer.Option(metavar="N", help="Runs of which the median CPU time counts.")] = 1,
     peers: Annotated[bool, flag("--peers", help="Other programs as well, if installed.")] = False,
     settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
@@ -188,8 +188,8 @@ def trade(
         chosen = {"accuracies": accuracies} if accuracies else {}
         with console.study() as listener:
             table = hybrid.trade(
-                asked, folder, models=models, **chosen, reference=reference, asked_for=asked_for, repeat=repeat,
-                peers=peers, told=listener, command=shlex.join(["hybrid", *(context.obj or [])]),
+                asked, folder, models=models, **chosen, reference=reference, target=target, repeat=repeat,
+                peers=peers, progress=listener, command=shlex.join(["hybrid", *(context.obj or [])]),
             )  # fmt: skip
         for row in table.rows:
             console.json("row", **(asdict(row) | judged(table, row)))

@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from hybrid.scene.schema import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
-    from hybrid.studies.runs import Doing
+    from hybrid.studies.runs import StudyProgress
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
@@ -102,7 +102,7 @@ class Console:
             line.close()
 
     @contextmanager
-    def study(self) -> Iterator[Callable[[Doing], None] | None]:
+    def study(self) -> Iterator[Callable[[StudyProgress], None] | None]:
         """What `hybrid.trade` calls: a bar over all runs, JSON lines, or nothing."""
         from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
 
@@ -119,25 +119,25 @@ class Console:
         with Progress(*columns, console=self._err, transient=True, auto_refresh=False) as bar:
             task, last = bar.add_task(""), -BAR_EVERY
 
-            def tell(doing: Doing) -> None:
+            def tell(run: StudyProgress) -> None:
                 nonlocal last
                 now = clock.monotonic()
-                if now - last < BAR_EVERY and 0.0 < doing.part < 1.0:
+                if now - last < BAR_EVERY and 0.0 < run.part < 1.0:
                     return
                 last = now
-                what = doing.what + (f", {doing.part:.0%}" if doing.part else "")
-                bar.update(task, total=doing.total, completed=doing.done, description=what, refresh=True)
+                what = run.what + (f", {run.part:.0%}" if run.part else "")
+                bar.update(task, total=run.total, completed=run.done, description=what, refresh=True)
 
             yield tell
 
-    def _json_study(self) -> Callable[[Doing], None]:
+    def _json_study(self) -> Callable[[StudyProgress], None]:
         last = ""
 
-        def tell(doing: Doing) -> None:
+        def tell(run: StudyProgress) -> None:
             nonlocal last
-            if doing.what != last:
-                last = doing.what
-                self.json("progress", done=doing.done, total=doing.total, what=doing.what)
+            if run.what != last:
+                last = run.what
+                self.json("progress", done=run.done, total=run.total, what=run.what)
 
         return tell
 

@@ -156,7 +156,7 @@ def trade_table(table: TradeTable) -> Any:
 
     out = Table(box=None, pad_edge=False, header_style="bold")
     out.add_column("run", no_wrap=True)
-    for name in ("position", "pull", "cells", "steps", "CPU"):
+    for name in ("position", "end force", "cells", "steps", "CPU"):
         out.add_column(name, justify="right", no_wrap=True)
     out.add_column("", overflow="fold")
     front, best = table.front(), table.recommended
@@ -164,7 +164,7 @@ def trade_table(table: TradeTable) -> Any:
         said = "recommended" if row == best else "Pareto front" if row in front else ""
         said = ", ".join(x for x in (said, "" if row.status == "done" else row.status, row.cause) if x)
         style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
-        figures = [part(row.position_part), part(row.pull_part), str(row.cells or ""), str(row.steps or "")]
+        figures = [part(row.position_part), part(row.end_force_part), str(row.cells or ""), str(row.steps or "")]
         out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", said, style=style)
     return out
 

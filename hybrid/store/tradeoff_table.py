@@ -8,37 +8,58 @@ from __future__ import annotations
 
 import csv
 import io
+import warnings
 from collections.abc import Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 OURS = "hybrid"
 # What became of a run.  The reference, and the run that shows how converged it is, are rows like others, but no choice.
-DONE, MISSED, FAILED, CANNOT, REFERENCE, CHECK = "done", "missed", "failed", "cannot do", "reference", "check"
+DONE, MISSED, FAILED, UNSUPPORTED, REFERENCE, CHECK = "done", "missed", "failed", "unsupported", "reference", "check"
 # Of two runs, one asked for a third of the error of the other and both in proportion to what they were asked, the
 # finer is wrong by half of their difference: e and 3e are 2e apart.
 OF_DIFFERENCE = 0.5
 
 
+# What rows and tables were called in 0.5.
+_FORMER = {
+    name: name.replace("pull", "end_force")
+    for name in ("pull", "pull_part", "estimate_pull", "effectivity_pull", "largest_pull", "bound_pull")
+} | {"asked_for": "target"}
+
+
+class _Renamed:
+    """Attributes under their former names, with a warning."""
+
+    if not TYPE_CHECKING:
+
+        def __getattr__(self, name: str) -> Any:
+            if name not in _FORMER or not hasattr(self, _FORMER[name]):
+                raise AttributeError(f"{type(self).__name__!r} object has no attribute {name!r}")
+            warnings.warn(f"{name} is now {_FORMER[name]}", DeprecationWarning, stacklevel=2)
+            return getattr(self, _FORMER[name])
+
+
 @dataclass(frozen=True)
-class Row:
+class Row(_Renamed):
     """One run.
 
-    Errors are the largest over all outputs and points (position) or both ends (pull), parts are of the length of the
-    cable and of the largest pull; estimates are the run's own.  None: there is no such figure.
+    Errors are the largest over all outputs and points (position) or both ends (end force); parts are of the length
+    of the cable and of the largest end force; estimates are the run's own.  None: there is no such figure.
     """
 
     code: str
     model: str
-    asked: str  # the accuracy, or what a peer was told
+    asked: str  # the accuracy; of another program its settings
     status: str
     cause: str = ""
     position: float | None = None  # m
     position_part: float | None = None
-    pull: float | None = None  # N
-    pull_part: float | None = None
+    end_force: float | None = None  # N
+    end_force_part: float | None = None
     estimate_position: float | None = None  # m
-    estimate_pull: float | None = None  # N
+    estimate_end_force: float | None = None  # N
     cells: int | None = None
     steps: int | None = None
     runs: int | None = (
@@ -54,9 +75,9 @@ class Row:
         return _over(self.estimate_position, self.position)
 
     @property
-    def effectivity_pull(self) -> float | None:
+    def effectivity_end_force(self) -> float | None:
         """The run's own estimate over the error."""
-        return _over(self.estimate_pull, self.pull)
+        return _over(self.estimate_end_force, self.end_force)
 
     @property
     def is_choice(self) -> bool:
@@ -69,7 +90,8 @@ class Row:
         return f"{self.model if self.code == OURS else self.code} {self.asked}"
 
 
-DERIVED = ("effectivity_position", "effectivity_pull")
+_NAMED = {"position": "position", "end_force": "end force"}
+DERIVED = ("effectivity_position", "effectivity_end_force")
 COLUMNS = (*(field.name for field in fields(Row)), *DERIVED)
 
 
@@ -83,18 +105,18 @@ def pareto(points: Sequence[tuple[float, float]]) -> list[bool]:
 
 
 @dataclass(frozen=True)
-class TradeTable:
+class TradeTable(_Renamed):
     """What was asked, what it is compared with, and the rows.
 
-    bound_position (m), bound_pull (N): what `asked_for` comes to, None: it does not ask for that.
+    bound_position (m), bound_end_force (N): what `target` comes to, None: it does not ask for that.
     """
 
     title: str
-    asked_for: str
+    target: str
     length: float  # m
-    largest_pull: float | None  # N, at the ends, of the reference
+    largest_end_force: float | None  # N, at the ends, of the reference
     bound_position: float | None
-    bound_pull: float | None
+    bound_end_force: float | None
     rows: tuple[Row, ...]
     notes: tuple[str, ...] = ()
     facts: tuple[tuple[str, str], ...] = ()  # machine, date, versions, command
@@ -116,13 +138,13 @@ class TradeTable:
         return [row for row in self.rows if row.is_choice]
 
     def doubt(self, name: str) -> float:
-        """Error of the reference, "position" (m) or "pull" (N): its own figure, or the check's if that is more."""
+        """Error of the reference, "position" (m) or "end_force" (N): its own figure, or the check's if that is more."""
         check = getattr(self.check, name) if self.check else None
         return max(getattr(self.reference, f"estimate_{name}") or 0.0, OF_DIFFERENCE * (check or 0.0))
 
     def score(self, row: Row) -> float:
         """Error over what is asked for, of the quantity where that is largest: at 1 or less it is met."""
-        pairs = ((row.position, self.bound_position), (row.pull, self.bound_pull))
+        pairs = ((row.position, self.bound_position), (row.end_force, self.bound_end_force))
         return max((error / bound for error, bound in pairs if error is not None and bound), default=0.0)
 
     def front(self) -> list[Row]:
@@ -143,17 +165,17 @@ class TradeTable:
         best, left = self.recommended, f" ({self.missing} runs are missing)" if self.missing else ""
         if best is None:
             near = min((row for row in self.choices if row.code == OURS), key=self.score, default=None)
-            nearest = f"; {near.name} comes nearest, at {self.score(near):.3g} times that" if near else ""
-            return f"No run met {self.asked_for}{nearest}{left}."
+            nearest = f"; {near.name} comes nearest, with {self.score(near):.3g} times this error" if near else ""
+            return f"No run met {self.target}{nearest}{left}."
         cpu = best.cpu or 0.0
-        text = f"For {self.asked_for} take model {best.model} with accuracy {best.asked}: {cpu:.3g} s of CPU time"
+        text = f"For {self.target} use model {best.model} with accuracy {best.asked}: {cpu:.3g} s of CPU time"
         rods = [r for r in self.choices if (r.code, r.model) == (OURS, "rod") and self.score(r) <= 1.0]
         rod = min(rods, key=lambda row: row.cpu or 0.0, default=None)
         if rod is not None and rod != best:
-            text += f", {(rod.cpu or 0.0) / cpu:.2g} times less than all rod (accuracy {rod.asked})"
+            text += f", {(rod.cpu or 0.0) / cpu:.2g} times less than a rod everywhere (accuracy {rod.asked})"
         wrong = [f"{best.position:.3g} m"] if best.position is not None else []
-        wrong += [f"{best.pull:.3g} N"] if best.pull is not None else []
-        return f"{text}, wrong by {' and '.join(wrong)}{left}."
+        wrong += [f"{best.end_force:.3g} N"] if best.end_force is not None else []
+        return f"{text}, error {' and '.join(wrong)}{left}."
 
     # ---- pages ------------------------------------------------------------------------------------
 
@@ -180,15 +202,15 @@ class TradeTable:
         return "\n".join(lines)
 
     def _table(self) -> list[str]:
-        head = ["run", "status", "position", "of length", "estimate", "pull", "of largest", "estimate"]
-        head += ["cells", "steps", "runs", "CPU", "front"]
+        head = ["run", "status", "position", "of length", "estimate", "end force", "of largest", "estimate"]
+        head += ["cells", "steps", "runs", "CPU", ""]
         lines = ["| " + " | ".join(head) + " |", "|---|---|" + "---:|" * 10 + "---|"]
         front, best = self.front(), self.recommended
         for row in self.rows:
-            mark = "**recommended**" if row == best else "front" if row in front else ""
+            mark = "**recommended**" if row == best else "Pareto front" if row in front else ""
             status = row.status + (f": {row.cause}" if row.cause else "")
             cells = [row.name, status]
-            for name, unit in (("position", "m"), ("pull", "N")):
+            for name, unit in (("position", "m"), ("end_force", "N")):
                 cells += self._error(row, name, unit)
             cells += [_whole(row.cells), _whole(row.steps), _whole(row.runs), _unit(row.cpu, "s"), mark]
             lines.append("| " + " | ".join(_cell(x) for x in cells) + " |")
@@ -207,14 +229,14 @@ class TradeTable:
         """How right the reference is."""
         row, check = self.reference, self.check
         text = f"Reference: {row.name}, {_whole(row.cells)} cells, {_whole(row.steps)} steps"
-        own = [_unit(x, u) for x, u in ((row.estimate_position, "m"), (row.estimate_pull, "N")) if x is not None]
-        text += f"; its own figures of its error are {' and '.join(own)}" if own else "; it has no error figure"
+        own = [_unit(x, u) for x, u in ((row.estimate_position, "m"), (row.estimate_end_force, "N")) if x is not None]
+        text += f"; its own error estimate is {' and '.join(own)}" if own else "; it has no error estimate"
         if check is not None and check.position is not None:
-            apart = [_unit(x, u) for x, u in ((check.position, "m"), (check.pull, "N")) if x is not None]
+            apart = [_unit(x, u) for x, u in ((check.position, "m"), (check.end_force, "N")) if x is not None]
             text += f"; {check.name} differs from it by {' and '.join(apart)}"
         if row.cause:
-            text += f". It missed what it was asked: {row.cause}"
-        return text + ". Errors marked ≲ are smaller than that of the reference, and say no more."
+            text += f". It missed its accuracy: {row.cause}"
+        return text + ". Errors marked ≲ are below the error of the reference: they are upper bounds."
 
     def write(self, folder: Path, picture: str = "") -> list[Path]:
         """trade.csv and trade.md in the folder."""
@@ -230,14 +252,16 @@ def judged(table: TradeTable, bounds: Sequence[tuple[float | None, float | None]
     What the reference itself may be wrong by counts for them: a run is blamed only for what is its own.
     """
     rows = []
-    for row, (position, pull) in zip(table.rows, bounds, strict=True):
-        named = (("position", row.position, position), ("pull", row.pull, pull))
+    for row, (position, end_force) in zip(table.rows, bounds, strict=True):
+        named = (("position", row.position, position), ("end_force", row.end_force, end_force))
         over = [(x / most, name) for name, x, most in named if x is not None and most and x - table.doubt(name) > most]
         worst, name = max(over, default=(0.0, ""))
         if row.status == DONE and over:
             estimate = getattr(row, f"estimate_{name}")
             knew = f", estimated {estimate:.2g}" if estimate is not None else ""
-            row = replace(row, status=MISSED, cause=row.cause or f"{name} {worst:.2g} times what was asked{knew}")
+            row = replace(
+                row, status=MISSED, cause=row.cause or f"{_NAMED[name]} error {worst:.2g} times the accuracy{knew}"
+            )
         rows.append(row)
     return replace(table, rows=tuple(rows))
 

@@ -1,4 +1,4 @@
-"""A run of a ladder: its scene, how it is made and timed, and how it is kept for the next call."""
+"""Runs of a tradeoff study: their scenes, their computation and timing, and the store that a second call reads."""
 
 from __future__ import annotations
 
@@ -26,11 +26,10 @@ from hybrid.store.reader import Result
 from hybrid.store.tradeoff_table import DONE, FAILED, MISSED, OURS, Row
 from hybrid.studies.machine import facts_of_machine
 
-# What a run takes to load the kernels before anything is timed, of accuracy and of the duration: they are the same for
-# all of it.
+# Accuracy, and part of the duration, of the run that loads the kernels before anything is timed.
 ROUGH = "10%"
 WARM_PART = 0.02
-# Keys of a model that say how finely, not what: the ladder decides these.
+# Keys of a model that set the resolution: the study chooses these.
 FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")
 # Files of the package that change no answer, only how it is shown or ranked.
@@ -38,8 +37,8 @@ SHOWS = ("cli", "view", "exports", "interop")
 
 
 @dataclass(frozen=True)
-class Doing:
-    """Where a ladder is: how many runs are done, of how many, which one runs, and how far that one is (0 to 1)."""
+class StudyProgress:
+    """Progress of a study: runs done, runs in total, the present one, and the part of it that is done (0 to 1)."""
 
     done: int
     total: int
@@ -48,27 +47,27 @@ class Doing:
 
 
 @dataclass(frozen=True)
-class Rung:
+class RunSpec:
     """A run to be made."""
 
     model: str
     accuracy: str
     scene: Scene | None  # None: refused
     refused: str = ""
-    times: int = 1  # it is made, of which the median cost counts
+    times: int = 1  # repetitions; the median of their CPU times counts
 
     @property
     def name(self) -> str:
         return f"{self.model} {self.accuracy}"
 
 
-def kinds_of_models() -> tuple[str, ...]:
+def model_kinds() -> tuple[str, ...]:
     """The kinds of `model` that scenes know."""
     return next(part.names for part in get_args(Model) if isinstance(part, Kinds))
 
 
-def rung_data(scene: Scene, kind: str, accuracy: str) -> dict[str, Any]:
-    """The scene with this model at this accuracy, and nothing in it that says how finely; as data."""
+def scene_data(scene: Scene, kind: str, accuracy: str) -> dict[str, Any]:
+    """The scene with this model at this accuracy, and without keys that set the resolution; as data."""
     data = scene.model_dump(mode="json", exclude_none=True)
     for name in ("mesh", "solver"):
         data.pop(name, None)
@@ -80,56 +79,56 @@ def rung_data(scene: Scene, kind: str, accuracy: str) -> dict[str, Any]:
     for name in ("errors", "criteria"):
         output.pop(name, None)
     given = data["model"] if data["model"]["kind"] == kind else {}
-    said = {name: value for name, value in given.items() if name not in FINENESS}
-    if "zones" in said:
-        said["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in said["zones"]]
-    return data | {"model": {"kind": kind} | said, "accuracy": accuracy}
+    kept = {name: value for name, value in given.items() if name not in FINENESS}
+    if "zones" in kept:
+        kept["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in kept["zones"]]
+    return data | {"model": {"kind": kind} | kept, "accuracy": accuracy}
 
 
-def rung_of(scene: Scene, kind: str, accuracy: str) -> Rung:
+def run_spec(scene: Scene, kind: str, accuracy: str) -> RunSpec:
     try:
-        return Rung(kind, accuracy, validate_scene(rung_data(scene, kind, accuracy)))
+        return RunSpec(kind, accuracy, validate_scene(scene_data(scene, kind, accuracy)))
     except SceneError as error:
-        return Rung(kind, accuracy, None, _in_short(error))
+        return RunSpec(kind, accuracy, None, _in_short(error))
 
 
 def _in_short(error: SceneError) -> str:
     first = error.complaints[0]
     if first.value == "nothing":
-        return f"it gives no {first.where}"
+        return f"{first.where} is missing"
     return f"refused: {first.where}: given {first.value}, expected {first.expected}"
 
 
-class Desk:
-    """Makes runs, keeps what they find in the folder, and says how far it is."""
+class RunStore:
+    """Computes runs, stores their results in the folder, and reports progress."""
 
-    def __init__(self, folder: Path, told: Callable[[Doing], None] | None, total: int) -> None:
+    def __init__(self, folder: Path, progress: Callable[[StudyProgress], None] | None, total: int) -> None:
         self.folder, self.total = folder, total
-        self.done, self.made, self._told, self._warm = 0, 0, told, set[str]()
+        self.done, self.computed, self._progress, self._warm = 0, 0, progress, set[str]()
         self.facts = facts_of_machine()  # now: the load is that before the first run
         (folder / "runs").mkdir(parents=True, exist_ok=True)
 
-    def say(self, what: str, part: float) -> None:
-        if self._told is not None:
-            self._told(Doing(self.done, self.total, what, part))
+    def report(self, what: str, part: float) -> None:
+        if self._progress is not None:
+            self._progress(StudyProgress(self.done, self.total, what, part))
 
-    def kept(self, rung: Rung, must: bool = False) -> tuple[Row, dict[str, np.ndarray]]:
-        """The run as it was kept, else made and kept now; must: a failure is raised, not kept."""
-        row = Row(OURS, rung.model, rung.accuracy, FAILED, rung.refused)
-        if rung.scene is None:
-            if must:
-                raise SceneError([Complaint("reference", rung.name, "a model that the scene admits", rung.refused)])
+    def get(self, spec: RunSpec, required: bool = False) -> tuple[Row, dict[str, np.ndarray]]:
+        """The stored run, else computed and stored now; required: a failure is raised, not stored."""
+        row = Row(OURS, spec.model, spec.accuracy, FAILED, spec.refused)
+        if spec.scene is None:
+            if required:
+                raise SceneError([Complaint("reference", spec.name, "a model that the scene admits", spec.refused)])
             self.done += 1
             return row, {}
-        key = key_of(rung.scene, rung.times)
-        found = self.found(key)
+        key = key_of(spec.scene, spec.times)
+        found = self.load(key)
         if found is None:
-            found = self._made(replace(row, key=key), rung, rung.scene, must)
+            found = self._compute(replace(row, key=key), spec, spec.scene, required)
         self.done += 1
         return found
 
-    def found(self, key: str) -> tuple[Row, dict[str, np.ndarray]] | None:
-        """A run that was kept."""
+    def load(self, key: str) -> tuple[Row, dict[str, np.ndarray]] | None:
+        """A stored run; None: there is none."""
         try:
             row = Row(**json.loads((self.folder / "runs" / f"{key}.json").read_text(encoding="utf-8")))
             if row.status == FAILED:
@@ -139,9 +138,9 @@ class Desk:
         except (OSError, ValueError, TypeError):  # absent, or of another version: it is made again
             return None
 
-    def keep(self, row: Row, values: Mapping[str, np.ndarray]) -> tuple[Row, dict[str, np.ndarray]]:
-        """Keep a run, and return it as a later call will find it.  Its JSON comes last and at once, so that what is
-        there is whole; seven digits are enough for errors of a ten-thousandth, and half the room.
+    def save(self, row: Row, values: Mapping[str, np.ndarray]) -> tuple[Row, dict[str, np.ndarray]]:
+        """Store a run, and return it as a later call reads it.  Its JSON is written last, by renaming, so that a stored
+        run is complete; single precision is enough for errors of 1e-4 and takes half the space.
         """
         runs = self.folder / "runs"
         half = {name: np.asarray(x, dtype=np.float32) for name, x in values.items()}
@@ -153,44 +152,44 @@ class Desk:
         draft.replace(runs / f"{row.key}.json")
         return row, half
 
-    def _made(self, row: Row, rung: Rung, scene: Scene, must: bool) -> tuple[Row, dict[str, np.ndarray]]:
+    def _compute(self, row: Row, spec: RunSpec, scene: Scene, required: bool) -> tuple[Row, dict[str, np.ndarray]]:
         spent, result = [], None
         try:
-            self._warm_up(rung, scene)
-            for k in range(rung.times):
-                what = rung.name + (f", {k + 1} of {rung.times}" if rung.times > 1 else "")
-                self.say(what, 0.0)
+            self._warm_up(spec, scene)
+            for k in range(spec.times):
+                what = spec.name + (f", {k + 1} of {spec.times}" if spec.times > 1 else "")
+                self.report(what, 0.0)
                 begin = clock.process_time()
                 result = run(scene, progress=self._follow(what))
                 spent.append(clock.process_time() - begin)
         except ComputationError as error:
-            if must:
-                detail = f"this was the reference, {rung.name}, without which nothing can be compared; {error.detail}"
+            if required:
+                detail = f"the reference run, {spec.name}, failed: nothing can be compared; {error.detail}"
                 raise ComputationError(error.outcome, error.t, error.s, detail.rstrip("; ")) from None
-            return self.keep(replace(row, cause=str(error).splitlines()[0]), {})
+            return self.save(replace(row, cause=str(error).splitlines()[0]), {})
         except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
-            if must:
+            if required:
                 raise
             return replace(row, cause=f"a bug: {type(error).__name__}: {error}"), {}
         assert result is not None
         values = {name: np.array(result[name]) for name in COMPARED if name in result}
-        row = replace(_told_by(result, row), cpu=median(spent))
-        self.made += 1
-        return self.keep(row, values)
+        row = replace(_figures_of(result, row), cpu=median(spent))
+        self.computed += 1
+        return self.save(row, values)
 
     def _follow(self, what: str) -> Callable[[Progress], None]:
         def follow(progress: Progress) -> None:
-            self.say(what, progress.fraction)
+            self.report(what, progress.fraction)
 
         return follow
 
-    def _warm_up(self, rung: Rung, scene: Scene) -> None:
-        """Have the kernels of a model compiled and loaded; whether it goes well does not matter."""
-        if rung.model in self._warm:
+    def _warm_up(self, spec: RunSpec, scene: Scene) -> None:
+        """Compile and load the kernels of a model; the result of this run is not used."""
+        if spec.model in self._warm:
             return
-        self._warm.add(rung.model)
-        self.say(f"loading the kernels of {rung.model}", 0.0)
-        data = rung_data(scene, rung.model, ROUGH)
+        self._warm.add(spec.model)
+        self.report(f"loading the kernels of {spec.model}", 0.0)
+        data = scene_data(scene, spec.model, ROUGH)
         data["time"]["duration"] *= WARM_PART
         data["output"].pop("every", None)
         with suppress(ComputationError, SceneError, ArithmeticError, ValueError, LookupError):
@@ -198,7 +197,7 @@ class Desk:
 
 
 def key_of(scene: Scene, repeat: int, also: str = "") -> str:
-    """Of all that decides what a run finds: the scene, files it reads, the package, how often it is timed."""
+    """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
     for end in scene.ends.both:
         if end.prescribed_motion is not None and end.prescribed_motion.file is not None:
@@ -211,12 +210,13 @@ def key_of(scene: Scene, repeat: int, also: str = "") -> str:
     return digest.hexdigest()[:16]
 
 
-def _told_by(result: Result, row: Row) -> Row:
-    """What a result says of itself."""
-    said = result.attributes
+def _figures_of(result: Result, row: Row) -> Row:
+    """Status, cost and estimates of a result."""
+    attributes = result.attributes
     missed = next((event.text for event in result.events if event.kind == "accuracy missed"), "")
     return replace(
-        row, status=MISSED if missed else DONE, cause=missed, cells=said.get("cells"),
-        steps=len(result["steps/t"]), runs=said.get("effort_runs"), effort_cpu=said.get("effort_cpu"),
-        estimate_position=said.get("error_total_position"), estimate_pull=said.get("error_total_end_force"),
+        row, status=MISSED if missed else DONE, cause=missed, cells=attributes.get("cells"),
+        steps=len(result["steps/t"]), runs=attributes.get("effort_runs"), effort_cpu=attributes.get("effort_cpu"),
+        estimate_position=attributes.get("error_total_position"),
+        estimate_end_force=attributes.get("error_total_end_force"),
     )  # fmt: skip

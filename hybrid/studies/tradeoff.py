@@ -1,19 +1,21 @@
-"""Error against cost: a ladder of models and accuracies on one scene, each run compared with a converged rod.
+"""Error against cost: models at several accuracies on one scene, each run compared with a converged rod.
 
-Every finished run is kept in the folder, so that a second call does only what is missing.
+Every finished run is kept in the folder, so that a second call computes only what is missing.
 docs/trade.md
 """
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
+from typing import Any
 
 import numpy as np
 
-import hybrid.studies.peers as others
+import hybrid.studies.peers as peer_codes
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, requested_accuracy
@@ -22,16 +24,26 @@ from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.read import SceneLike, as_scene, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.store.tradeoff_table import CHECK, DONE, FAILED, OURS, REFERENCE, Row, TradeTable, judged
-from hybrid.studies.runs import COMPARED, FINENESS, Desk, Doing, Rung, key_of, kinds_of_models, rung_data, rung_of
+from hybrid.studies.runs import (
+    COMPARED,
+    FINENESS,
+    RunSpec,
+    RunStore,
+    StudyProgress,
+    key_of,
+    model_kinds,
+    run_spec,
+    scene_data,
+)
 from hybrid.view.tradeoff import plot_trade
 
 ACCURACIES = ("10%", "3%", "1%", "0.3%", "0.1%")
-# The reference: a third of the finest accuracy on the usual ladder.  A finer ladder needs a finer reference: errors
-# below half of what it is asked for would be its own.
+# The reference: a third of the finest default accuracy.  Finer accuracies need a finer reference: errors below half of
+# its accuracy would be its own.
 REFERENCE_ACCURACY, LEAST_FINER = "0.03%", 0.5
 CHECK_COARSER = 3.0  # the run that shows how converged the reference is: asked for so many times its error
 ROUGHEST_PART = 0.1  # of what `accuracy` takes
-PULLS = COMPARED[1:]
+END_FORCES = COMPARED[1:]
 
 
 def trade(
@@ -41,61 +53,73 @@ def trade(
     models: Sequence[str] | None = None,
     accuracies: Sequence[str] = ACCURACIES,
     reference: str | None = None,
-    asked_for: str = "1%",
+    target: str = "1%",
     repeat: int = 1,
     peers: bool = False,
-    told: Callable[[Doing], None] | None = None,
+    progress: Callable[[StudyProgress], None] | None = None,
     command: str = "",
+    **former: Any,
 ) -> TradeTable:
     """Compute a scene with every model at every accuracy, compare with a converged rod, and write table and picture.
 
     folder: gets trade.csv, trade.md, trade.png and, in runs/, what each run has found; a second call does what is
-    missing.  models: kinds of `model`, None: all that the scene admits; accuracies, reference, asked_for: as the
+    missing.  models: kinds of `model`, None: all that the scene admits; accuracies, reference, target: as the
     scene's `accuracy`; repeat: of so many runs the median CPU time counts; peers: other programs as well, those that
-    are installed; told: called with what is being done; command: for the heading of the page.
+    are installed; progress: called with a StudyProgress; command: for the heading of the page.
 
-    Raises SceneError when scene or ladder are refused, ComputationError when the reference fails.  KeyboardInterrupt
-    leaves a table of what is done.
+    Raises SceneError when the scene or an argument is refused, ComputationError when the reference fails.
+    KeyboardInterrupt leaves a table of the finished runs.
     """
+    target, progress = _renamed(former, target, progress)
     scene = as_scene(scene)
     scene.require_time()
     names = _models(scene, models)
     goal = reference or _finer(scene, accuracies)
     checks = [_asked(scene, x, "accuracies") for x in accuracies]
-    wanted = _asked(scene, asked_for, "for")
+    wanted = _asked(scene, target, "for")
     _must_be_finer(_asked(scene, goal, "reference"), goal, checks)
     if repeat < 1:
         raise SceneError([Complaint("repeat", str(repeat), "1 or more runs, of which the median counts", "--repeat 3")])
     notes = _notes(scene, names, models is None)
     kinds = [kind for kind, reason in names.items() if not reason or models is not None]
     rod = "rod" if _refusal(scene, "rod", goal) == "" else kinds[0]
-    ladder = [replace(rung_of(scene, kind, x), times=repeat) for x in accuracies for kind in kinds]
-    guests = others.ladder(scene) if peers else []
-    desk = Desk(Path(folder), told, 2 + len(ladder) + len(guests))
+    specs = [replace(run_spec(scene, kind, x), times=repeat) for x in accuracies for kind in kinds]
+    peer_runs = peer_codes.peer_runs(scene) if peers else []
+    store = RunStore(Path(folder), progress, 2 + len(specs) + len(peer_runs))
 
-    best, truth = desk.kept(rung_of(scene, rod, goal), must=True)
-    check, _ = _compared(desk, rung_of(scene, rod, _coarser(goal)), truth, scene.length)
+    best, reference_values = store.get(run_spec(scene, rod, goal), required=True)
+    check, _ = _compared(store, run_spec(scene, rod, _coarser(goal)), reference_values, scene.length)
     rows = [replace(best, status=REFERENCE), replace(check, status=CHECK) if check.status != FAILED else check]
     limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
-    largest = _largest_pull(truth)
+    largest = _largest_end_force(reference_values)
     try:
-        for rung, want in zip(ladder, [x for x in checks for _ in kinds], strict=True):
-            rows.append(_compared(desk, rung, truth, scene.length)[0])
+        for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
+            rows.append(_compared(store, spec, reference_values, scene.length)[0])
             limits.append(_bounds(want, largest))
-        for guest in guests:
-            rows.append(_of_guest(desk, guest, repeat, scene, truth))
+        for peer_run in peer_runs:
+            rows.append(_peer_row(store, peer_run, repeat, scene, reference_values))
             limits.append((None, None))
     finally:
-        position, pull = _bounds(wanted, largest)
+        position, end_force = _bounds(wanted, largest)
         table = TradeTable(
-            scene.title, asked_for, scene.length, largest, position, pull, tuple(rows), tuple(notes),
-            (*desk.facts, *_measured(desk, repeat, command, guests)), desk.total - len(rows),
+            scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
+            (*store.facts, *_measured(store, repeat, command, peer_runs)), store.total - len(rows),
         )  # fmt: skip
         table = judged(table, limits)
         table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
-        table.write(desk.folder, "trade.png")
-        plot_trade(table, desk.folder / "trade.png", overwrite=True)  # the folder is of this program
+        table.write(store.folder, "trade.png")
+        plot_trade(table, store.folder / "trade.png", overwrite=True)  # the folder is of this program
     return table
+
+
+def _renamed(former: dict[str, Any], target: str, progress: Any) -> tuple[str, Any]:
+    """Arguments of `trade` under their names of 0.5."""
+    now = {"asked_for": "target", "told": "progress"}
+    for name in former:
+        if name not in now:
+            raise TypeError(f"trade() got an unexpected keyword argument {name!r}")
+        warnings.warn(f"trade({name}=...) is now trade({now[name]}=...)", DeprecationWarning, stacklevel=3)
+    return former.get("asked_for", target), former.get("told", progress)
 
 
 def _order(row: Row, kinds: Sequence[str]) -> int:
@@ -109,12 +133,12 @@ def _order(row: Row, kinds: Sequence[str]) -> int:
 
 
 def _refusal(scene: Scene, kind: str, accuracy: str) -> str:
-    return rung_of(scene, kind, accuracy).refused
+    return run_spec(scene, kind, accuracy).refused
 
 
 def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
     """Kinds of models, and why the scene does not admit them, "" if it does."""
-    known = kinds_of_models()
+    known = model_kinds()
     for name in wanted or ():
         if name not in known:
             raise SceneError([Complaint("models", name, f"some of: {', '.join(known)}", f"--models {known[0]}")])
@@ -122,7 +146,7 @@ def _models(scene: Scene, wanted: Sequence[str] | None) -> dict[str, str]:
 
 
 def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
-    """What of the scene the ladder does not keep, and which models it has left out."""
+    """Keys of the scene that the study ignores, and models that the scene does not admit."""
     time = scene.require_time()
     dropped = [f"time.{x}" for x in ("step", "tolerance") if getattr(time, x) is not None]
     dropped += ["time.rho_inf"] if time.rho_inf > LEAST_DAMPED else []
@@ -131,10 +155,10 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
     dropped += ["solver"] if scene.solver != "elimination" else []
     given = scene.model.model_dump(exclude_none=True)
     dropped += [f"model.{x}" for x in FINENESS[1:] if x in given]
-    notes = [f"The ladder chooses mesh, steps and tolerance: of the scene it leaves out {', '.join(dropped)}."]
+    notes = [f"The study chooses mesh, steps and tolerance: it ignores these keys of the scene: {', '.join(dropped)}."]
     kept = [x for x in sorted(scene.model.model_fields_set) if x not in FINENESS]
     if kept:
-        notes.append(f"Of the scene's model it keeps {', '.join(kept)}, for runs of that kind ({scene.model.kind}).")
+        notes.append(f"Of the scene's model it uses {', '.join(kept)}, for runs of that kind ({scene.model.kind}).")
     if chosen:
         notes += [f"Not admitted by the scene: {kind} ({why})." for kind, why in models.items() if why]
     return notes if dropped else notes[1:]
@@ -143,7 +167,7 @@ def _notes(scene: Scene, models: Mapping[str, str], chosen: bool) -> list[str]:
 def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
     """An accuracy in numbers; SceneError if it is none."""
     try:
-        found = requested_accuracy(validate_scene(rung_data(scene, scene.model.kind, accuracy)))
+        found = requested_accuracy(validate_scene(scene_data(scene, scene.model.kind, accuracy)))
     except SceneError as error:
         bad = [c for c in error.complaints if c.where.startswith("accuracy")] or error.complaints
         raise SceneError([replace(c, where=where, line=None, column=None) for c in bad]) from None
@@ -152,7 +176,7 @@ def _asked(scene: Scene, accuracy: str, where: str) -> RequestedAccuracy:
 
 
 def _finer(scene: Scene, accuracies: Sequence[str]) -> str:
-    """An accuracy for the reference: the usual one, or a third of the finest of the ladder."""
+    """An accuracy for the reference: the usual one, or a third of the finest accuracy."""
     parts = [amount(x)[1] for x in accuracies if _asked(scene, x, "accuracies") and amount(x)[0] == "part"]
     return f"{100 * min([amount(REFERENCE_ACCURACY)[1], *(x / CHECK_COARSER for x in parts)]):.3g}%"
 
@@ -168,99 +192,113 @@ def _coarser(accuracy: str) -> str:
     )
 
 
-def _must_be_finer(goal: RequestedAccuracy, text: str, ladder: Sequence[RequestedAccuracy]) -> None:
+def _must_be_finer(goal: RequestedAccuracy, text: str, specs: Sequence[RequestedAccuracy]) -> None:
     for name in ("position", "tension", "of_end_force"):
-        finest = min((x for x in (getattr(each, name) for each in ladder) if x is not None), default=None)
+        finest = min((x for x in (getattr(each, name) for each in specs) if x is not None), default=None)
         mine = getattr(goal, name)
         if finest is not None and mine is not None and mine > LEAST_FINER * finest:
             fix = "a finer reference, or coarser accuracies"
-            raise SceneError([Complaint("reference", text, "at most half of the finest accuracy of the ladder", fix)])
+            raise SceneError([Complaint("reference", text, "at most half of the finest accuracy of the study", fix)])
 
 
 def _bounds(want: RequestedAccuracy, largest: float | None) -> tuple[float | None, float | None]:
-    """What is asked for in m and N; the tighter one of two for the pull."""
-    pulls = [want.tension] if want.tension is not None else []
-    pulls += [want.of_end_force * largest] if want.of_end_force is not None and largest else []
-    return want.position, min(pulls, default=None)
+    """What is asked for in m and N; the smaller of the two for the end force."""
+    forces = [want.tension] if want.tension is not None else []
+    forces += [want.of_end_force * largest] if want.of_end_force is not None and largest else []
+    return want.position, min(forces, default=None)
 
 
 # --- errors -------------------------------------------------------------------------------------
 
 
 def _compared(
-    desk: Desk, rung: Rung, truth: Mapping[str, np.ndarray], length: float
+    store: RunStore, spec: RunSpec, reference: Mapping[str, np.ndarray], length: float
 ) -> tuple[Row, dict[str, np.ndarray]]:
-    row, values = desk.kept(rung)
-    return (against(row, values, truth, length) if values else row), values
+    row, values = store.get(spec)
+    return (with_errors(row, values, reference, length) if values else row), values
 
 
-def against(row: Row, values: Mapping[str, np.ndarray], truth: Mapping[str, np.ndarray], length: float) -> Row:
+def with_errors(row: Row, values: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray], length: float) -> Row:
     """The row with its errors: outputs (nt, ...) of the run and of the reference, at the same times and places."""
-    position = float(np.linalg.norm(values["position"] - truth["position"], axis=-1).max())
-    pulls = [float(_apart(values[x], truth[x]).max()) for x in PULLS if x in values and x in truth]
+    position = float(np.linalg.norm(values["position"] - reference["position"], axis=-1).max())
+    forces = [float(_difference(values[x], reference[x]).max()) for x in END_FORCES if x in values and x in reference]
     row = replace(row, position=position, position_part=position / length)
-    largest = _largest_pull(truth)
-    if pulls and largest:
-        row = replace(row, pull=max(pulls), pull_part=max(pulls) / largest)
-    if max(row.position_part or 0.0, row.pull_part or 0.0) > 1.0:
-        return replace(row, status=FAILED, cause="it blew up: it is wrong by more than there is")
+    largest = _largest_end_force(reference)
+    if forces and largest:
+        row = replace(row, end_force=max(forces), end_force_part=max(forces) / largest)
+    if max(row.position_part or 0.0, row.end_force_part or 0.0) > 1.0:
+        return replace(row, status=FAILED, cause="diverged: the error exceeds the length or the largest end force")
     return row
 
 
-def _apart(force: np.ndarray, truth: np.ndarray) -> np.ndarray:
+def _difference(force: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Difference (nt,) of two forces (nt, 3), N; of their sizes, where only that is known (nt, 1)."""
     if force.shape[-1] == 1:
-        return np.asarray(np.abs(np.abs(force[:, 0]) - np.linalg.norm(truth, axis=-1)))
-    return np.asarray(np.linalg.norm(force - truth, axis=-1))
+        return np.asarray(np.abs(np.abs(force[:, 0]) - np.linalg.norm(reference, axis=-1)))
+    return np.asarray(np.linalg.norm(force - reference, axis=-1))
 
 
-def _largest_pull(truth: Mapping[str, np.ndarray]) -> float | None:
+def _largest_end_force(reference: Mapping[str, np.ndarray]) -> float | None:
     """N; None: no end is held."""
-    return max((float(np.linalg.norm(truth[x], axis=-1).max()) for x in PULLS if x in truth), default=None) or None
+    return (
+        max(
+            (float(np.linalg.norm(reference[x], axis=-1).max()) for x in END_FORCES if x in reference),
+            default=None,
+        )
+        or None
+    )
 
 
 # --- other programs -----------------------------------------------------------------------------
 
 
-def _of_guest(desk: Desk, guest: others.Guest, repeat: int, scene: Scene, truth: Mapping[str, np.ndarray]) -> Row:
+def _peer_row(
+    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene, reference: Mapping[str, np.ndarray]
+) -> Row:
     """The row of another program, kept as ours are."""
     row = Row(
-        guest.code,
-        guest.model,
-        guest.told,
+        peer_run.code,
+        peer_run.model,
+        peer_run.settings,
         FAILED,
-        guest.cannot,
-        key=key_of(scene, repeat, others.driver(guest)) + guest.tag,
+        peer_run.unsupported,
+        key=key_of(scene, repeat, peer_codes.fingerprint(peer_run)) + peer_run.tag,
     )
-    if guest.cannot:
-        desk.done += 1
-        return replace(row, status=others.CANNOT)
-    found = desk.found(row.key)
+    if peer_run.unsupported:
+        store.done += 1
+        return replace(row, status=peer_codes.UNSUPPORTED)
+    found = store.load(row.key)
     if found is None:
-        desk.say(guest.name, 0.0)
+        store.report(peer_run.name, 0.0)
         try:
-            answers = [others.answer(guest, scene) for _ in range(repeat)]
-        except others.Failed as error:
-            found = desk.keep(replace(row, cause=str(error)), {})
+            answers = [peer_codes.compute(peer_run, scene) for _ in range(repeat)]
+        except peer_codes.PeerFailed as error:
+            found = store.save(replace(row, cause=str(error)), {})
         else:
             values = answers[-1].values
-            row = replace(row, status=DONE, cells=guest.elements, steps=answers[-1].steps)
-            found = desk.keep(replace(row, cpu=median(x.cpu for x in answers)), values)
-            desk.made += 1
-    desk.done += 1
+            row = replace(row, status=DONE, cells=peer_run.elements, steps=answers[-1].steps)
+            found = store.save(replace(row, cpu=median(x.cpu for x in answers)), values)
+            store.computed += 1
+    store.done += 1
     if not found[1]:
         return found[0]
-    pulls = np.max([_apart(found[1][x], truth[x]) for x in PULLS], axis=0)
-    # A jolt at the start, or one blow, is another matter than an error that lasts.
-    worst, usual = [0.0, *output_times(scene)][int(pulls.argmax())], float(np.median(pulls))
-    cause = f"its pull is furthest off at t = {worst:g} s, usually by {usual:.3g} N"
-    return against(replace(found[0], cause=cause), found[1], truth, scene.length)
+    forces = np.max([_difference(found[1][x], reference[x]) for x in END_FORCES], axis=0)
+    # The median tells a transient at the start, or one impact, from an error that lasts.
+    worst, usual = [0.0, *output_times(scene)][int(forces.argmax())], float(np.median(forces))
+    cause = f"largest error of its end force at t = {worst:g} s; median error {usual:.3g} N"
+    return with_errors(replace(found[0], cause=cause), found[1], reference, scene.length)
 
 
-def _measured(desk: Desk, repeat: int, command: str, guests: Sequence[others.Guest]) -> list[tuple[str, str]]:
+def _measured(
+    store: RunStore, repeat: int, command: str, peer_runs: Sequence[peer_codes.PeerRun]
+) -> list[tuple[str, str]]:
     """How costs were measured, for the heading."""
     count = "one run each" if repeat == 1 else f"median of {repeat} runs"
-    made = "all made by this call" if desk.made == desk.done else f"{desk.made} of {desk.done} made by this call"
-    said = [("other programs", found)] if (found := others.versions(guests)) else []
-    said += [("command", f"`{command}`")] if command else []
-    return [*said, ("CPU time", f"of the process, kernels loaded beforehand; {count}; {made}")]
+    made = (
+        "all computed now"
+        if store.computed == store.done
+        else f"{store.computed} of {store.done} computed now"
+    )
+    rows = [("other programs", found)] if (found := peer_codes.versions(peer_runs)) else []
+    rows += [("command", f"`{command}`")] if command else []
+    return [*rows, ("CPU time", f"of the process, kernels loaded beforehand; {count}; {made}")]

@@ -1,6 +1,6 @@
-"""The page of a ladder of runs: error against CPU time, a line for every model.
+"""The page of a tradeoff study: error against CPU time, a line for every model.
 
-The large panel shows what decides: the error over what is asked for, of the quantity where that is largest.
+The large panel shows the error relative to the target accuracy, of the quantity where it is largest.
 Beside it are the errors themselves. Pages read rows and compute nothing.
 """
 
@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 # Colours that no kind of zone has, of the same family; other codes are grey, apart by their marks.
 COLOURS = {"adaptive": "#CC79A7", "zones": "#56B4E9"} | KIND_COLOURS
 MARKS = {"rod": "o", "catenary": "s", "adaptive": "D", "corrected": "^", "zones": "v"}
-_GUEST_MARKS = ("P", "X", "p", "d")
+_PEER_MARKS = ("P", "X", "p", "d")
 _MET, STAR = "#009E73", "#F0E442"
 _BESIDE = 1.8  # of the smallest and largest value, times that which an axis leaves beside them
 _LEAST_DECADES = 1.0  # a vertical axis spans at least so many, or differences of a few per cent would look like much
@@ -47,20 +47,20 @@ def plot_trade(table: TradeTable, path: str | Path | None = None, *, overwrite: 
 
 def _page(table: TradeTable) -> Page:
     if not table.choices:
-        return Page(table.title or "(no title)", table.recommendation, 2, size=_SIZE, empty="no run came to an end")
-    part = table.asked_for if table.asked_for.strip().endswith("%") else ""
+        return Page(table.title or "(no title)", table.recommendation, 2, size=_SIZE, empty="no finished run")
+    part = table.target if table.target.strip().endswith("%") else ""
     scale = float(part.strip().rstrip("%")) if part else 1.0
-    title, up = "error over what is asked for", ("error / asked", "")
+    title, up = "error relative to the target accuracy", ("error / target", "")
     if part:
-        title, up = "error, the larger of position (of length) and end force (of largest)", ("error", "%")
-    asked = (scale, f"asked: {table.asked_for}")
+        title, up = "larger error: position / length, end force / largest", ("error", "%")
+    asked = (scale, f"target {table.target}")
     panels = {"score": _panel(table, title, up, lambda row: scale * table.score(row), asked, named=True)}
-    for name, unit, bound in (("position", "m", table.bound_position), ("pull", "N", table.bound_pull)):
+    for name, unit, bound in (("position", "m", table.bound_position), ("end_force", "N", table.bound_end_force)):
         if any(getattr(row, name) is not None for row in table.choices):
             title = f"error of {'position' if name == 'position' else 'end forces'}"
             limit, doubt = (bound, ""), table.doubt(name)
             panels[name] = _panel(table, title, ("", unit), attrgetter(name), limit, doubt=doubt)
-    mosaic = [["score", name if name in panels else "."] for name in ("position", "pull")]
+    mosaic = [["score", name if name in panels else "."] for name in ("position", "end_force")]
     look: dict[str, Any] = {"mosaic": mosaic, "widths": [1.7, 1.0], "legend": ["score"], "size": _SIZE}
     return Page(table.title or "(no title)", table.recommendation, 2, panels, **look)
 
@@ -77,18 +77,18 @@ def _panel(
 ) -> Panel:
     """A line for every model, its accuracies in a row; rings: the front; the star: what is recommended.
 
-    limit: what is asked for, and in words; doubt: the error of the reference; named: accuracies beside their points.
+    limit: the target and its label; doubt: the error of the reference; named: accuracies beside their points.
     """
     groups: dict[tuple[str, str], list[Row]] = {}
     for row in table.choices:
         if figure_of(row):
             groups.setdefault((row.code, row.model), []).append(row)
-    guests = list(dict.fromkeys(code for code, _ in groups if code != OURS))
+    peers = list(dict.fromkeys(code for code, _ in groups if code != OURS))
     items: list[Item] = []
     for n, ((code, model), rows) in enumerate(groups.items()):
         ours = code == OURS
         colour = COLOURS.get(model, INK) if ours else GREY
-        symbol = MARKS.get(model, "h") if ours else _GUEST_MARKS[guests.index(code) % len(_GUEST_MARKS)]
+        symbol = MARKS.get(model, "h") if ours else _PEER_MARKS[peers.index(code) % len(_PEER_MARKS)]
         dash, name = ("", model) if ours else ("dot", code)
         items.append(Line(*_places(rows, figure_of), name, colour, 1.2, dash, symbol=symbol, size=4.5))
         for k, row in enumerate(rows if named else ()):
@@ -99,7 +99,10 @@ def _panel(
             items.append(Text(x, y, said, colour, (side, lift), across, "baseline", SMALL - 1.0))
     front = [row for row in table.front() if figure_of(row)]
     best = [row for row in front if row == table.recommended]
-    for chosen, symbol, name, face, size in ((front, "o", "front", "", 10.0), (best, "*", "recommended", STAR, 15.0)):
+    for chosen, symbol, name, face, size in (
+        (front, "o", "Pareto front", "", 10.0),
+        (best, "*", "recommended", STAR, 15.0),
+    ):
         items += [Marks(*_places(chosen, figure_of), symbol, name, face, INK, 0.9, size)] * bool(chosen)
     costs = [row.cpu for rows in groups.values() for row in rows if row.cpu]
     errors = [z for rows in groups.values() for row in rows if (z := figure_of(row))]

@@ -67,7 +67,7 @@ def test_trade_writes_beside_the_scene_and_says_what_to_take(call: Call) -> None
     assert {x.name for x in folder.iterdir()} == {"runs", "trade.csv", "trade.md", "trade.png"}
     assert "rod 3%" in said.out and "reference" in said.out and "catenary 10%" in said.out
     whole = " ".join(said.out.split())
-    assert "For 1% take model " in whole or "No run met 1%" in whole
+    assert "For 1% use model " in whole or "No run met 1%" in whole
     assert f"4 runs -> {folder}/trade.md, {folder}/trade.csv and {folder}/trade.png" in whole
     page = (folder / "trade.md").read_text()
     assert f"`hybrid trade there/sag.yaml {' '.join(SHORT)}`" in page
@@ -124,7 +124,7 @@ def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(rungs, "run", run)
     said = call("trade", "sag.yaml", *SHORT)
-    assert said.code == 2 and "this was the reference, rod 3%" in " ".join(said.err.split())
+    assert said.code == 2 and "the reference run, rod 3%, failed" in " ".join(said.err.split())
 
 
 def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> None:

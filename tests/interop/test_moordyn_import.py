@@ -16,7 +16,7 @@ from hybrid.interop.moordyn.cables import _rotated
 from hybrid.scene.schema import Body, Clamped, Free, Pinned, Scene
 from hybrid.studies.peers import PEERS
 from hybrid.studies.peers.decks import MoorDyn
-from hybrid.studies.peers.seam import line_of
+from hybrid.studies.peers.interface import line_of
 
 
 def only(name: str, line: int | None = None) -> ImportedScene:

@@ -15,11 +15,9 @@ import numpy as np
 import pytest
 
 import hybrid
-import hybrid.studies.peers as peers
-import hybrid.studies.runs as rungs
-import hybrid.studies.tradeoff as ladder
 from hybrid.errors import ComputationError, Outcome, SceneError
 from hybrid.store.tradeoff_table import CHECK, FAILED, MISSED, REFERENCE, Row, TradeTable, judged, pareto
+from hybrid.studies import peers, runs, tradeoff
 from hybrid.view.tradeoff import plot_trade
 
 # A second of a line that hangs in water: every model can do it, and a run is some 0.1 s.
@@ -54,14 +52,16 @@ def scene(**changes: Any) -> hybrid.Scene:
 
 def row(model: str = "rod", asked: str = "1%", cpu: float = 1.0, error: float = 0.5, **more: Any) -> Row:
     """A run with `error` metres and ten times as many newtons."""
-    figures = {"position": error, "pull": 10.0 * error, "position_part": error / 10, "pull_part": error / 20}
+    figures = {"position": error, "end_force": 10.0 * error, "position_part": error / 10, "end_force_part": error / 20}
     return Row("hybrid", model, asked, "done", cpu=cpu, **figures | more)
 
 
-def table(*rows: Row, position: float | None = 1.0, pull: float | None = 10.0, **more: Any) -> TradeTable:
-    reference = Row("hybrid", "rod", "0.03%", REFERENCE, estimate_position=0.01, estimate_pull=0.1, cells=9, steps=9)
+def table(*rows: Row, position: float | None = 1.0, end_force: float | None = 10.0, **more: Any) -> TradeTable:
+    reference = Row(
+        "hybrid", "rod", "0.03%", REFERENCE, estimate_position=0.01, estimate_end_force=0.1, cells=9, steps=9
+    )
     facts = (("command", "`hybrid trade x.yaml`"),)
-    return TradeTable("by hand", "1%", 10.0, 200.0, position, pull, (reference, *rows), facts=facts, **more)
+    return TradeTable("by hand", "1%", 10.0, 200.0, position, end_force, (reference, *rows), facts=facts, **more)
 
 
 # --- what counts as good ------------------------------------------------------------------------
@@ -94,33 +94,33 @@ def test_the_cheapest_that_meets_what_is_asked_is_recommended() -> None:
     assert found.recommended == cheap
     assert found.front() == [rough, cheap, dear]
     said = found.recommendation
-    assert said.startswith("For 1% take model catenary with accuracy 1%: 0.5 s of CPU time")
-    assert "4 times less than all rod" in said and "0.9 m and 9 N" in said
+    assert said.startswith("For 1% use model catenary with accuracy 1%: 0.5 s of CPU time")
+    assert "4 times less than a rod everywhere" in said and "0.9 m and 9 N" in said
 
 
 def test_the_worse_of_two_quantities_counts_and_what_is_not_asked_does_not() -> None:
-    bent = row(error=0.5, pull=30.0)
+    bent = row(error=0.5, end_force=30.0)
     assert table(bent).score(bent) == 3.0
     assert table(bent).recommended is None
-    assert table(bent, pull=None).recommended == bent
-    assert "No run met 1%; rod 1% comes nearest, at 3 times that" in table(bent).recommendation
+    assert table(bent, end_force=None).recommended == bent
+    assert "No run met 1%; rod 1% comes nearest, with 3 times this error" in table(bent).recommendation
 
 
 def test_failed_runs_references_and_other_programs_are_not_recommended() -> None:
-    guest = replace(row(cpu=0.01, error=0.01), code="MoorDyn")
+    peer_run = replace(row(cpu=0.01, error=0.01), code="MoorDyn")
     ours = row(cpu=1.0, error=0.9)
     failed = Row("hybrid", "catenary", "1%", FAILED, "it went slack", cpu=0.001)
     check = replace(row(cpu=0.001, error=0.001), status=CHECK)
-    found = table(ours, failed, check, guest)
-    assert found.recommended == ours and found.front() == [guest]
+    found = table(ours, failed, check, peer_run)
+    assert found.recommended == ours and found.front() == [peer_run]
 
 
 def test_a_run_that_misses_what_it_was_asked_says_by_how_much() -> None:
-    good, bad = row(error=0.5, estimate_pull=2.0), row(error=3.0, estimate_pull=2.0, pull=4.0)
+    good, bad = row(error=0.5, estimate_end_force=2.0), row(error=3.0, estimate_end_force=2.0, end_force=4.0)
     limits = [(None, None), (1.0, 10.0), (1.0, 10.0), (None, None)]
     _, first, second, third = judged(table(good, bad, bad), limits).rows
     assert first.status == third.status == "done"
-    assert second.status == MISSED and second.cause == "position 3 times what was asked"
+    assert second.status == MISSED and second.cause == "position error 3 times the accuracy"
 
 
 def test_a_run_is_not_blamed_for_the_error_of_the_reference() -> None:
@@ -139,7 +139,7 @@ def test_errors_below_that_of_the_reference_are_marked() -> None:
     assert "≲ 0.005 m" in first and "(×" not in first
     assert "≲" not in second and "0.25 m (× 0.5)" in second
     doubt = table(row(), replace(row(error=0.4), status=CHECK))
-    assert doubt.doubt("position") == 0.2 and doubt.doubt("pull") == 2.0
+    assert doubt.doubt("position") == 0.2 and doubt.doubt("end_force") == 2.0
 
 
 def test_errors_are_the_largest_over_time_and_place_and_pulls_are_vectors() -> None:
@@ -147,35 +147,48 @@ def test_errors_are_the_largest_over_time_and_place_and_pulls_are_vectors() -> N
     values = {name: x.copy() for name, x in truth.items()}
     values["position"][1, 2] = [0.3, 0.0, 0.4]
     values["reaction_start"][2] = [4.0, 3.0, 0.0]  # as large, elsewhere to
-    found = ladder.against(row(), values, truth, 10.0)
+    found = tradeoff.with_errors(row(), values, truth, 10.0)
     assert found.position == pytest.approx(0.5) and found.position_part == pytest.approx(0.05)
-    assert found.pull == pytest.approx(2**0.5) and found.pull_part == pytest.approx(2**0.5 / 5)
+    assert found.end_force == pytest.approx(2**0.5) and found.end_force_part == pytest.approx(2**0.5 / 5)
     assert found.status == "done"
     wild = values | {"reaction_start": 3.0 * truth["reaction_start"]}
-    assert ladder.against(row(), wild, truth, 10.0).status == FAILED, "wrong by twice the largest pull"
+    assert tradeoff.with_errors(row(), wild, truth, 10.0).status == FAILED, "wrong by twice the largest pull"
     sizes = values | {"reaction_start": np.full((3, 1), 5.5)}  # a program that tells only how large a force is
-    assert ladder.against(row(), sizes, truth, 10.0).pull == pytest.approx(0.5)
+    assert tradeoff.with_errors(row(), sizes, truth, 10.0).end_force == pytest.approx(0.5)
 
 
-# --- the ladder ---------------------------------------------------------------------------------
+def test_names_of_0_5_still_work() -> None:
+    found = table(row(error=0.5))
+    with pytest.warns(DeprecationWarning, match="largest_pull is now largest_end_force"):
+        assert found.largest_pull == found.largest_end_force == 200.0
+    with pytest.warns(DeprecationWarning, match="pull_part is now end_force_part"):
+        assert found.rows[1].pull_part == found.rows[1].end_force_part
+    with pytest.warns(DeprecationWarning, match="asked_for=.* is now .*target="), pytest.raises(SceneError) as refused:
+        hybrid.trade(scene(), "nowhere", asked_for="much")
+    assert refused.value.complaints[0].where == "for"
+    with pytest.raises(TypeError, match="goal"):
+        hybrid.trade(scene(), "nowhere", goal="1%")
 
 
-def test_a_rung_keeps_the_scene_and_drops_how_finely_it_was_to_be_computed() -> None:
-    asked = hybrid.validate_scene(rungs.rung_data(scene(), "adaptive", "0.3%"))
+# --- the study ---------------------------------------------------------------------------------
+
+
+def test_a_run_keeps_the_scene_and_drops_its_resolution() -> None:
+    asked = hybrid.validate_scene(runs.scene_data(scene(), "adaptive", "0.3%"))
     assert asked.mesh is None and asked.time is not None and asked.time.step is None
     assert asked.accuracy is not None and asked.accuracy.position == "0.3%"
     assert asked.model.kind == "adaptive" and asked.model.tolerance is None and asked.model.force_rod == ((0.0, 1.0),)
     assert asked.cable == scene().cable and asked.ends == scene().ends and asked.output.points == 25
-    assert rungs.rung_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
+    assert runs.scene_data(scene(), "rod", "1%")["model"] == {"kind": "rod"}
 
 
 def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
-    assert {"rod", "catenary", "adaptive", "zones"} <= set(rungs.kinds_of_models())
+    assert {"rod", "catenary", "adaptive", "zones"} <= set(runs.model_kinds())
     soft = scene()
     data = soft.model_dump(mode="json", exclude_none=True)
     del data["cable"]["sections"][0]["bending_stiffness"]
     soft = hybrid.validate_scene(data | {"model": "catenary"})
-    admitted = [kind for kind, why in ladder._models(soft, None).items() if not why]
+    admitted = [kind for kind, why in tradeoff._models(soft, None).items() if not why]
     assert "catenary" in admitted and "rod" not in admitted
 
 
@@ -185,7 +198,7 @@ def test_models_are_those_of_the_schema_that_the_scene_admits() -> None:
         ({"models": ["rood"]}, "models"),
         ({"accuracies": ["1 parsec"]}, "accuracies"),
         ({"accuracies": ["50%"]}, "accuracies"),
-        ({"asked_for": "much"}, "for"),
+        ({"target": "much"}, "for"),
         ({"reference": "1%", "accuracies": ["1%"]}, "reference"),
         ({"reference": "none"}, "reference"),
         ({"repeat": 0}, "repeat"),
@@ -208,9 +221,11 @@ def test_a_scene_without_time_is_refused(tmp_path: Path) -> None:
     ("accuracies", "reference"), [(["10%", "3%"], "0.03%"), (["0.06%"], "0.02%"), (["3 cm"], "0.03%")]
 )
 def test_the_reference_is_finer_than_the_ladder(accuracies: list[str], reference: str) -> None:
-    assert ladder._finer(scene(), accuracies) == reference
+    assert tradeoff._finer(scene(), accuracies) == reference
     assert (
-        ladder._coarser("0.03%") == "0.09%" and ladder._coarser("8%") == "10%" and ladder._coarser("3 cm") == "0.09 m"
+        tradeoff._coarser("0.03%") == "0.09%"
+        and tradeoff._coarser("8%") == "10%"
+        and tradeoff._coarser("3 cm") == "0.09 m"
     )
 
 
@@ -223,7 +238,7 @@ LADDER: dict[str, Any] = {"models": ["rod", "catenary"], "accuracies": ["10%", "
 def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
     """Which runs are made, warming up left out."""
     made: list[str] = []
-    real = rungs.run
+    real = runs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if more:
@@ -231,14 +246,14 @@ def counted(monkeypatch: pytest.MonkeyPatch) -> Iterator[list[str]]:
             made.append(f"{scene.model.kind} {scene.accuracy.position}")
         return real(scene, *args, **more)
 
-    monkeypatch.setattr(rungs, "run", run)
+    monkeypatch.setattr(runs, "run", run)
     yield made
 
 
 def test_a_ladder_is_computed_once_and_kept(tmp_path: Path, counted: list[str]) -> None:
     first = hybrid.trade(scene(), tmp_path, **LADDER)
     assert counted[:2] == ["rod 1%", "rod 3%"], "the reference comes first, then what shows how converged it is"
-    # The check is the rung "rod 3%" as well: one run serves both.
+    # The check is the run "rod 3%" as well: one run serves both.
     assert sorted(counted) == sorted(["rod 1%", "rod 3%", "rod 10%", "catenary 10%", "catenary 3%"])
     assert [r.name for r in first.rows] == ["rod 1%", "rod 3%", "rod 10%", "rod 3%", "catenary 10%", "catenary 3%"]
     assert [r.status for r in first.rows][:2] == [REFERENCE, CHECK]
@@ -268,14 +283,14 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
     assert len(rows) == len(found.rows) == 6
     for read, kept in zip(rows, found.rows, strict=True):
         assert (read["model"], read["asked"], read["status"]) == (kept.model, kept.asked, kept.status)
-        assert read["pull"] == (f"{kept.pull:.6g}" if kept.pull is not None else "")
+        assert read["end_force"] == (f"{kept.end_force:.6g}" if kept.end_force is not None else "")
     assert sum(int(read["recommended"]) for read in rows) == 1
     assert {r.name for r in found.front()} == {f"{r['model']} {r['asked']}" for r in rows if r["front"] == "1"}
     page = (tmp_path / "trade.md").read_text()
     for said in (
         "# a line that sags", found.recommendation, "(trade.png)", "| machine | ", "cores", "| versions | hybrid-cable ",
         "`hybrid trade sag.yaml`", "Reference: rod 1%", "rod 3% differs from it by", "time.step, mesh, model.tolerance",
-        "it keeps force_rod",
+        "it uses force_rod",
     ):  # fmt: skip
         assert said in page, said
     assert page.count("**recommended**") == 1
@@ -286,7 +301,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
 def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
-    real = rungs.run
+    real = runs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if scene.model.kind == "catenary":
@@ -294,7 +309,7 @@ def test_a_model_that_fails_is_a_row_and_is_not_tried_again(
             raise ComputationError(Outcome.SLACK, 0.4, 3.0)
         return real(scene, *args, **more)
 
-    monkeypatch.setattr(rungs, "run", run)
+    monkeypatch.setattr(runs, "run", run)
     found = hybrid.trade(scene(), tmp_path, **LADDER)
     failed = [r for r in found.rows if r.model == "catenary"]
     assert [r.status for r in failed] == [FAILED] * 2 and "goes into compression" in failed[0].cause
@@ -308,8 +323,8 @@ def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch:
     def run(*_: Any, **__: Any) -> None:
         raise ComputationError(Outcome.NOT_CONVERGED, 0.4, 3.0)
 
-    monkeypatch.setattr(rungs, "run", run)
-    with pytest.raises(ComputationError, match="this was the reference, rod 1%"):
+    monkeypatch.setattr(runs, "run", run)
+    with pytest.raises(ComputationError, match="the reference run, rod 1%, failed"):
         hybrid.trade(scene(), tmp_path, **LADDER)
     assert not (tmp_path / "trade.md").exists()
 
@@ -318,7 +333,7 @@ def test_a_reference_that_fails_ends_it_and_says_so(tmp_path: Path, monkeypatch:
 def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
 ) -> None:
-    real = rungs.run
+    real = runs.run
 
     def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
         if more and len(counted) == 3:
@@ -326,7 +341,7 @@ def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
         return real(scene, *args, **more)
 
     with monkeypatch.context() as patch:
-        patch.setattr(rungs, "run", run)
+        patch.setattr(runs, "run", run)
         with pytest.raises(KeyboardInterrupt):
             hybrid.trade(scene(), tmp_path, **LADDER)
     assert len(counted) == 3
@@ -369,15 +384,15 @@ def test_the_picture_shows_every_run_at_its_place() -> None:
     np.testing.assert_allclose(lines["rod"].get_xydata(), [(0.1, 2.0), (0.5, 0.5), (3.0, 0.03)])
     np.testing.assert_allclose(lines["MoorDyn"].get_xydata(), [(9.0, 0.2)])
     np.testing.assert_allclose(lines["recommended"].get_xydata(), [(0.3, 0.7)])
-    assert lines["front"].get_xydata().shape == (4, 2)
+    assert lines["Pareto front"].get_xydata().shape == (4, 2)
     assert position.get_xscale() == position.get_yscale() == "log"
     (low, high), (left, right) = position.get_ylim(), position.get_xlim()
     assert low < 0.03 and high > 2.0 and left < 0.1 and right > 9.0
 
 
 def test_a_picture_without_runs_or_pulls_says_so() -> None:
-    assert any("no run came to an end" in text.get_text() for text in plot_trade(table()).texts)
-    figure = plot_trade(table(row(pull=None, pull_part=None)))
+    assert any("no finished run" in text.get_text() for text in plot_trade(table()).texts)
+    figure = plot_trade(table(row(end_force=None, end_force_part=None)))
     assert [ax.get_label() for ax in figure.axes] == ["score", "position"]
 
 
@@ -399,7 +414,7 @@ def test_what_other_programs_cannot_do_is_said(change: dict[str, Any], reason: s
     if "environment" in change and not change["environment"]:
         section = {k: v for k, v in SAG["cable"]["sections"][0].items() if k not in ("drag", "added_mass")}
         data["cable"] = {"sections": [section]}
-    said = peers.unfit(hybrid.validate_scene(data))
+    said = peers.unsupported(hybrid.validate_scene(data))
     assert reason in said and bool(said) == bool(reason)
 
 
@@ -409,8 +424,8 @@ def test_a_program_that_is_not_installed_has_no_row_and_one_that_cannot_has_one(
     monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
     moving = scene(environment={"fluid": {"density": 1025, "current": [0.1, 0, 0]}})
     found = hybrid.trade(moving, tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
-    (guest,) = (r for r in found.rows if r.code != "hybrid")
-    assert (guest.code, guest.status, guest.cause) == ("MoorDyn", "cannot do", "the water moves")
+    (peer_run,) = (r for r in found.rows if r.code != "hybrid")
+    assert (peer_run.code, peer_run.status, peer_run.cause) == ("MoorDyn", "unsupported", "the water moves")
     assert "MoorDyn" in (tmp_path / "trade.md").read_text()
 
 
@@ -418,30 +433,30 @@ def test_a_program_that_is_not_installed_has_no_row_and_one_that_cannot_has_one(
 def test_another_program_agrees(code: str) -> None:
     """With the rod at 0.3 %, to 1 % of the length, and in the middle of all outputs 1 % of the pull: what 50 elements can."""
     pytest.importorskip(peers.PEERS[code].package)
-    guest = next(g for g in peers.ladder(scene()) if g.code == code and g.elements == 50)
-    answer = peers.answer(guest, scene())
-    result = hybrid.run(hybrid.validate_scene(rungs.rung_data(scene(), "rod", "0.3%")))
-    truth = {name: np.array(result[name]) for name in rungs.COMPARED}
-    found = ladder.against(row(), answer.values, truth, 12.0)
+    peer_run = next(g for g in peers.peer_runs(scene()) if g.code == code and g.elements == 50)
+    answer = peers.compute(peer_run, scene())
+    result = hybrid.run(hybrid.validate_scene(runs.scene_data(scene(), "rod", "0.3%")))
+    truth = {name: np.array(result[name]) for name in runs.COMPARED}
+    found = tradeoff.with_errors(row(), answer.values, truth, 12.0)
     assert found.position_part is not None and found.position_part < 0.01
-    usual = [np.median(ladder._apart(answer.values[x], truth[x])) for x in ladder.PULLS]
-    assert max(usual) < 0.01 * ladder._largest_pull(truth)
+    usual = [np.median(tradeoff._difference(answer.values[x], truth[x])) for x in tradeoff.END_FORCES]
+    assert max(usual) < 0.01 * tradeoff._largest_end_force(truth)
     assert answer.cpu > 0.0 and answer.steps > 10
 
 
 @pytest.mark.slow  # a ladder of runs
 def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
-    real = peers.answer
+    real = peers.compute
 
-    def answer(guest: peers.Guest, scene: hybrid.Scene) -> peers.Answer:
-        if guest.elements != 25:
-            raise peers.Failed("it blew up")
-        return real(replace(guest, code="nobody"), scene)
+    def answer(peer_run: peers.PeerRun, scene: hybrid.Scene) -> peers.PeerResult:
+        if peer_run.elements != 25:
+            raise peers.PeerFailed("diverged")
+        return real(replace(peer_run, code="nobody"), scene)
 
     monkeypatch.setattr(peers, "answer", answer)
-    monkeypatch.setattr(peers, "versions", lambda guests: "moordyn 0")
+    monkeypatch.setattr(peers, "versions", lambda peer_runs: "moordyn 0")
     found = hybrid.trade(scene(), tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
-    guests = [r for r in found.rows if r.code != "hybrid"]
-    assert [r.status for r in guests] == [FAILED] * 3
-    assert "nobody" in guests[0].cause and guests[1].cause == "it blew up"
+    peer_runs = [r for r in found.rows if r.code != "hybrid"]
+    assert [r.status for r in peer_runs] == [FAILED] * 3
+    assert "nobody" in peer_runs[0].cause and peer_runs[1].cause == "diverged"

@@ -1,11 +1,11 @@
-"""Other people's cable codes on a scene of ours: an adapter for each, which runs in a process of its own.
+"""Other cable programs on a scene of ours: an adapter for each, which runs in a process of its own.
 
     CableDyn   finite elements, implicit                      decks.py
     MoorDyn    lumped masses, explicit                        decks.py
     Exudyn     planar cable elements (ANCF), implicit         ancf.py
 
-What they all can do is a uniform line between two points that are held or moved as prescribed, in still water, on a
-level seabed; of anything else `unfit` says why not.
+All of them compute a uniform line between two points, fixed or moved, in still water, on a level seabed; `unsupported`
+says why a scene is anything else.
 """
 
 from __future__ import annotations
@@ -28,14 +28,14 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.studies.peers.ancf import Exudyn
 from hybrid.studies.peers.decks import CableDyn, MoorDyn
-from hybrid.studies.peers.seam import Answer, Failed, Guest, Peer
+from hybrid.studies.peers.interface import Peer, PeerFailed, PeerResult, PeerRun
 
-CANNOT = "cannot do"
-PATIENCE = 900.0  # s of wall time for one run: what takes longer is no choice
+UNSUPPORTED = "unsupported"
+TIME_LIMIT = 900.0  # s of wall time for one run
 PEERS: Mapping[str, Peer] = {"CableDyn": CableDyn(), "MoorDyn": MoorDyn(), "Exudyn": Exudyn()}
 
 
-def unfit(scene: Scene) -> str:
+def unsupported(scene: Scene) -> str:
     """Why other codes cannot do a scene; "" if they can."""
     if scene.initial.kind != "equilibrium":
         return f"the cable starts {scene.initial.kind}, not in equilibrium"
@@ -64,44 +64,46 @@ def unfit(scene: Scene) -> str:
     return ""
 
 
-def ladder(scene: Scene) -> list[Guest]:
-    """Runs of those codes that are installed; of a scene they cannot do one each, that says why."""
+def peer_runs(scene: Scene) -> list[PeerRun]:
+    """Runs of the codes that are installed; one each, with the reason, for a scene that they do not support."""
     installed = [code for code, peer in PEERS.items() if importlib.util.find_spec(peer.package) is not None]
-    reason = unfit(scene)
+    reason = unsupported(scene)
     if reason:
-        return [Guest(code, PEERS[code].model, PEERS[code].package, cannot=reason) for code in installed]
+        return [PeerRun(code, PEERS[code].model, PEERS[code].package, unsupported=reason) for code in installed]
     return [
-        Guest(code, PEERS[code].model, PEERS[code].package, *how) for code in installed for how in PEERS[code].settings
+        PeerRun(code, PEERS[code].model, PEERS[code].package, *how)
+        for code in installed
+        for how in PEERS[code].settings
     ]
 
 
-def versions(guests: Sequence[Guest]) -> str:
-    """Of the programs in a ladder."""
-    names = dict.fromkeys(guest.package for guest in guests if not guest.cannot)
+def versions(peer_runs: Sequence[PeerRun]) -> str:
+    """Versions of the programs of these runs."""
+    names = dict.fromkeys(peer_run.package for peer_run in peer_runs if not peer_run.unsupported)
     return ", ".join(f"{name} {version(name)}" for name in names)
 
 
-def driver(guest: Guest) -> str:
-    """What decides its answer besides the scene: these files, and its version."""
+def fingerprint(peer_run: PeerRun) -> str:
+    """Hash of what decides the result besides the scene: these files, and the version of the program."""
     digest = hashlib.sha256()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(file.read_bytes())
-    return digest.hexdigest() if guest.cannot else f"{digest.hexdigest()} {versions([guest])}"
+    return digest.hexdigest() if peer_run.unsupported else f"{digest.hexdigest()} {versions([peer_run])}"
 
 
-def answer(guest: Guest, scene: Scene) -> Answer:
-    """Run it, in a process of its own; Failed if it does not come to an end."""
+def compute(peer_run: PeerRun, scene: Scene) -> PeerResult:
+    """Run it in a process of its own; PeerFailed if it fails or takes too long."""
     with tempfile.TemporaryDirectory() as folder:
-        task = {"scene": scene_text(scene), "guest": asdict(guest)}
+        task = {"scene": scene_text(scene), "run": asdict(peer_run)}
         Path(folder, "task.json").write_text(json.dumps(task), encoding="utf-8")
         command = [sys.executable, "-m", "hybrid.studies.peers", folder]
         try:
-            done = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE, check=False)
+            done = subprocess.run(command, capture_output=True, text=True, timeout=TIME_LIMIT, check=False)
         except subprocess.TimeoutExpired:
-            raise Failed(f"not done after {PATIENCE:g} s") from None
+            raise PeerFailed(f"not done after {TIME_LIMIT:g} s") from None
         if done.returncode:
-            last = (done.stderr.strip().splitlines() or [f"it left with code {done.returncode}"])[-1]
-            raise Failed(last[:200])
+            last = (done.stderr.strip().splitlines() or [f"exit code {done.returncode}"])[-1]
+            raise PeerFailed(last[:200])
         cost = json.loads(Path(folder, "cost.json").read_text(encoding="utf-8"))
         with np.load(Path(folder, "values.npz")) as file:
-            return Answer({name: file[name] for name in file.files}, **cost)
+            return PeerResult({name: file[name] for name in file.files}, **cost)

@@ -1,4 +1,4 @@
-"""The process of another program: `python -m hybrid.peers FOLDER` does the task in the folder."""
+"""The process of another program: `python -m hybrid.studies.peers FOLDER` runs the task in the folder."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from hybrid.model.plan import output_times
 from hybrid.scene.read import parse_scene
 from hybrid.studies.peers import PEERS
-from hybrid.studies.peers.seam import Failed, Guest, line_of
+from hybrid.studies.peers.interface import PeerFailed, PeerRun, line_of
 
 
 @contextmanager
@@ -32,13 +32,13 @@ def silence() -> Iterator[None]:
 
 
 def main(folder: Path) -> None:
-    """Do it, and leave values.npz and cost.json."""
+    """Run it, and write values.npz and cost.json."""
     task = json.loads((folder / "task.json").read_text(encoding="utf-8"))
-    scene, guest = parse_scene(task["scene"]), Guest(**task["guest"])
+    scene, peer_run = parse_scene(task["scene"]), PeerRun(**task["run"])
     with silence():
-        found = PEERS[guest.code].march(line_of(scene), guest, [0.0, *output_times(scene)])
+        found = PEERS[peer_run.code].run(line_of(scene), peer_run, [0.0, *output_times(scene)])
     if not all(np.isfinite(x).all() for x in found.values.values()):
-        raise Failed("its answer is not finite")
+        raise PeerFailed("its result is not finite")
     np.savez(folder / "values.npz", **found.values)  # type: ignore[arg-type]
     (folder / "cost.json").write_text(json.dumps({"cpu": found.cpu, "steps": found.steps}), encoding="utf-8")
 

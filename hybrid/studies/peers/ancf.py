@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.studies.peers.seam import Answer, Failed, Guest, Line
+from hybrid.studies.peers.interface import Line, PeerFailed, PeerResult, PeerRun
 
 BLEND = 1e-2  # m of depth of the seabed over which its damper, which acts on the way down only, comes in
 OUT_OF_PLANE = 1e-6  # of the length: what leaves the vertical plane of the ends by more is not planar
@@ -114,29 +114,29 @@ class Exudyn:
     model, package = "planar ANCF elements", "exudyn"
     settings = ((25, 80), (50, 80), (100, 80), (100, 160))
 
-    def march(self, line: Line, guest: Guest, times: list[float]) -> Answer:
+    def run(self, line: Line, peer_run: PeerRun, times: list[float]) -> PeerResult:
         setattr(sys, "exudynFast", True)  # noqa: B010  Exudyn's own switch: no range checks
         with contextlib.redirect_stdout(None):
             import exudyn
 
         interval = times[1] - times[0]
         if np.ptp(np.diff(times)) > 1e-6 * interval:
-            raise Failed("outputs are not evenly spread")
+            raise PeerFailed("outputs are not evenly spread")
         origin, e = _plane(line, times)
-        step = line.length / guest.elements
+        step = line.length / peer_run.elements
         begin = clock.process_time()
         exudyn.config.printToConsole = False
         container = exudyn.SystemContainer()
         mbs = container.AddSystem()
-        nodes = _elements(exudyn, mbs, line, guest.elements, origin, e)
+        nodes = _elements(exudyn, mbs, line, peer_run.elements, origin, e)
         position = exudyn.OutputVariableType.Position
-        pulls = _held_ends(exudyn, mbs, line, (nodes[0], nodes[-1]), origin, e)
+        forces = _held_ends(exudyn, mbs, line, (nodes[0], nodes[-1]), origin, e)
         seen = [
             mbs.AddSensor(_items().SensorNode(nodeNumber=n, outputVariableType=position, storeInternal=True))
             for n in nodes
         ]
         mbs.Assemble()
-        steps = max(1, math.ceil(interval * (guest.per_period or 1) / line.period - 1e-9)) * (len(times) - 1)
+        steps = max(1, math.ceil(interval * (peer_run.per_period or 1) / line.period - 1e-9)) * (len(times) - 1)
         rest = _solved(exudyn, mbs, times, steps)
         cpu = clock.process_time() - begin
 
@@ -149,12 +149,12 @@ class Exudyn:
         whole[..., 2] = nodes_at[..., 1]
         values = {"position": np.stack([line.places(x) for x in whole])}
         for k, name in enumerate(("reaction_start", "reaction_end")):
-            pull = -np.stack([stored(pulls[2 * k + axis])[:, 0] for axis in (0, 1)], axis=1)
+            pull = -np.stack([stored(forces[2 * k + axis])[:, 0] for axis in (0, 1)], axis=1)
             pull[0] = rest[2 * k : 2 * k + 2]  # no force is stored before the first step
             force_on_line = pull[:, :1] * e + pull[:, 1:] * (0.0, 0.0, 1.0)
-            # less what moves the end node's share of the line: the others do not count that either
+            # less what moves the end node's share of the line: the peer_codes do not count that either
             values[name] = force_on_line - 0.5 * step * line.mass * np.array([line.end(k, t)[2] for t in times])
-        return Answer(values, cpu, steps)
+        return PeerResult(values, cpu, steps)
 
 
 def _items() -> Any:
@@ -205,7 +205,7 @@ def _held_ends(
         return np.array([(q - origin) @ e, q[2]]), np.array([v @ e, v[2]])
 
     ground = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=mbs.AddNode(items.NodePointGround()), coordinate=0))
-    force, pulls = exudyn.OutputVariableType.Force, []
+    force, forces = exudyn.OutputVariableType.Force, []
     for k, node in enumerate(nodes):
         for axis in (0, 1):
             marker = mbs.AddMarker(items.MarkerNodeCoordinate(nodeNumber=node, coordinate=axis))
@@ -216,8 +216,8 @@ def _held_ends(
                 )
             )
             sensor = items.SensorObject(objectNumber=held, outputVariableType=force, storeInternal=True)
-            pulls.append(mbs.AddSensor(sensor))
-    return pulls
+            forces.append(mbs.AddSensor(sensor))
+    return forces
 
 
 def _solved(exudyn: Any, mbs: Any, times: list[float], steps: int) -> np.ndarray:
@@ -229,7 +229,7 @@ def _solved(exudyn: Any, mbs: Any, times: list[float], steps: int) -> np.ndarray
     how.staticSolver.numberOfLoadSteps, how.staticSolver.useLoadFactor = 1, False
     how.staticSolver.newton.relativeTolerance, how.staticSolver.newton.maxIterations = 1e-8, 100
     if not mbs.SolveStatic(how, updateInitialValues=True):
-        raise Failed("it finds no static equilibrium")
+        raise PeerFailed("it finds no static equilibrium")
     rest = np.asarray(mbs.systemData.GetAECoordinates(configuration=exudyn.ConfigurationType.Initial))
     march = how.timeIntegration
     march.endTime, march.numberOfSteps = times[-1], steps
@@ -238,12 +238,12 @@ def _solved(exudyn: Any, mbs: Any, times: list[float], steps: int) -> np.ndarray
     march.newton.relativeTolerance, march.minimumStepSize = NEWTON, SMALLEST_STEP
     how.solution.sensors.writePeriod = times[1] - times[0]
     if not mbs.SolveDynamic(how, solverType=exudyn.DynamicSolverType.GeneralizedAlpha):
-        raise Failed("it stops on the way")
+        raise PeerFailed("it stops on the way")
     return rest
 
 
 def _plane(line: Line, times: list[float]) -> tuple[np.ndarray, np.ndarray]:
-    """A point, and the level direction, of the vertical plane in which the ends move; Failed if they leave it."""
+    """A point, and the level direction, of the vertical plane in which the ends move; PeerFailed if they leave it."""
     ends = np.array([[line.end(k, t)[0] for t in times] for k in (0, 1)])
     origin = ends[0, 0] * (1.0, 1.0, 0.0)
     span = (ends[1, 0] - ends[0, 0]) * (1.0, 1.0, 0.0)
@@ -251,7 +251,7 @@ def _plane(line: Line, times: list[float]) -> tuple[np.ndarray, np.ndarray]:
     e = span / far if far > OUT_OF_PLANE * line.length else np.array([1.0, 0.0, 0.0])
     across = (ends - origin) @ np.array([-e[1], e[0], 0.0])
     if np.abs(across).max() > OUT_OF_PLANE * line.length:
-        raise Failed("the ends leave a vertical plane, and its elements are planar")
+        raise PeerFailed("the ends leave a vertical plane, and its elements are planar")
     return origin, e
 
 

@@ -11,7 +11,16 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.studies.peers.seam import Answer, Failed, Guest, Line, Values, even, seen, stacked
+from hybrid.studies.peers.interface import (
+    Line,
+    PeerFailed,
+    PeerResult,
+    PeerRun,
+    Values,
+    output_values,
+    stacked,
+    steps_per_output,
+)
 
 # Both read the same kind of file; their drag and added mass have our conventions, their seabed is per area of line
 # seen from above.
@@ -61,13 +70,13 @@ class CableDyn:
     # the whole answer (25 elements, 40 steps), twice as many gain nothing.
     settings = ((25, 80), (50, 80), (100, 160), (200, 160))
 
-    def march(self, line: Line, guest: Guest, times: list[float]) -> Answer:
+    def run(self, line: Line, peer_run: PeerRun, times: list[float]) -> PeerResult:
         import cabledyn  # type: ignore[import-not-found]
 
         if line.ends[0].moving and line.ends[1].moving:
-            raise Failed("both ends move: it wants the far end of a line that bends to be fixed")
+            raise PeerFailed("both ends move: it wants the far end of a line that bends to be fixed")
         near = 0 if line.ends[0].moving else 1  # its end A; it counts from there
-        per = even(times, line.period / (guest.per_period or 1))
+        per = steps_per_output(times, line.period / (peer_run.per_period or 1))
         steps = 0
         types = "TypeName Diam MassDenInAir EA BA/-zeta EI Cd_n Cd_t Ca_n Ca_t\n"
         types += "(-) (m) (kg/m) (N) (N-s/-) (N-m^2) (-) (-) (-) (-)\n"
@@ -78,19 +87,19 @@ class CableDyn:
         lines += (
             "--------------------- SECTIONS ---------------------\nLineID LineType Length NumSegs\n(-) (-) (m) (-)\n"
         )
-        lines += f"1 line {line.length} {guest.elements}"
+        lines += f"1 line {line.length} {peer_run.elements}"
         text = _deck(
             line, (times[1] - times[0]) / per, (near,), types=types, lines=lines, rho="rhoW",
             options=f"{times[-1]} TMax", outputs='"FairTen1"',
         )  # fmt: skip
 
-        def look() -> Values:
+        def sample() -> Values:
             nodes = np.asarray(model.line(1).node_positions())
             nodes = nodes if near == 0 else nodes[::-1]
             # It tells the force on a driven end; of a fixed one how large it is.
-            pulls = [np.array([model.line(1).anchor_tension()])] * 2
-            pulls[near] = np.asarray(model.calc_output())[driven]
-            return seen(line, nodes, pulls)
+            forces = [np.array([model.line(1).anchor_tension()])] * 2
+            forces[near] = np.asarray(model.calc_output())[driven]
+            return output_values(line, nodes, forces)
 
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "line.dat"
@@ -100,7 +109,7 @@ class CableDyn:
         with model:
             q, v, a = model.get_coupled_motion()
             driven = np.asarray(model.host_dofs())
-            looks = [look()]
+            samples = [sample()]
             for t0, t1 in pairwise(times):
                 n = max(1, round((t1 - t0) / (times[1] - times[0]) * per))
                 dt = (t1 - t0) / n
@@ -108,9 +117,9 @@ class CableDyn:
                     q[driven], v[driven], a[driven] = line.end(near, t0 + i * dt)
                     model.step(dt, q, v, a)
                     steps += 1
-                looks.append(look())
+                samples.append(sample())
             cpu = clock.process_time() - begin
-        return Answer(stacked(looks), cpu, steps)
+        return PeerResult(stacked(samples), cpu, steps)
 
 
 class MoorDyn:
@@ -138,16 +147,16 @@ class MoorDyn:
         options += f"{self.RELAXATION} TmaxIC"
         return _deck(line, dt, (0, 1), types=types, lines=lines, rho="rho", options=options, outputs="FairTen1")
 
-    def march(self, line: Line, guest: Guest, times: list[float]) -> Answer:
+    def run(self, line: Line, peer_run: PeerRun, times: list[float]) -> PeerResult:
         import moordyn  # type: ignore[import-not-found]
 
-        l = line.length / guest.elements
+        l = line.length / peer_run.elements
         dt = self.STRETCH * l / math.sqrt(line.ea / line.mass)
         if line.ei:
             dt = min(dt, self.BEND * l * l / math.sqrt(line.ei / line.mass))
-        hands = even(times, self.PER_HAND * dt)
+        hands = steps_per_output(times, self.PER_HAND * dt)
         dt = (times[1] - times[0]) / hands / self.PER_HAND
-        text = self.deck(line, guest.elements, dt)
+        text = self.deck(line, peer_run.elements, dt)
         steps = 0
         with tempfile.TemporaryDirectory() as folder:
             path = Path(folder) / "line.txt"
@@ -157,14 +166,14 @@ class MoorDyn:
             try:
                 there = np.concatenate([line.end(k, 0.0)[0] for k in (0, 1)])
                 if moordyn.Init(system, there.tolist(), [0.0] * there.size):
-                    raise Failed("it does not start")
+                    raise PeerFailed("it does not start")
                 cable, points = moordyn.GetLine(system, 1), [moordyn.GetPoint(system, k) for k in (1, 2)]
 
-                def look() -> Values:
-                    nodes = [moordyn.GetLineNodePos(cable, i) for i in range(guest.elements + 1)]
-                    return seen(line, np.array(nodes), [moordyn.GetPointForce(p) for p in points])
+                def sample() -> Values:
+                    nodes = [moordyn.GetLineNodePos(cable, i) for i in range(peer_run.elements + 1)]
+                    return output_values(line, np.array(nodes), [moordyn.GetPointForce(p) for p in points])
 
-                looks = [look()]
+                samples = [sample()]
                 for t0, t1 in pairwise(times):
                     n = max(1, round((t1 - t0) / (times[1] - times[0]) * hands))
                     hand = (t1 - t0) / n
@@ -174,8 +183,8 @@ class MoorDyn:
                         now, then = (np.concatenate([line.end(k, x)[0] for k in (0, 1)]) for x in (t, t + hand))
                         moordyn.Step(system, now.tolist(), ((then - now) / hand).tolist(), t, hand)
                     steps += n * self.PER_HAND
-                    looks.append(look())
+                    samples.append(sample())
                 cpu = clock.process_time() - begin
             finally:
                 moordyn.Close(system)
-        return Answer(stacked(looks), cpu, steps)
+        return PeerResult(stacked(samples), cpu, steps)

@@ -1,4 +1,4 @@
-"""What adapters of other programs share: the run asked for, the line in their terms, the answer."""
+"""What adapters of other programs share: the run, the line in their terms, the result."""
 
 from __future__ import annotations
 
@@ -17,40 +17,40 @@ from hybrid.scene.motion_checks import shortest_period
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
 
-# Depth, m, by which a line without a surface is sunk below that of the other code: more than any end is heaved.
-SINK = 50.0
+# Depth, m, of the upper end below the surface of the other code, for a scene without one: more than any heave.
+SUBMERGENCE = 50.0
 # Over this time, s, the acceleration of an end is taken from its velocity: short against any period, long against
 # round-off of a velocity (1e-12 over 1e-4).
-GLANCE = 1e-4
+DIFFERENCE_TIME = 1e-4
 Values = dict[str, np.ndarray]
 
 
-class Failed(Exception):
-    """A run of another code that came to no end, and why."""
+class PeerFailed(Exception):
+    """A run of another code failed, and why."""
 
 
 @dataclass(frozen=True)
-class Guest:
-    """A run to be made; per_period: steps to the shortest period, None: as stability wants; cannot: why it is not."""
+class PeerRun:
+    """A run; per_period: steps per shortest period, None: by stability; unsupported: why it cannot be made, else ""."""
 
     code: str
     model: str
     package: str
     elements: int = 0
     per_period: int | None = None
-    cannot: str = ""
+    unsupported: str = ""
 
     @property
-    def told(self) -> str:
+    def settings(self) -> str:
         """Settings, in words."""
-        if self.cannot:
+        if self.unsupported:
             return ""
-        steps = f"{self.per_period} steps to a period" if self.per_period else "steps as stability wants"
+        steps = f"{self.per_period} steps per period" if self.per_period else "steps by stability"
         return f"{self.elements} elements, {steps}"
 
     @property
     def name(self) -> str:
-        return f"{self.code} {self.told}"
+        return f"{self.code} {self.settings}"
 
     @property
     def tag(self) -> str:
@@ -59,14 +59,14 @@ class Guest:
 
 
 @dataclass(frozen=True)
-class Answer:
+class PeerResult:
     """Position (nt, ns, 3) m and force on the cable at both ends (nt, 3) N at the outputs of the scene; cost.
 
-    Of a force with one component (nt, 1) the code tells only how large it is.
+    A force with one component (nt, 1) is a magnitude: the code gives no more.
     """
 
     values: Values
-    cpu: float  # s, from the input file to the last output, the search for the rest included
+    cpu: float  # s, from the input file to the last output, statics included
     steps: int
 
 
@@ -97,12 +97,12 @@ class Line:
     def end(self, k: int, t: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Position, velocity, acceleration (3,) of an end."""
         q, v = self.ends[k].at(t)[:2]
-        before, after = max(t - GLANCE, 0.0), t + GLANCE
+        before, after = max(t - DIFFERENCE_TIME, 0.0), t + DIFFERENCE_TIME
         a = (self.ends[k].at(after)[1] - self.ends[k].at(before)[1]) / (after - before)
         return q + self.shift, v, a
 
     def hanging(self, elements: int) -> np.ndarray:
-        """Nodes (n+1, 3) of the elastic catenary that our own search for the rest starts from."""
+        """Nodes (n+1, 3) of the elastic catenary that our own statics start from."""
         data = self.scene.model_dump(mode="json", exclude_none=True) | {
             "model": "catenary",
             "mesh": {"cells": elements},
@@ -110,7 +110,7 @@ class Line:
         return np.asarray(build(validate_scene(data)).start.r) + self.shift
 
     def places(self, nodes: np.ndarray) -> np.ndarray:
-        """Positions (ns, 3) at the output points, by a spline through nodes (n+1, 3) that are evenly spread."""
+        """Positions (ns, 3) at the output points, by a spline through nodes (n+1, 3) that are equally spaced."""
         from scipy.interpolate import CubicSpline
 
         spline = CubicSpline(np.linspace(0.0, self.length, len(nodes)), nodes)
@@ -127,7 +127,7 @@ class Peer(Protocol):
     @property
     def settings(self) -> Sequence[tuple[int, int | None]]: ...  # elements, steps to a period
 
-    def march(self, line: Line, guest: Guest, times: list[float]) -> Answer: ...
+    def run(self, line: Line, peer_run: PeerRun, times: list[float]) -> PeerResult: ...
 
 
 def line_of(scene: Scene) -> Line:
@@ -135,7 +135,7 @@ def line_of(scene: Scene) -> Line:
     assert fluid is not None and section.diameter is not None and section.axial_stiffness is not None
     ends = [x for x in (scene.ends.start, scene.ends.end) if isinstance(x, Pinned)]
     top = max(x.position[2] for x in ends)
-    up = -fluid.surface if fluid.surface is not None else -top - SINK
+    up = -fluid.surface if fluid.surface is not None else -top - SUBMERGENCE
     drag = (section.drag.normal, section.drag.tangential) if section.drag else (0.0, 0.0)
     stiff = section.bending_stiffness
     return Line(
@@ -148,16 +148,16 @@ def line_of(scene: Scene) -> Line:
     )  # fmt: skip
 
 
-def even(times: list[float], most: float) -> int:
+def steps_per_output(times: list[float], most: float) -> int:
     """Steps of at most so long to the shortest interval between two outputs."""
     return max(1, math.ceil(float(np.diff(times).min()) / most - 1e-9))
 
 
-def seen(line: Line, nodes: np.ndarray, pulls: list[Any]) -> Values:
-    """What is compared at one output; pulls: of the line on its two points, so the points pull with the opposite."""
-    start, end = (-np.asarray(pull, dtype=float) for pull in pulls)
+def output_values(line: Line, nodes: np.ndarray, line_forces: list[Any]) -> Values:
+    """What is compared at one output; line_forces: of the line on its two points; the reactions are the opposite."""
+    start, end = (-np.asarray(force, dtype=float) for force in line_forces)
     return {"position": line.places(np.asarray(nodes)), "reaction_start": start, "reaction_end": end}
 
 
-def stacked(seen: list[Values]) -> Values:
-    return {name: np.stack([each[name] for each in seen]) for name in seen[0]}
+def stacked(samples: list[Values]) -> Values:
+    return {name: np.stack([each[name] for each in samples]) for name in samples[0]}
