@@ -294,11 +294,7 @@ def _measured(
 ) -> list[tuple[str, str]]:
     """How costs were measured, for the heading."""
     count = "one run each" if repeat == 1 else f"median of {repeat} runs"
-    made = (
-        "all computed now"
-        if store.computed == store.done
-        else f"{store.computed} of {store.done} computed now"
-    )
+    made = "all computed now" if store.computed == store.done else f"{store.computed} of {store.done} computed now"
     rows = [("other programs", found)] if (found := peer_codes.versions(peer_runs)) else []
     rows += [("command", f"`{command}`")] if command else []
     return [*rows, ("CPU time", f"of the process, kernels loaded beforehand; {count}; {made}")]

@@ -264,7 +264,7 @@ def test_a_ladder_is_computed_once_and_kept(tmp_path: Path, counted: list[str]) 
     counted.clear()
     second = hybrid.trade(scene(), tmp_path, **LADDER)
     assert not counted and second.rows == first.rows
-    assert (tmp_path / "trade.md").read_text().count("0 of 6 made by this call") == 1
+    assert (tmp_path / "trade.md").read_text().count("0 of 6 computed now") == 1
 
     files = sorted((tmp_path / "runs").glob("*.json"))
     lost = next(file for file in files if json.loads(file.read_text())["model"] == "catenary")
