@@ -1,8 +1,8 @@
-"""The domain manager: watches the criteria, proposes zones, and blends bending in and out.
+"""The domain manager: evaluates the criteria, proposes zones, and ramps bending stiffness up and down.
 
-It proposes; the loop disposes.  What it holds besides the layout is small: how far bending has
-been blended in (`grown`), which rods are on their way out (`leaving`), since when they are calm, and
-tensions of a while ago.
+The time loop decides whether a proposal is carried out.  Besides the layout the manager holds the part of its stiffness
+that each rod has (`grown`), rods whose stiffness is ramped down (`leaving`), since when they are below their
+thresholds, and earlier tensions.
 """
 
 from __future__ import annotations
@@ -22,30 +22,33 @@ from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material, tension_floor
 
-# Rod on either side of what asks for it, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension weight
-# is what straightens a cable.
+# Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
+# it is weight that straightens a cable.
 BUFFER = 2.0
-# How far ahead a falling tension is seen, in paces; the past it is judged by is a sample or two old.
-HORIZON, MOST_AHEAD = 0.125, 2.0
-REVIEWS, SAMPLES = 4, 16  # in a pace: reviews when nothing asks, what happens in between is remembered; pasts
-HARD = 4.0  # a step that ends with a catenary above this is taken back, and more of the line becomes rod first
-HASTE = 16.0  # times as fast bending is blended in where tension is lost
-SOON = 4.0  # dwell times within which a catenary is not worth the two switches that it takes
-LOST, WEIGHTLESS = 0.3, 1e-3  # part of the tension that is left of what is lost; floor over tension scale of no weight
-MOST_PATIENCE = 8.0  # dwell times that a rod must have been calm, where those before it were let go too soon
+# How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
+LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
+REVIEWS, SAMPLES = 4, 16  # per ramp time: reviews without a cell above threshold; samples of the tension
+REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, and repeated with more rod
+FAST_RAMP = 16.0  # factor by which stiffness is ramped up faster where tension is lost
+RETURN_WINDOW = 4.0  # hold times: a catenary that lasts less costs more than its two switches save
+LOST_TENSION, WEIGHTLESS = (
+    0.3,
+    1e-3,
+)  # remaining part of a lost tension; tension floor over scale, no weight
+LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
 SHORTEST = 2.0  # base cells that make a zone
-ASKED = 2.0  # ratio of what the scene says is always rod
+FORCED_RATIO = 2.0  # ratio of cells that the scene forces to be rod
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
-REMEMBERED = (
+CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age",
 )  # fmt: skip
 
 
 class NodeState(NamedTuple):
-    """What a criterion of the user gets to see; arrays are not his to change.
+    """What a user criterion receives; the arrays are read-only.
 
     t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
     bending_stiffness: (N+1,) N m2.
@@ -60,7 +63,7 @@ class NodeState(NamedTuple):
     bending_stiffness: Floats
 
 
-# (N+1,) at 1 asks for rod around a node, below 0.5 lets go.
+# (N+1,) above 1: rod around the node; below 0.5: catenary again.
 UserCriterion = Callable[[NodeState], Floats]
 
 
@@ -77,12 +80,12 @@ class Reason(NamedTuple):
 
 
 class Change(NamedTuple):
-    """A proposal, (n,) of base cells: what they should be, why, and which have no time to be blended in slowly."""
+    """A proposal, (n,) of base cells: what they should be, why, and which must be ramped up fast."""
 
     rod: np.ndarray
     reasons: tuple[Reason, ...]
     urgent: np.ndarray
-    stiff: np.ndarray  # rods that get all of their stiffness at once
+    stiff: np.ndarray  # rods that get their full stiffness at once
 
 
 class DomainManager:
@@ -100,10 +103,10 @@ class DomainManager:
         pace: float | None = None,
         left: float = 1.0,
     ) -> None:
-        """tolerance: m; given: (n,) 1 always rod, -1 always catenary, 0 as it comes; scale: tension scale, N.
+        """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
-        left: part of what catenaries leave out that results still lack (1: they are not corrected);
-        dwell: s, for which a rod must have been calm; pace: s, in which bending comes and goes (None: dwell).
+        left: part of the bending error of catenaries that remains in results (1: no correction);
+        dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell).
         """
         n = layout.rod.size
         self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
@@ -122,9 +125,9 @@ class DomainManager:
         self.moments, self.loaded = np.zeros((2, 3)), False  # N m, given at the ends
         self.twisted = all(cable.held_twist) and all(cable.held_tangent)
         self.total_twist = self.torque = 0.0  # rad; N m, that a rod from end to end would carry, where there is none
-        self.follow(layout)
+        self.set_layout(layout)
 
-    def follow(self, layout: Layout) -> None:
+    def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
         self.layout = layout
         s = layout.nodes
@@ -145,40 +148,40 @@ class DomainManager:
         self.turn, self.twisting, self.share = np.zeros((3, s.size))
         self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
         self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
-        self._see_who_comes()
+        self._update_ramping()
         self.past = self.recent = np.zeros(0)
         self.age = self.recent_age = 0.0
 
-    def take(self, new: Layout, change: Change, t: float) -> None:
+    def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
 
         What comes back soon after it was let go must be calm much longer from then on, and else half as long.
         """
         fresh, gone, urgent = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod, change.urgent
-        soon = t - self.released < SOON * self.dwell * self.patience
-        self.patience[fresh] = np.where(soon, MOST_PATIENCE, np.maximum(0.5 * self.patience, 1.0))[fresh]
+        soon = t - self.released < RETURN_WINDOW * self.dwell * self.patience
+        self.patience[fresh] = np.where(soon, LONGEST_WAIT, np.maximum(0.5 * self.patience, 1.0))[fresh]
         self.released[gone] = t
         self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
-        self.haste[fresh] = np.where(urgent[fresh], HASTE, 1.0)
+        self.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
         self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
-        self.follow(new)
+        self.set_layout(new)
 
     def checkpoint(self) -> dict[str, Any]:
-        """What it remembers beside the layout."""
-        return {name: getattr(self, name) for name in REMEMBERED}
+        """State besides the layout."""
+        return {name: getattr(self, name) for name in CHECKPOINTED}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+        """Restore a checkpoint; ValueError: it is invalid."""
         allowed, cells = self.tolerance, self.base_of_cell.size
         vars(self).update(saved)
         good = 0.0 < self.tolerance <= allowed and self.past.shape == self.recent.shape in ((0,), (cells,))
         loudest = self.calmed[0]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
-            raise ValueError("a memory that no domain manager has")
+            raise ValueError("invalid checkpoint of the domain manager")
         if not (0.0 <= self.grown.min() <= self.grown.max() <= 1.0 and min(self.age, self.recent_age) >= 0.0):
-            raise ValueError("bending that is more than all of it, or a past that is to come")
-        self._see_who_comes()
+            raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time")
+        self._update_ramping()
 
     # --- watching ------------------------------------------------------------------------------
 
@@ -191,7 +194,7 @@ class DomainManager:
             self.past = self.recent = state.T.copy()
             self.age = self.recent_age = 0.0
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
-        ahead = min(HORIZON * self.pace / self.age, MOST_AHEAD) if self.age > 0.0 else 0.0
+        ahead = min(LOOKAHEAD * self.pace / self.age, LONGEST_LOOKAHEAD) if self.age > 0.0 else 0.0
         self.torque = self._torque(line, ends, state) if self.twisted else 0.0
         self.loudest = evaluate_criteria(
             line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
@@ -224,8 +227,8 @@ class DomainManager:
         asked = self.ratios[[CLAMP, TORSION]].max(axis=0)
         self.loudest = max(self.loudest, float(np.max(asked, where=~quiet, initial=0.0)))
 
-    def remember(self, state: State) -> None:
-        """The state that was weighed is accepted: its tensions will be the past."""
+    def store_past(self, state: State) -> None:
+        """The evaluated state is accepted: store its tensions for extrapolation."""
         if self.recent_age * SAMPLES >= self.pace:
             self.past, self.age = self.recent, self.recent_age
             self.recent, self.recent_age = state.T.copy(), 0.0
@@ -260,19 +263,19 @@ class DomainManager:
                 f"the criterion gave {ratio[i]} at t = {t:.6g} s, s = {self.s[i]:.6g} m, expected a number"
             )
         cells = np.maximum(ratio[:-1], ratio[1:])
-        cells[cells == 1.0] = ASKED  # a mask of what must be rod does as well
+        cells[cells == 1.0] = FORCED_RATIO  # a mask of what must be rod does as well
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
         self.loudest = max(self.loudest, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
 
     @property
-    def catenary_beyond(self) -> np.ndarray:
-        """Cells of catenaries that must not be so any longer, by what was weighed last and since the last review."""
-        loud = ~(self.ratios <= HARD).all(axis=0) & ~self.layout.rod & (self.given >= 0)
+    def cells_to_reject(self) -> np.ndarray:
+        """Cells of catenaries above REJECT_RATIO since the last review."""
+        loud = ~(self.ratios <= REJECT_RATIO).all(axis=0) & ~self.layout.rod & (self.given >= 0)
         return np.flatnonzero(loud[self.base_of_cell])
 
-    def near_asking(self, cell: int) -> np.ndarray:
-        """Cells about one where a step failed in which more rod may be the cure: some criterion is above its `off`."""
+    def cells_near_threshold(self, cell: int) -> np.ndarray:
+        """Cells near one where a step failed and a criterion is above its `off`: more rod may help."""
         j = self.base_of_cell[cell]
         near = np.arange(max(j - 1, 0), min(j + 2, self.layout.rod.size))
         asks = ~(self.ratios[:, near] <= OFF[:, None]).all(axis=0) & ~self.layout.rod[near]
@@ -280,14 +283,14 @@ class DomainManager:
 
     # --- proposing -----------------------------------------------------------------------------
 
-    def due(self, t: float) -> bool:
+    def review_due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
         return self.loudest > 1.0 or t >= self.next_review
 
     def review(self, t: float, state: State) -> Change | None:
-        """What should change now, after the ratios since the last review; None most of the time."""
+        """The change that follows from the ratios since the last review; None: no change."""
         rod = self.layout.rod
-        self._complete()
+        self._add_global_ratios()
         rules = self.rules(state)
         next_, self.calm_since = planned(
             self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
@@ -296,7 +299,7 @@ class DomainManager:
         back, before, self.leaving = self.going, self.leaving, rod & ~next_
         self.going = bool(self.leaving.any())
         if back or self.going:
-            self._see_who_comes()  # perhaps one that was on its way out
+            self._update_ramping()  # perhaps one that was on its way out
             now = self.leaving & ~before
             self.calmed[0, now] = loudest = np.argmax(self.ratios[:, now] / OFF[:, None], axis=0)
             self.calmed[1, now] = np.take_along_axis(self.ratios[:, now], loudest[None], axis=0)[0]
@@ -307,22 +310,22 @@ class DomainManager:
         self.next_review = t + (wait - 1e-9) * self.pace
         change = None
         if (new != rod).any():
-            urgent = spread((self.ratios[SLACK] > 1.0) | self._losing(state), self.layout.base, rules.buffer)
+            urgent = spread((self.ratios[SLACK] > 1.0) | self._losing_tension(state), self.layout.base, rules.buffer)
             change = Change(new, tuple(self._reasons(rod, new)), urgent, np.zeros_like(rod))
-        self._forget()
+        self._reset_ratios()
         return change
 
-    def first(self, state: State) -> np.ndarray:
+    def initial_rods(self, state: State) -> np.ndarray:
         """Base cells that ask to be rod, whatever they are, after `evaluate_criteria`; the ratios begin anew."""
         n = self.layout.rod.size
-        self._complete()
+        self._add_global_ratios()
         rules = self.rules(state)
         asks = spread(wanted(self.ratios, np.zeros(n, bool)), self.layout.base, rules.buffer)
-        self._forget()
+        self._reset_ratios()
         return np.asarray(tidied(asks, asks, self.layout.base, rules.shortest) & (self.given >= 0))
 
-    def insist(self, cells: np.ndarray, why: str) -> Change:
-        """Rods wanted at once, whatever the criteria say: for a step that failed."""
+    def force_rods(self, cells: np.ndarray, why: str) -> Change:
+        """Rods at once, whatever the criteria: after a failed step."""
         new = self.layout.rod.copy()
         for j in np.unique(self.base_of_cell[cells]):
             new[max(j - 1, 0) : j + 2] = True
@@ -334,12 +337,12 @@ class DomainManager:
                 reasons.append(Reason(a, b, "retry", f"{why}, with all of its stiffness"))
         return Change(new, tuple(reasons), new, stiff)
 
-    def _losing(self, state: State) -> np.ndarray:
+    def _losing_tension(self, state: State) -> np.ndarray:
         """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a pace."""
         if not (self.weightless and self.age > 0.0):
             return np.zeros(self.layout.rod.size, bool)
         T = state.T + self.pace / self.age * (state.T - self.past)
-        falls = (T < LOST * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
+        falls = (T < LOST_TENSION * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
         return np.asarray(np.logical_or.reduceat(falls, self.layout.first[:-1]))
 
     def rules(self, state: State) -> Rules:
@@ -347,22 +350,22 @@ class DomainManager:
         reach(state.T, self.base_of_cell, self.EI, self.w, self.floor, BUFFER, 1e-9 * self.scale, self.buffer)
         return Rules(self.buffer, self.shortest, self.dwell)
 
-    def _complete(self) -> None:
-        """What is not of a place: the scene's wishes, and torque, which needs rods from end to end."""
-        self.ratios[GIVEN, self.given > 0] = ASKED
+    def _add_global_ratios(self) -> None:
+        """Ratios that are not local: forced rods, and torque, which needs rods from end to end."""
+        self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
         if self.twisted or self.loaded:
             self.ratios[TORSION] = self.ratios[TORSION].max()
 
-    def _forget(self) -> None:
+    def _reset_ratios(self) -> None:
         np.maximum(self.seen, self.ratios, out=self.seen)
         self.ratios[:] = 0.0
 
-    def begin(self) -> None:
-        """Forget what was weighed until now."""
+    def reset(self) -> None:
+        """Set all ratios to zero."""
         self.ratios[:] = self.seen[:] = 0.0
 
-    def told(self, s: Floats) -> Floats:
-        """The largest ratios (criteria, places) at places s, m, since this was asked last."""
+    def largest_ratios(self, s: Floats) -> Floats:
+        """The largest ratios (criteria, places) at places s, m, since the last call."""
         out = np.maximum(self.seen, self.ratios)
         self.seen[:] = 0.0
         cells = np.clip(np.searchsorted(self.layout.base, s) - 1, 0, self.layout.rod.size - 1)
@@ -400,14 +403,14 @@ class DomainManager:
                 out.append(Reason(a, b, "shrink" if beside else "merge", text, name, value, off))
         return out
 
-    # --- blending ------------------------------------------------------------------------------
+    # --- ramps -----------------------------------------------------------------------------------
 
     @property
-    def blending(self) -> bool:
+    def ramping(self) -> bool:
         return self.going or self.coming
 
-    def parts(self, dt: float = 0.0) -> Floats:
-        """How much of its stiffness every node has (N+1,), dt from now; overwritten by the next call.
+    def stiffness_shares(self, dt: float = 0.0) -> Floats:
+        """Part of its bending stiffness that each node has (N+1,), dt from now; overwritten by the next call.
 
         Over a pace: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
@@ -415,10 +418,10 @@ class DomainManager:
         shares(self.grown, self.leaving, self.haste, dt / self.pace, self.base_of_cell, self.share)
         return self.share
 
-    def blend(self, dt: float) -> None:
-        """Move on by dt."""
+    def advance_ramp(self, dt: float) -> None:
+        """Advance the ramps of stiffness by dt."""
         advance(self.grown, self.leaving, self.haste, dt / self.pace)
-        self._see_who_comes()
+        self._update_ramping()
 
-    def _see_who_comes(self) -> None:
+    def _update_ramping(self) -> None:
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())

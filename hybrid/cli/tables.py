@@ -95,8 +95,8 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     """The same for people: by cause, beside what was asked."""
     from rich.table import Table
 
-    pulls = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
-    most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in pulls), default=0.0)
+    forces = [result[name] for name in ("reaction_start", "reaction_end") if name in result]
+    most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in forces), default=0.0)
     table = Table.grid(padding=(0, 2))
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
     table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
@@ -171,11 +171,11 @@ def trade_table(table: TradeTable) -> Any:
 
 def import_notes(made: ImportedDeck) -> list[str]:
     """What could not be carried over from a deck: of the deck, then of each scene what the others do not share."""
-    parts = [note.told(made.file) for note in made.notes if note.kind != "not needed"]
+    parts = [note.text_in(made.file) for note in made.notes if note.kind != "not needed"]
     shared = set.intersection(*(set(scene.notes) for scene in made.scenes.values()))
-    parts += [note.told(made.file) for note in next(iter(made.scenes.values())).notes if note in shared]
+    parts += [note.text_in(made.file) for note in next(iter(made.scenes.values())).notes if note in shared]
     for name, scene in made.scenes.items():
-        parts += [f"{name}: {note.told(made.file)}" for note in scene.notes if note not in shared]
+        parts += [f"{name}: {note.text_in(made.file)}" for note in scene.notes if note not in shared]
     settings = [f"    {note.line}: {note.text}" for note in made.notes if note.kind == "not needed"]
     if settings:
         parts += ["not needed, MoorDyn's own settings and outputs (--json says why):", *settings]

@@ -27,13 +27,13 @@ from hybrid.store.selection import (
     Numbers,
     Part,
     Window,
-    check_place,
+    check_target,
     error_name,
     head_lines,
+    missing_parts,
     part_of,
     scene_lines,
-    shortfalls,
-    write_whole,
+    write_atomically,
 )
 from hybrid.store.xarray_dataset import image as netcdf
 
@@ -80,10 +80,10 @@ def export(
     if kind == "fatigue":
         files.append(file.with_name(file.name.removesuffix(".csv").removesuffix(".cycles") + ".histories.csv"))
     for place in files:
-        check_place(place, overwrite)  # before the work
+        check_target(place, overwrite)  # before the work
     made = _MADE[kind](part)
-    write_whole(dict(zip(files, made.files, strict=True)), overwrite)
-    return Exported(tuple(files), made.text + _span(part), (*shortfalls(part), *made.notes))
+    write_atomically(dict(zip(files, made.files, strict=True)), overwrite)
+    return Exported(tuple(files), made.text + _span(part), (*missing_parts(part), *made.notes))
 
 
 class _Made(NamedTuple):

@@ -1,7 +1,7 @@
 """Cycles of tension and curvature at the places that matter, for fatigue: histories, and rainflow counts of them.
 
 Places: both ends, the touchdown (where in its range the curvature ranges most), the place where the curvature
-ranges most of all, and those asked for.  At the ends the tension is the pull of the step log, which knows every step;
+ranges most of all, and those asked for.  At the ends the tension is the end force of the step log, known at every step;
 all else is known at the outputs.  Curvature is counted about one axis fixed in space, the one the cable bends most
 about at that place: a magnitude would fold a bend to both sides into half its range.
 
@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.selection import Part, error_name, head_lines, needed
+from hybrid.store.selection import Part, error_name, head_lines, optional_package
 
 # A sine read n times a period shows 1 - cos(pi/n) less than its range at worst: 5 % for 10.
 _SAMPLES = 10
@@ -29,12 +29,12 @@ _NOISE = 1e-6
 _SLOPE = 3
 # A bend is counted about one axis; if less than this part of its square lies about it, the head of the file warns.
 _PLANAR = 0.95
-# Histories of one interval that show less than this part of the range of a pull are said to lose some of it.
+# Histories of one interval that show less than this part of the range of an end force are said to lose some of it.
 _KEPT = 0.99
 # A touchdown so near to an end of the cable (part of its length) is that end.
 _AT_END = 0.005
 
-_UNITS = {"tension": "N", "pull": "N", "curvature": "1/m"}
+_UNITS = {"tension": "N", "end_force": "N", "curvature": "1/m"}
 
 
 class Series(NamedTuple):
@@ -65,7 +65,7 @@ def count(chosen: Part) -> Counted:
 
     ResultError when there are fewer than three outputs, or rainflow is not installed.
     """
-    needed("rainflow", "counting cycles")
+    optional_package("rainflow", "counting cycles")
     part, asked = replace(chosen, at=None), [] if chosen.at is None else chosen.at.tolist()
     if len(part.times) < 3:
         raise ResultError(
@@ -89,7 +89,7 @@ def count(chosen: Part) -> Counted:
     base, notes = _base(part, series)
     names_of = {f"{x.quantity} ({_UNITS[x.quantity]}) at s = {x.s:.9g} m": x for x in series}
     histories = [base, *(np.interp(base, x.t, x.values) for x in names_of.values())]
-    notes += [note for x in series if x.quantity == "pull" for note in _too_slow(part, x)]
+    notes += [note for x in series if x.quantity == "end_force" for note in _too_slow(part, x)]
     head = [*head_lines(part), *(f"note: {note}" for note in notes)]
     head += ["cycles: rainflow (ASTM E1049), of every value that was recorded; a count of 0.5 is half a cycle"]
     head += [f"left out: {noise} cycles below {_NOISE:g} of the largest of all places, the solver's tolerance"]
@@ -148,13 +148,13 @@ def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Series]:
-    """Pull or tension, and curvature, at one place."""
+    """End force or tension, and curvature, at one place."""
     result, times = part.result, part.times
     series = []
-    pull = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
-    if pull and f"steps/{pull}" in result and len(part.array("steps/t")) > 2:
+    end_force = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
+    if end_force and f"steps/{end_force}" in result and len(part.array("steps/t")) > 2:
         said = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
-        series.append(Series(place, s, "pull", part.array("steps/t"), part.array(f"steps/{pull}"), said))
+        series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), said))
     else:
         tension = result.at(s=s, names=["tension"])["tension"][part.rows]
         series.append(Series(place, s, "tension", times, tension, "at every output" + _error(part, "tension", s)))
@@ -200,7 +200,7 @@ def _base(part: Part, series: Sequence[Series]) -> tuple[np.ndarray, list[str]]:
     if np.ptp(gaps) > 1e-6 * every:
         every = float(gaps.min())
         notes.append(f"the outputs are {every:.4g} to {gaps.max():.4g} s apart: histories are linear between them")
-    logs = [x for x in series if x.quantity == "pull"]
+    logs = [x for x in series if x.quantity == "end_force"]
     steps = [np.median(np.diff(x.t)) for x in logs]
     interval = every / max([1, *(int(np.ceil(every / step - 1e-6)) for step in steps)])
     first, last = max(x.t[0] for x in series), min(x.t[-1] for x in series)
@@ -211,7 +211,7 @@ def _base(part: Part, series: Sequence[Series]) -> tuple[np.ndarray, list[str]]:
         kept = np.ptp(np.interp(base, x.t, x.values)) / whole if whole > _NOISE * np.abs(x.values).max() else 1.0
         if kept < _KEPT:
             notes.append(
-                f"the histories of the pull at s = {x.s:.6g} m show {100 * kept:.1f} % of its range, since steps are "
+                f"the histories of the end force at s = {x.s:.6g} m show {100 * kept:.1f} % of its range: steps are "
                 f"shorter than {interval:.4g} s at times; the cycles are counted at every step"
             )
     return base, notes
@@ -234,14 +234,14 @@ def _too_slow(part: Part, log: Series) -> list[str]:
         lost_range = 1.0 - max((c[0] for c in seen), default=0.0) / largest
         weights = [sum(c[2] * c[0] ** _SLOPE for c in found) for found in (cycles, seen)]
         notes.append(
-            f"outputs every {every:.4g} s are far apart for cycles of {period:.4g} s in the pull at s = {log.s:.6g} m: "
-            f"seen at the outputs only, its largest range would be {100 * lost_range:.2g} % smaller and the sum of "
-            f"count x range^{_SLOPE} {100 * (1 - weights[1] / weights[0]):.2g} %; elsewhere nothing else is known; "
+            f"outputs every {every:.4g} s are far apart for cycles of {period:.4g} s in the end force at "
+            f"s = {log.s:.6g} m: at the outputs alone its largest range would be {100 * lost_range:.2g} % smaller, the sum "
+            f"of count x range^{_SLOPE} {100 * (1 - weights[1] / weights[0]):.2g} %; elsewhere the loss is unknown; "
             f"try output: {{every: {period / _SAMPLES:.2g}}}"
         )
     if step * _SAMPLES > period * (1 + 1e-9):
         notes.append(
-            f"steps of {step:.4g} s are long for cycles of {period:.4g} s in the pull at s = {log.s:.6g} m; "
+            f"steps of {step:.4g} s are long for cycles of {period:.4g} s in the end force at s = {log.s:.6g} m; "
             f"try time.step: {period / _SAMPLES:.2g}"
         )
     return notes

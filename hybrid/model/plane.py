@@ -34,18 +34,18 @@ def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: 
     found, findings = plane_of(scene.environment, scene.cable, scene.ends, scene.initial, tolerance)
     if findings:
         where = ".".join(str(x) for x in findings[0].at)
-        return None, Entry(WHAT, False, f"{where} leaves {found.said()}")
+        return None, Entry(WHAT, False, f"{where} leaves {found.text()}")
     plane = np.array([found.p, found.q, found.normal])
     if not _lies_in(plane, start, ends, tolerance):
         if asked:
             fix = "give `initial` a shape or a direction in the plane, or write `dimension: 3`"
-            expected = f"a first shape in {found.said()}, which the rest of the scene lies in"
+            expected = f"a first shape in {found.text()}, which the rest of the scene lies in"
             raise SceneError([Complaint("initial", "one that leaves the plane", expected, fix)])
-        return None, Entry(WHAT, False, f"the first shape leaves {found.said()}")
+        return None, Entry(WHAT, False, f"the first shape leaves {found.text()}")
     if asked:
         others[:] = [(name, x) for name, x in others if _lies_in(plane, x, ends, tolerance)]
-        return plane, Entry(WHAT, True, f"dimension: 2; {found.said()}")
-    why = f"all of the scene lies in {found.said()}; dimension: 3 switches it off"
+        return plane, Entry(WHAT, True, f"dimension: 2; {found.text()}")
+    why = f"all of the scene lies in {found.text()}; dimension: 3 switches it off"
     return plane, Entry(WHAT, True, why)
 
 

@@ -70,7 +70,7 @@ class Accuracy(Table):
     )
     tension: Amount | None = Field(
         default=None,
-        description="of the pull at both ends at every output: a part of the largest, or N, kN",
+        description="of the force at both ends at every output: a part of the largest, or N, kN",
     )
 
     curvature: Amount | None = Field(

@@ -295,19 +295,21 @@ class Kinds:
     implied: tuple[tuple[str, str], ...] = ()
 
     def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
-        said = {tag: _of_kind(table) for table, tag in _tagged(source)}
-        return core_schema.no_info_before_validator_function(partial(self.check, said=said), handler(source))
+        descriptions = {tag: _of_kind(table) for table, tag in _tagged(source)}
+        return core_schema.no_info_before_validator_function(
+            partial(self.check, descriptions=descriptions), handler(source)
+        )
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         tables = handler(schema)
-        said = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
-        alone = [table["properties"]["kind"]["const"] for table in said if not table.get("required")]
+        descriptions = [handler.resolve_ref_schema(arm) for arm in tables.get("oneOf") or tables.get("anyOf") or []]
+        alone = [table["properties"]["kind"]["const"] for table in descriptions if not table.get("required")]
         if not alone:  # every kind needs more than its name
             return tables
         return {"anyOf": [tables, {"enum": alone, "description": "short for {kind: ...}"}]}
 
-    def check(self, value: Any, said: Mapping[str, str]) -> Any:
-        """`said`: of each kind what the schema says."""
+    def check(self, value: Any, descriptions: Mapping[str, str]) -> Any:
+        """`descriptions`: of each kind, from the schema."""
         if isinstance(value, Table):
             if getattr(value, "kind", None) not in self.names:
                 self._refuse_table(f"a {type(value).__name__}")
@@ -325,7 +327,7 @@ class Kinds:
             fix = "write kind, not type" if "type" in value else f"add `kind: {self.usual[0]}`, or another of these"
             refuse([Finding(("kind",), expected, fix)])
         elif kind not in self.names:
-            refuse([Finding(("kind",), expected, nearest(str(kind), said) or "write one of these")])
+            refuse([Finding(("kind",), expected, nearest(str(kind), descriptions) or "write one of these")])
         return value
 
     def _refuse_table(self, given: str | None) -> NoReturn:

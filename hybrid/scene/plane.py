@@ -48,7 +48,7 @@ class Plane:
     def normal(self) -> Triple:
         return _cross(self.p, self.q)
 
-    def said(self) -> str:
+    def text(self) -> str:
         """What it is, for people."""
         if self.q == UP:
             return f"the vertical plane at {math.degrees(math.atan2(self.p[1], self.p[0])) + 0.0:.6g} deg from x"
@@ -115,7 +115,7 @@ def _leaves(
         out = abs(v[0] * n[0] + v[1] * n[1] + v[2] * n[2]) if w.kind != "normal" else math.hypot(*_cross(v, n))
         if out > tolerance * size:
             what = "a vector in" if w.kind == "along" else "a place in" if w.kind == "place" else "a vector normal to"
-            expected = f"{what} {plane.said()}, which the rest of the scene lies in, because dimension is 2"
+            expected = f"{what} {plane.text()}, which the rest of the scene lies in, because dimension is 2"
             yield Finding(w.at, expected, "write `dimension: 3`, or leave dimension out", _given(w.vector))
 
 

@@ -69,7 +69,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
     looked for in the folder of the scene file, and the scene keeps its absolute path.
     SceneError with every complaint if the scene is refused.
     """
-    return _told(*read_scene(path, overrides))
+    return _warn_renamed(*read_scene(path, overrides))
 
 
 def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
@@ -103,7 +103,7 @@ def _text_of(path: str | Path) -> str:
 
 def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
     """Read a scene from YAML text; `file` is its name in complaints and the folder of motion files."""
-    return _told(*_parsed(text, file, overrides))
+    return _warn_renamed(*_parsed(text, file, overrides))
 
 
 @contextmanager
@@ -152,7 +152,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
 
 def validate_scene(data: Any) -> Scene:
     """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
-    return _told(*_validated(data, from_data(data), [], ""))
+    return _warn_renamed(*_validated(data, from_data(data), [], ""))
 
 
 def scene_text(scene: Scene) -> str:
@@ -180,7 +180,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
             here["file"] = str((folder / name).absolute())
 
 
-def _told(scene: Scene, renamed: list[RenamedKey]) -> Scene:
+def _warn_renamed(scene: Scene, renamed: list[RenamedKey]) -> Scene:
     for each in renamed:
         warnings.warn(each, stacklevel=3)
     return scene

@@ -99,7 +99,7 @@ class Diagnostics:
         self._rested = self._left_out = False
         self._placed: Floats | None = None  # m, of base nodes at the start
         self._jump = SNAP * model.tension_scale  # N
-        self._pulls = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
+        self._tension_range = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
         self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
         self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
@@ -114,7 +114,8 @@ class Diagnostics:
         """What has been noted so far, and what `finish` will judge by."""
         worst = np.array(self._left).reshape(-1, 4)
         return {name: getattr(self, name) for name in REMEMBERED} | {
-            "pulls": list(self._pulls), "worst": worst, "placed": self._placed if self._placed is not None else NOWHERE,
+            "pulls": list(self._tension_range), "worst": worst,
+            "placed": self._placed if self._placed is not None else NOWHERE,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -125,7 +126,7 @@ class Diagnostics:
         if placed.shape not in (NOWHERE.shape, (places.size, 3)) or worst.shape[1:] != (4,) or len(worst) > SEVERAL:
             raise ValueError("places of another line")
         self._placed = placed if placed.size else None
-        self._pulls, self._left = tuple(saved["pulls"]), [tuple(x) for x in worst.tolist()]
+        self._tension_range, self._left = tuple(saved["pulls"]), [tuple(x) for x in worst.tolist()]
 
     def follow(self, model: Model) -> None:
         """Watch the same line with other zones."""
@@ -211,8 +212,8 @@ class Diagnostics:
         if self._placed is None:
             self._placed = before.r[first].copy()
         self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
-        pull = float(state.T.max())
-        jump = pull - float(before.T.max())
+        largest = float(state.T.max())
+        jump = largest - float(before.T.max())
         if jump > self._jump and self._model.inextensible:
             cell = int(np.argmax(state.T))
             text = (
@@ -221,7 +222,7 @@ class Diagnostics:
             )
             self.note(t, cell, "snap", text)
             self._jump = 3.0 * jump
-        self._pulls = min(self._pulls[0], pull), max(self._pulls[1], pull)
+        self._tension_range = min(self._tension_range[0], largest), max(self._tension_range[1], largest)
         change = np.abs(state.a - before.a)
         self._rho = rho
         self._steps += 1
@@ -237,7 +238,7 @@ class Diagnostics:
         Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
-        low, high = self._pulls
+        low, high = self._tension_range
         hardly = self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
         if hardly or not self._left or not self._moved > 0.0:
             return

@@ -91,8 +91,8 @@ def _compile_zones(scene: Scene, model: Model) -> None:
 
     manager = manager_for(scene, model, first_resolution(scene), None)
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)
-    manager.first(model.start)
-    manager.remember(model.start)
+    manager.initial_rods(model.start)
+    manager.store_past(model.start)
     manager.review(0.0, model.start)
 
 

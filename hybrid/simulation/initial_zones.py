@@ -77,12 +77,12 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     allowed = manager.tolerance
     try:
         for part in STRICTER:
-            manager.follow(model.layout)
+            manager.set_layout(model.layout)
             manager.tolerance = part * allowed
             answer = _zones_within(model, found, manager, t)
             if answer is None:
                 break
-            if _apart(equilibrium.state, most.layout, answer, t) <= allowed:
+            if _difference(equilibrium.state, most.layout, answer, t) <= allowed:
                 return answer
         else:
             manager.held = True
@@ -90,7 +90,7 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
         manager.held = True
     if manager.held:
         manager.tolerance = allowed
-    manager.follow(most.layout)
+    manager.set_layout(most.layout)
     return most, equilibrium
 
 
@@ -101,7 +101,7 @@ def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
     if free.all():
         return model
     new = on_layout(model, model.layout._replace(rod=free))
-    manager.follow(model.layout._replace(rod=free))
+    manager.set_layout(model.layout._replace(rod=free))
     return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
 
 
@@ -112,23 +112,23 @@ def _zones_within(
     assert model.layout is not None
     full = found.state
     manager.evaluate_criteria(model.line, model.sea.at(t), model.ends.at(t), full, 0.0)
-    rod = manager.first(full)
+    rod = manager.initial_rods(full)
     for _ in range(MOST_ROUNDS):
         if rod[manager.given >= 0].all():
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
         answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.with_friction)
-        manager.follow(layout)
+        manager.set_layout(layout)
         manager.evaluate_criteria(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
-        more = rod | manager.first(answer.state)
+        more = rod | manager.initial_rods(answer.state)
         if (more == rod).all():
             return new, answer
         rod = more
     return None
 
 
-def _apart(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
+def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], t: float) -> float:
     """Largest distance, m, of base nodes between the equilibrium of a rod and another, corrected if its results are."""
     model, found = answer
     assert model.layout is not None

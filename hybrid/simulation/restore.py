@@ -157,6 +157,6 @@ def restored_parts(
         manager = manager_for(scene, start, resolution, criterion)
         manager.moments = model.ends.moments
         manager.loaded = bool(manager.moments.any())
-        manager.follow(model.layout)
+        manager.set_layout(model.layout)
         switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
     return model, switching, Correction(model, switching) if model.follows_error else None

@@ -129,7 +129,7 @@ class TimeLoop:
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
         ends, work = model.ends.at(run.t), np.array(run.work)
-        ratios = switching.manager.told if switching is not None else None
+        ratios = switching.manager.largest_ratios if switching is not None else None
         shift = run.correction.shift(run.state) if run.correction is not None else None
         values = self.observer.values(ends, run.state, run.stepper.work.report, work, ratios, shift)
         self.recorder.save(run.t, values, self.observer.zone_rows)

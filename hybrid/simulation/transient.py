@@ -168,7 +168,7 @@ class Transient:
             return
         while self.t < stop:
             manager = self.switching.manager if self.switching is not None else None
-            blending = manager is not None and manager.blending
+            blending = manager is not None and manager.ramping
             self.control.most = LONGEST_IN_PACE * manager.pace if manager is not None and blending else np.inf
             yield self.control.until(self.t, stop)
 

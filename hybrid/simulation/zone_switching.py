@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.manager import HARD, Change, DomainManager
+from hybrid.adapt.manager import REJECT_RATIO, Change, DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.adapt.state_transfer import Clamp, Remapped, remap
 from hybrid.errors import Outcome
@@ -109,7 +109,7 @@ class ZoneSwitching:
 
     def begin(self, ends: Ends, state: State) -> None:
         """Weigh the criteria of the first state."""
-        self.manager.begin()
+        self.manager.reset()
         self.evaluate_criteria(0.0, 0.0, ends, state)
 
     def prepare_step(self, end: float, dt: float, state: State) -> None:
@@ -120,15 +120,15 @@ class ZoneSwitching:
             self.letting_go = length_defect(
                 x.lack, x.rate, x.since, x.keeps, end, LETTING_GO * self.manager.pace, self.true, line.h
             )
-        if self.manager.blending:
-            soften(self.manager.parts(dt), self.stiff, line.kb)
+        if self.manager.ramping:
+            soften(self.manager.stiffness_shares(dt), self.stiff, line.kb)
         if self.joints is not None:
-            self.joints.load(line, state, self.manager.EI, self.manager.parts(dt), dt / self.manager.pace)
+            self.joints.load(line, state, self.manager.EI, self.manager.stiffness_shares(dt), dt / self.manager.pace)
 
     def evaluate_criteria(self, t: float, dt: float, ends: Ends, state: State) -> np.ndarray:
         """Weigh the criteria after a step of dt to t; catenary cells that are beyond their hard bound."""
         loudest = self.manager.evaluate_criteria(self.model.line, self.model.sea.values, ends, state, dt, t)
-        return self.manager.catenary_beyond if loudest > HARD else NONE
+        return self.manager.cells_to_reject if loudest > REJECT_RATIO else NONE
 
     def rescue(self, taken: Taken, end: float, dt: float, tried: State, rescues: int) -> Change | None:
         """More rod for a step of dt to `end` that failed or took a catenary too far; None: as it is.
@@ -143,7 +143,7 @@ class ZoneSwitching:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))
             why = "a step would have left it a catenary without tension; the step is repeated"
         else:
-            cells = self.manager.near_asking(min(max(taken.where, 0), self.model.cells - 1))
+            cells = self.manager.cells_near_threshold(min(max(taken.where, 0), self.model.cells - 1))
             why = f"a step failed here ({taken.outcome.cause}); it is repeated"
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
@@ -155,7 +155,7 @@ class ZoneSwitching:
 
     def _force_rod(self, cells: np.ndarray, why: str) -> Change | None:
         """Cells to be rod, with all of their stiffness; None: they are."""
-        change = self.manager.insist(cells, why)
+        change = self.manager.force_rods(cells, why)
         return None if (change.rod == self.manager.layout.rod).all() and not change.stiff.any() else change
 
     def book_step(self, t: float, dt: float, ends: Ends, before: State, state: State) -> tuple[float, Change | None]:
@@ -167,19 +167,19 @@ class ZoneSwitching:
             self.lengths[:] = line.h
             if not self.letting_go:
                 self.relaxing = None
-        if manager.blending:
+        if manager.ramping:
             if self.strain.shape != line.kb.shape:
                 self.strain = _strain(line, ends, before)
             now = _strain(line, ends, state)
-            booked += freed(line.kb, manager.parts(), self.stiff, self.strain, now)
+            booked += freed(line.kb, manager.stiffness_shares(), self.stiff, self.strain, now)
             self.strain = now
-            manager.blend(dt)
+            manager.advance_ramp(dt)
         else:
             self.strain = NO_STRAIN
         if self.joints is not None:
             booked += self.joints.unload(line, state.r - before.r)
-        manager.remember(state)
-        return booked, manager.review(t, state) if manager.due(t) else None
+        manager.store_past(state)
+        return booked, manager.review(t, state) if manager.review_due(t) else None
 
     def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
         """The model and the state with other zones, and the energy (J) that the switch puts in."""
@@ -188,7 +188,7 @@ class ZoneSwitching:
         line = model.line
         if self.joints is not None:
             self.joints.unload(line, np.zeros_like(state.r))
-        soften(manager.parts(), self.stiff, line.kb)  # a step that was refused has left others
+        soften(manager.stiffness_shares(), self.stiff, line.kb)  # a step that was refused has left others
         line.h[:] = self.lengths
         was = _energy(line, sea, ends, state)
         changed = on_layout(model, new)
@@ -196,9 +196,9 @@ class ZoneSwitching:
         carried = self._carried(old, new, line, target, ends, state)
         if target.bits & PLANAR:
             untwist(target, ends, model.cable.held_tangent, carried.state)
-        manager.take(new, change, t)
+        manager.adopt_layout(new, change, t)
         self.stiff, self.true = target.kb.copy(), target.h.copy()
-        soften(manager.parts(), self.stiff, target.kb)
+        soften(manager.stiffness_shares(), self.stiff, target.kb)
         target.h[:] = carried.lengths
         self.lengths = carried.lengths.copy()
         # new cells go on with the length, and the change of length, that their ends and tension imply, but for what

@@ -156,17 +156,17 @@ def facts(part: Part) -> dict[str, Any]:
     result = part.result
     own = {k: v for k, v in result.attributes.items() if k not in ("format", "format_version")}
     made = {"format": MARK, "exported_from": result.file.name if result.file else "a result in memory"}
-    said = {"noted": ", ".join(noted(part)), "left_out": "; ".join(shortfalls(part))}
+    said = {"noted": ", ".join(noted_events(part)), "left_out": "; ".join(missing_parts(part))}
     return made | own | {"exported_by": f"hybrid-cable {_version()}"} | said
 
 
-def noted(part: Part) -> list[str]:
+def noted_events(part: Part) -> list[str]:
     """Kinds of events of the run that call its answer into question, the worst first."""
     kinds = {event.kind for event in part.result.events}
     return [kind for kind in EVENTS_BY_WEIGHT if kind in kinds]
 
 
-def shortfalls(part: Part) -> list[str]:
+def missing_parts(part: Part) -> list[str]:
     """What a reader of the file must know: the run is not complete, or only some of it is there."""
     said, t, whole = [], part.times, part.result["t"]
     if part.result.status != "complete":
@@ -180,8 +180,8 @@ def head_lines(part: Part) -> list[str]:
     """The beginning of a text file, without the marks of a comment: title, origin, status."""
     result, own = part.result, facts(part)
     lines = [f"title: {result.title}", f"result: {own['exported_from']}, {result.status_text}"]
-    lines += [f"note: {text}" for text in shortfalls(part)]
-    lines += [f"the run noted: {', '.join(noted(part))}; see its events"] if noted(part) else []
+    lines += [f"note: {text}" for text in missing_parts(part)]
+    lines += [f"the run noted: {', '.join(noted_events(part))}; see its events"] if noted_events(part) else []
     lines.append("computed by: " + ", ".join(f"{k} {v}" for k, v in result.versions.items()))
     lines.append(f"computed: {own['created']}; exported by: {own['exported_by']}")
     return lines
@@ -199,7 +199,7 @@ def error_name(part: Part, name: str) -> tuple[str, str]:
     return "", ""
 
 
-def needed(package: str, what: str) -> Any:
+def optional_package(package: str, what: str) -> Any:
     """A package that only an export needs; ResultError with the command that installs it when it is not there."""
     try:
         return import_module(package)
@@ -220,14 +220,14 @@ def _version() -> str:
 # ---- whole or not at all --------------------------------------------------------------------------
 
 
-def write_whole(files: Mapping[Path, bytes | memoryview], overwrite: bool) -> None:
+def write_atomically(files: Mapping[Path, bytes | memoryview], overwrite: bool) -> None:
     """Write all files or none, each beside its place first.  ResultError when that cannot be done.
 
     The files are made in memory: where a disk is full, HDF5 cannot close what it writes, and takes the interpreter
     down with it.
     """
     for path in files:
-        check_place(path, overwrite)
+        check_target(path, overwrite)
     new = {path: path.with_name(f".{path.name}.{os.getpid()}.new") for path in files}
     try:
         for path, content in files.items():
@@ -244,7 +244,7 @@ def write_whole(files: Mapping[Path, bytes | memoryview], overwrite: bool) -> No
                 path.unlink(missing_ok=True)
 
 
-def check_place(path: Path, overwrite: bool) -> None:
+def check_target(path: Path, overwrite: bool) -> None:
     """ResultError if nothing can or may be written there."""
     why, advice = "", "another name, or delete the file yourself"
     if path.is_dir():

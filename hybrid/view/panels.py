@@ -299,7 +299,7 @@ def end_forces(result: Result) -> Panel | None:
     items += [Line(t, y * factor, f"at the {end}", _ENDS[end]) for end, (t, y) in found.items()]
     y = Axis("force", unit, peak=peak * factor)
     caption = "Force that holds or loads each end, at every step."
-    return Panel("pulls", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
+    return Panel("end-forces", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
 
 
 def touchdown(result: Result) -> Panel:

@@ -144,11 +144,11 @@ def _tension(result: Result) -> Fact:
     values: dict[str, Any] = {"tension": most}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
-            pull = result[f"steps/end_force_{end}"]
-            n = int(pull.argmax())
-            values[f"end_force_{end}"], when = float(pull[n]), float(result["steps/t"][n])
-            if pull[n] > most * (1.0 + 1e-3):
-                text += f" Between outputs the force at the {end} reaches {amount(pull[n], 'N')}, at t = {when:.5g} s."
+            force = result[f"steps/end_force_{end}"]
+            n = int(force.argmax())
+            values[f"end_force_{end}"], when = float(force[n]), float(result["steps/t"][n])
+            if force[n] > most * (1.0 + 1e-3):
+                text += f" Between outputs the force at the {end} reaches {amount(force[n], 'N')}, at t = {when:.5g} s."
     return Fact("tension", "Largest tension", text, values=values, t=t, s=s)
 
 

@@ -303,12 +303,12 @@ def _events(events: Sequence[Event]) -> list[Item]:
             gaps = np.full(len(at), np.nan)
             x, y = (np.column_stack([at[:, k], gaps]).ravel() for k in ([0, 0], [1, 2]))
             items.append(Line(x, y, width=0.5))
-        texts = [_told(event) for event in found]
+        texts = [_event_lines(event) for event in found]
         items.append(Marks(at[:, 0], at[:, 1:].mean(axis=1), symbol, name, face, edge, 0.5, size, texts))
     return items
 
 
-def _told(event: Event) -> list[str]:
+def _event_lines(event: Event) -> list[str]:
     """What an event says of itself, line by line."""
     where = f"s = {event.s_a:.4g} m" if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m"
     energy = [] if event.energy is None else [f"energy put in: {event.energy:.3g} J"]

@@ -24,7 +24,7 @@ from adapt_scenes import (
 from problems import Scene, clamped, pinned, scene
 
 import hybrid
-from hybrid.adapt.manager import HARD, DomainManager
+from hybrid.adapt.manager import REJECT_RATIO, DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.kernels.criteria import BEND, CRITERIA
 from hybrid.kernels.state import no_sea
@@ -214,16 +214,16 @@ def test_a_rod_that_comes_back_is_blended_in_again():
         for _ in range(round(seconds / 0.05)):
             t += 0.05
             manager.ratios[BEND] = ratio
-            if manager.blending:
-                manager.blend(0.05)
-            if manager.due(t):
+            if manager.ramping:
+                manager.advance_ramp(0.05)
+            if manager.review_due(t):
                 manager.review(t, state)
 
     pass_by(1.6, still)
-    assert manager.leaving.all() and 0.0 < manager.grown.max() < 0.9 and manager.parts().max() < 0.9
+    assert manager.leaving.all() and 0.0 < manager.grown.max() < 0.9 and manager.stiffness_shares().max() < 0.9
     pass_by(2.0, 0.9)
-    assert not manager.leaving.any() and (manager.grown == 1.0).all() and (manager.parts() == 1.0).all()
-    assert not manager.blending
+    assert not manager.leaving.any() and (manager.grown == 1.0).all() and (manager.stiffness_shares() == 1.0).all()
+    assert not manager.ramping
 
 
 def test_far_beyond_is_no_tension_that_is_only_foreseen():
@@ -233,9 +233,9 @@ def test_far_beyond_is_no_tension_that_is_only_foreseen():
     line, sea = on(what, zones), no_sea(10)
     for T, dt in ((400.0, 0.0), (100.0, 0.05)):
         loudest = manager.evaluate_criteria(line, sea, held(), state_on(line, lambda s: np.outer(s, X), T), dt)
-    assert 1.0 < loudest < HARD and not manager.catenary_beyond.size
+    assert 1.0 < loudest < REJECT_RATIO and not manager.cells_to_reject.size
     loudest = manager.evaluate_criteria(line, sea, held(), state_on(line, lambda s: np.outer(s, X), -1.0), 0.05)
-    assert loudest > HARD and manager.catenary_beyond.size == 10
+    assert loudest > REJECT_RATIO and manager.cells_to_reject.size == 10
 
 
 # --- the default ---------------------------------------------------------------------------------------------

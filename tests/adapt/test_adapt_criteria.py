@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygon, state_on, still, untwisted, weighed
 
-from hybrid.adapt.manager import HARD, HORIZON, MOST_AHEAD, DomainManager
+from hybrid.adapt.manager import LONGEST_LOOKAHEAD, LOOKAHEAD, REJECT_RATIO, DomainManager
 from hybrid.adapt.zone_rules import wanted
 from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
 from hybrid.kernels.forces import SEABED
@@ -136,7 +136,7 @@ def test_falling_tension_is_seen_ahead(dt, steps):
     before, now = (state_on(line, along(), T) for T in (40.0, 36.0))
     now.T[7:] = 41.0  # this part rises: no better than it is
     ratio = weighed(cable(), zones, now, before=before, dt=dt, dwell=dwell)[SLACK]
-    a = min(HORIZON * dwell / dt, MOST_AHEAD)
+    a = min(LOOKAHEAD * dwell / dt, LONGEST_LOOKAHEAD)
     assert steps is None or a == steps
     assert ratio[:6] == pytest.approx(FLOORED / (36.0 - 4.0 * a), rel=ROUND)
     assert ratio[8:] == pytest.approx(FLOORED / 41.0, rel=ROUND)
@@ -148,7 +148,7 @@ def test_tension_that_will_be_gone_asks_now():
     before, now = (state_on(line, along(), T) for T in (60.0, 10.0))
     ratio = weighed(cable(), zones, now, before=before, dt=0.2, dwell=0.5)[SLACK]
     assert (ratio == FORESEEN).all()  # 10 - 0.3125 x 50 < 0: asks for rod, and takes no step back
-    assert 1.0 < FORESEEN < HARD
+    assert 1.0 < FORESEEN < REJECT_RATIO
 
 
 def clamp(angle, end=0):

@@ -46,7 +46,7 @@ from adapt_scenes import (
 from problems import Scene
 
 import hybrid
-from hybrid.adapt.manager import BUFFER, HORIZON
+from hybrid.adapt.manager import BUFFER, LOOKAHEAD
 from hybrid.adapt.zone_rules import spread
 
 Floats = np.ndarray
@@ -105,7 +105,7 @@ def test_on(name):
     if name == "slack":  # what is weighed is the tension ahead: to the digits in a catenary
         T = tensions(result)[:k].min(axis=1)
         T = np.append(T, 2 * T[-1] - T[-2])  # at the step of the switch, where outputs show the new cells
-        weighed = FLOORED / (T[1:] + HORIZON * DWELL / DT * np.minimum(np.diff(T), 0.0))
+        weighed = FLOORED / (T[1:] + LOOKAHEAD * DWELL / DT * np.minimum(np.diff(T), 0.0))
         assert (weighed[:-1] <= 1.0 + 1e-6).all() and weighed[-1] > 0.9
     assert at.max() > 0.9 or name == "slack"
     assert all_[name][k - 1].max() == loud[k - 1].max()  # no other was nearer

@@ -55,7 +55,7 @@ def made(
             *([("touchdown", "m", ("edge",), "")] if bed else []),
         )
     ]
-    log = [Field("t", "s", "end of the step"), Field("dt", "s", "length"), Field("end_force_end", "N", "the pull")]
+    log = [Field("t", "s", "end of the step"), Field("dt", "s", "length"), Field("end_force_end", "N", "the end_force")]
     memory = io.BytesIO()
     fixed = [(Field("history", "m", "arc lengths to follow", (1,), ("history",)), np.array([2.5]))]
     if bed:
@@ -317,8 +317,8 @@ def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: 
     assert [file.name for file in made.files] == ["run.cycles.csv", "run.histories.csv"] and made.notes == ()
     cycles, histories = (table_of(file) for file in made.files)
     at_end = cycles[(cycles["s (m)"] == LENGTH)]
-    pull = at_end[at_end["quantity"] == "pull"]
-    full = pull[pull["range"] > 0.99 * 2 * PULL]
+    end_force = at_end[at_end["quantity"] == "end_force"]
+    full = end_force[end_force["range"] > 0.99 * 2 * PULL]
     # a sine has as many cycles as periods: seven between eight maxima, and halves that add up to one more at most
     assert 7.0 <= full["count"].sum() <= 8.0 and (full["unit"] == "N").all()
     # steps of 0.02 s meet a maximum and a minimum of a period of 1 s to within 0.01 s
@@ -331,7 +331,7 @@ def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: 
     assert set(cycles["place"]) == {"start", "end and largest range of curvature"}
     base = histories["t (s)"].to_numpy()
     assert np.diff(base) == pytest.approx(0.02, rel=1e-9), "the outputs are every 0.1 s, the steps every 0.02 s"
-    np.testing.assert_allclose(histories["pull (N) at s = 10 m"], 100 + PULL * np.sin(2 * np.pi * base), atol=1e-9)
+    np.testing.assert_allclose(histories["end_force (N) at s = 10 m"], 100 + PULL * np.sin(2 * np.pi * base), atol=1e-9)
     for file in made.files:
         head = file.read_text(encoding="utf-8")
         assert "# not done: stress" in head and "#   title: Schwingt, 5 µm" in head
@@ -340,7 +340,7 @@ def test_cycles_of_a_pull_and_of_a_bend_to_both_sides(result: Result, tmp_path: 
 
 
 def test_counts_are_those_of_a_series_counted_by_hand(tmp_path: Path) -> None:
-    """The series of the example in ASTM E1049, section 5.4.4, as the pull: ranges and counts as published there."""
+    """The series of the example in ASTM E1049, section 5.4.4, as the end force: ranges and counts as published there."""
     pytest.importorskip("rainflow", reason="the extra `export` is not installed")
     from hybrid.exports.fatigue import _cycles
 
@@ -382,7 +382,7 @@ def test_outputs_too_far_apart_are_said_and_how_much_they_lose(tmp_path: Path) -
     fine = export(made(tmp_path / "fine.h5", every=0.1), format="fatigue")
     assert fine.notes == ()
     (note,) = export(made(tmp_path / "coarse.h5", every=0.4), format="fatigue").notes
-    assert note.startswith("outputs every 0.4 s are far apart for cycles of 1 s in the pull at s = 10 m")
+    assert note.startswith("outputs every 0.4 s are far apart for cycles of 1 s in the end force at s = 10 m")
     assert note.endswith("try output: {every: 0.1}")
     # five samples of a sine in two periods: the extremes among them are at 0.1 and 0.3 of a period from a zero
     seen, there = (np.ptp(np.sin(2 * np.pi * np.arange(0, 2, every))) for every in (0.4, 0.02))

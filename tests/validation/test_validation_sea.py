@@ -140,7 +140,7 @@ def test_point_load(name, report):
         error.append((np.abs(result.position[-1] - position).max(), np.abs(ends).max()))
     p = [order(e) for e in np.array(error).T]
     report(
-        f"A {name} on a span, 100 cells: shape, pull at the ends", "two elastic catenaries",
+        f"A {name} on a span, 100 cells: shape, end forces", "two elastic catenaries",
         f"{error[1][0]:.1e} m, {error[1][1]:.1e}, order {p[0][1]:.2f}, {p[1][1]:.2f}", "discretisation: 3e-3 m, 1e-4, order 2.0 +- 0.1",
     )  # fmt: skip
     assert error[1][0] <= 3e-3
@@ -188,7 +188,7 @@ def test_s_tether(current, report):
     p = [order(e) for e in np.array(error).T]
     out = np.abs(exact[0][:, 1]).max()
     report(
-        f"S-tether of two sections in {current}{' with a float' if with_float else ''}, 130 cells: shape, pull at the ends",
+        f"S-tether of two sections in {current}{' with a float' if with_float else ''}, 130 cells: shape, end forces",
         "shooting (scipy, DOP853)",
         f"{error[1][0]:.1e} m ({out:.1f} m out of plane), {error[1][1]:.1e}, order {p[0][1]:.2f}, {p[1][1]:.2f}",
         "discretisation: 1.5e-2 m, 1e-4, order 2.0 +- 0.1",
@@ -208,7 +208,7 @@ def test_body_in_a_current(report):
         error.append(np.abs(result.position[-1] - position)[nodes].max())
     p = order(error)
     report(
-        "Body on a cable in a current, 100 cells: shape; pull at the top", "elastic catenary",
+        "Body on a cable in a current, 100 cells: shape; end force at the top", "elastic catenary",
         f"{error[1]:.1e} m, order {p[0]:.2f}, {p[1]:.2f}; {abs(pull):.1e}", "discretisation: 1e-3 m, order 2.0 +- 0.1; round-off: 1e-9",
     )  # fmt: skip
     assert error[1] <= 1e-3
@@ -388,7 +388,7 @@ def test_dragged_over_the_bed(model, sideways, report):
             way = 0.1 * np.diff(result.t[late][[0, -1]])[0]
             works = max(works, abs(np.diff(result.work["friction"][late][[0, -1]])[0] / (-exact * way) - 1))
     report(
-        f"A {model} dragged {'sideways' if sideways else 'along'}, 5 to 200 cells, two starts: pull, work of friction",
+        f"A {model} dragged {'sideways' if sideways else 'along'}, 5 to 200 cells, two starts: end force, work of friction",
         "mu w L",
         f"{worst:.1e}, {works:.1e}",
         "1 %; " + ("it bows: 2e-3" if sideways else "round-off: 1e-6"),

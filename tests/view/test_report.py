@@ -81,7 +81,7 @@ def test_every_kind_of_result_has_a_report(case: str) -> None:
     assert (index["scene"] is None) == (n == 0)
     keys = set(re.findall(r'id="plot-([\w-]+)"', page))
     assert ("range-tension" in keys) == (n > 0)
-    assert ("zones" in keys) == ("pulls" in keys or case == "bare") == (n > 1)
+    assert ("zones" in keys) == ("end-forces" in keys or case == "bare") == (n > 1)
     assert ("energy" in keys) == (n > 1 and "bare" not in case)
     assert ('id="play"' in page) == (n > 1)
     if result.status != "complete":

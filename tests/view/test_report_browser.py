@@ -116,19 +116,19 @@ def test_it_opens_complete_and_without_complaint(visit: Visit) -> None:
 
 @pytest.mark.slow
 def test_its_pictures_are_not_blank(visit: Visit) -> None:
-    for name in ("cable", "zones", "pulls", "range-tension", "energy"):
+    for name in ("cable", "zones", "end-forces", "range-tension", "energy"):
         assert visit.pixels("#cable-plot" if name == "cable" else f"#plot-{name}").std() > 5.0, name
 
 
 def test_the_slider_moves_the_cable_and_the_cursors(visit: Visit) -> None:
     first = visit.cable()
-    visit.shown("#plot-pulls")
+    visit.shown("#plot-end-forces")
     visit.page.eval_on_selector("#time", "x => { x.value = '25'; x.dispatchEvent(new Event('input')); }")
     moved = visit.cable()
     s = np.linspace(0.0, 100.0, 41)
     assert moved[2] - first[2] == pytest.approx(2.0 * s / 100.0, abs=1e-4)  # the sine is 1 at t = 2.5 s
     assert visit.page.inner_text("#now") == "t = 2.50 s"
-    cursor = visit.page.evaluate("document.getElementById('plot-pulls').layout.shapes[0].x0")
+    cursor = visit.page.evaluate("document.getElementById('plot-end-forces').layout.shapes[0].x0")
     assert cursor == pytest.approx(2.5)
     visit.shown("#plot-range-tension")
     now = "document.getElementById('plot-range-tension').data.find(t => t.name === 'now').y[40]"

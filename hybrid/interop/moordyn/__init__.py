@@ -131,7 +131,7 @@ def _no_place(source: Source, deck: Deck) -> list[Note]:
     why = "D of an exponent is taken as Fortran does, 1.0D+8 as 1e8; MoorDyn-C stops reading at the D, and takes 1"
     notes += [note(TAKEN, row, why, "write e, as in 1.0e8") for row in source.fortran]
     outputs = [row for row in source.rows("outputs") if row.cells[0].upper() != "END"]
-    why = "output channels; hybrid keeps the whole cable, and the pull at both ends at every step (steps/end_force_end)"
+    why = "output channels; hybrid stores the whole cable, and both end forces at every step (steps/end_force_end)"
     notes += [note(NOT_NEEDED, row, why) for row in outputs]
     used = {(kind, id) for line in deck.lines.values() for kind, id, _ in line.ends}
     carried = {p.on for id, p in deck.points.items() if p.kind == "body" and ("point", id) in used}

@@ -27,7 +27,7 @@ class Note:
     why: str
     instead: str = ""
 
-    def told(self, file: str) -> str:
+    def text_in(self, file: str) -> str:
         """The note as errors are written: place and text, then why and what to do."""
         place = f"{file}:{self.line}" if self.line is not None else file
         lines = [f"{place}: {self.kind}{': ' + self.text if self.text else ''}", f"    detail:   {self.why}"]

@@ -95,9 +95,12 @@ class _Maker:
 
     def _environment(self) -> list[str]:
         options = self.options
-        parts = ["environment:", f"  gravity: {_number(options.gravity)}{self._said('gravity', 'default of MoorDyn')}"]
+        parts = [
+            "environment:",
+            f"  gravity: {_number(options.gravity)}{self._origin('gravity', 'default of MoorDyn')}",
+        ]
         if self.wet:
-            said = self._said("density", "default of MoorDyn")
+            said = self._origin("density", "default of MoorDyn")
             parts.append(f"  fluid: {{density: {_number(options.density)}, surface: 0.0}}{said}")
         bed = self._bed()
         return parts + ([bed] if bed else [])
@@ -287,7 +290,7 @@ class _Maker:
             said.append((why, ""))
         self.notes += [Note(DIFFERS, None, "", why, instead) for why, instead in said]
 
-    def _said(self, key: str, otherwise: str) -> str:
+    def _origin(self, key: str, otherwise: str) -> str:
         row = self.options.rows.get(key)
         return _lines([row.line]) if row is not None else f"  # {otherwise}"
 
