@@ -235,8 +235,9 @@ def _too_slow(part: Part, log: Series) -> list[str]:
         weights = [sum(c[2] * c[0] ** _SLOPE for c in found) for found in (cycles, seen)]
         notes.append(
             f"outputs every {every:.4g} s are far apart for cycles of {period:.4g} s in the end force at "
-            f"s = {log.s:.6g} m: at the outputs alone its largest range would be {100 * lost_range:.2g} % smaller, the sum "
-            f"of count x range^{_SLOPE} {100 * (1 - weights[1] / weights[0]):.2g} %; elsewhere the loss is unknown; "
+            f"s = {log.s:.6g} m: at the outputs alone its largest range would be {100 * lost_range:.2g} % smaller "
+            f"and the sum of count x range^{_SLOPE} {100 * (1 - weights[1] / weights[0]):.2g} % smaller; at other "
+            f"places the loss is unknown; "
             f"try output: {{every: {period / _SAMPLES:.2g}}}"
         )
     if step * _SAMPLES > period * (1 + 1e-9):
