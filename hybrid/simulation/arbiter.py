@@ -35,7 +35,7 @@ _STEP_FIELDS = (
 
 
 def static_shooting(scene: Scene, output: str | Path | None, overwrite: bool) -> Result:
-    """Equilibrium of a scene by literal shooting; ComputationError where its growth drowns the answer."""
+    """Equilibrium of a scene by literal shooting; ComputationError where it is ill-conditioned."""
     target = _target(output)
     state = static(scene)
     with _recorder(scene, target, overwrite, ()) as recorder:

@@ -1,4 +1,4 @@
-"""What is watched while a cable is computed: everything that would make an answer wrong in silence.
+"""Checks during a run: whatever makes a result doubtful without stopping the computation.
 
 Each watch writes an event when something shows first and again when it has become much
 worse; what makes going on pointless is returned as an Outcome, with its node or cell.
@@ -34,7 +34,7 @@ LARGEST_TWIST = 2.8
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
 # Energy below this part of tension scale times length is what Newton's tolerance leaves over many steps.
 NEWTON_LEAVES = 1e-7
-# Energy that the scheme swallows, as a part of the same: beyond this a motion was too fast for its step.
+# Numerical dissipation, as a part of the same energy: beyond this the step was too long for the motion.
 LOSS_NOTED = 0.5
 # A rod is pressed when it carries more than this part of EI/L^2: a quarter of pi^2 is the least that any rod buckles
 # under, and what Newton leaves of no tension at all is far below.
@@ -218,7 +218,7 @@ class Diagnostics:
             cell = int(np.argmax(state.T))
             text = (
                 f"tension jumps by {jump:.3g} N within a step: what does not stretch stops at once, and the height of "
-                f"such a blow depends on step and cells; give axial_stiffness"
+                f"such a peak depends on step and cells; give axial_stiffness"
             )
             self.note(t, cell, "snap", text)
             self._jump = 3.0 * jump
@@ -272,7 +272,7 @@ class Diagnostics:
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
     def mesh(self, t: float, state: State) -> None:
-        """Folds that a catenary's cells do not resolve, and a seabed in which the line drowns."""
+        """Folds that a catenary's cells do not resolve, and a line deep in the seabed."""
         line, d = self._model.line, state.e / np.linalg.norm(state.e, axis=1)[:, None]
         flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
         turn = np.where(flexible, np.arccos(np.clip(np.einsum("ij,ij->i", d[:-1], d[1:]), -1.0, 1.0)), 0.0)

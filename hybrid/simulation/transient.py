@@ -212,7 +212,7 @@ class Transient:
                 repeats += 1
                 dt = 0.5 * dt if control is None else control.fails(end - self.t)
         if repeats and self.model.line.bits & SEABED:
-            self._forget_blow(until - begin)
+            self._reset_after_impact(until - begin)
 
     def _try(self, end: float) -> Taken:
         """A step to `end`, from `state` to `before`, which is not yet swapped with it."""
@@ -268,8 +268,8 @@ class Transient:
             self.stepper.evaluate_forces(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
             self.power = self._powers()
 
-    def _forget_blow(self, dt: float) -> None:
-        """After shortened steps: a blow on the bed leaves accelerations that would undo all velocity in a step."""
+    def _reset_after_impact(self, dt: float) -> None:
+        """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity in a step."""
         state = self.state
         hit = state.bed.any(axis=1) & (np.abs(state.a).max(axis=1) * dt > np.abs(state.v).max())
         state.a[hit], state.vd[hit] = 0.0, 0.0
