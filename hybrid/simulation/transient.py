@@ -269,7 +269,7 @@ class Transient:
             self.power = self._powers()
 
     def _reset_after_impact(self, dt: float) -> None:
-        """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity in a step."""
+        """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity at once."""
         state = self.state
         hit = state.bed.any(axis=1) & (np.abs(state.a).max(axis=1) * dt > np.abs(state.v).max())
         state.a[hit], state.vd[hit] = 0.0, 0.0
