@@ -449,12 +449,12 @@ def test_a_program_that_fails_is_a_row(monkeypatch: pytest.MonkeyPatch, tmp_path
     monkeypatch.setattr(peers.importlib.util, "find_spec", lambda name: object() if name == "moordyn" else None)
     real = peers.compute
 
-    def answer(peer_run: peers.PeerRun, scene: hybrid.Scene) -> peers.PeerResult:
+    def failing(peer_run: peers.PeerRun, scene: hybrid.Scene) -> peers.PeerResult:
         if peer_run.elements != 25:
             raise peers.PeerFailed("diverged")
         return real(replace(peer_run, code="nobody"), scene)
 
-    monkeypatch.setattr(peers, "answer", answer)
+    monkeypatch.setattr(peers, "compute", failing)
     monkeypatch.setattr(peers, "versions", lambda peer_runs: "moordyn 0")
     found = hybrid.trade(scene(), tmp_path, **LADDER | {"models": ["rod"], "accuracies": ["10%"]}, peers=True)
     peer_runs = [r for r in found.rows if r.code != "hybrid"]
