@@ -160,7 +160,7 @@ rather than the lift, give `volume` instead.
 
 A `body` is an end that carries a mass and is not held: a vehicle, a buoy, a weight.
 Give it a volume and it is buoyant; if it displaces more than its mass, it floats at the surface.
-`near` says where the search of the equilibrium puts it first.
+`initial_guess` says where the search of the equilibrium puts it first.
 Here a vehicle of 1.5 t hangs from a ship that rises and falls with the waves, sets off at 0.5 m/s, and is then moved
 10 m aside:
 

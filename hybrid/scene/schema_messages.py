@@ -147,7 +147,8 @@ def _missing_fix(key: str, words: str, spot: Spot, bare: bool) -> str:
     else:
         usual = {kind: a for kind in kinds.usual for a, marks in found if Tag(f"<{kind}>") in marks}
         return "add " + " or ".join(f"`{key}: {_example(kind, table)}`" for kind, table in usual.items())
-    return f"{fix}, the {what.removeprefix('the ')}" if what else fix
+    article = "" if what.startswith(("how ", "what ", "where ")) else "the "
+    return f"{fix}, {article}{what.removeprefix('the ')}" if what else fix
 
 
 def _example(kind: str, table: type[Table]) -> str:

@@ -118,7 +118,7 @@ def _guess(cable: Cable, ends: Ends, initial: Equilibrium) -> Iterator[Finding]:
         yield from _polyline_start(cable, ends, initial, POLYLINE_STRETCH)
     elif initial.guess in ("catenary", "arc", "span") and len(places) < 2:
         expected = f"auto or straight, because a guess like {initial.guess} goes from one known place to another"
-        yield Finding(("initial", "guess"), expected, "hold both ends, or say `near` where a body is")
+        yield Finding(("initial", "guess"), expected, "hold both ends, or say `initial_guess` where a body is")
     elif initial.guess == "straight" or initial.direction is not None:
         for name in ends.initial_guesses():
             expected = "nothing, because the search starts from a cable straight in a direction (initial)"
