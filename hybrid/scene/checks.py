@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from hybrid.scene import sea_checks, start_checks
+from hybrid.scene import attachment_checks, sea_checks, start_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -242,9 +242,10 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     start_checks.start_is_known,
     start_checks.equilibrium_exists,
     sea_checks.fluid_density,
-    sea_checks.attachments_on_cable,
-    sea_checks.attachments_in_fluid,
-    sea_checks.bodies_in_fluid,
+    attachment_checks.attachments_on_cable,
+    attachment_checks.attachments_in_fluid,
+    attachment_checks.bodies_in_fluid,
+    attachment_checks.densities,
     sea_checks.waves,
     sea_checks.followed,
     sea_checks.surface_over_seabed,

@@ -1,4 +1,4 @@
-"""Contradictions about the sea and what floats in it: water, waves, seabed, attachments, bodies."""
+"""Contradictions about the sea: water, waves, seabed."""
 
 from __future__ import annotations
 
@@ -6,12 +6,10 @@ import math
 from collections.abc import Iterator
 
 from hybrid.scene.analysis import Equilibrium, Initial, Straight
-from hybrid.scene.attachments import Clump, Float, Modules
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import Body, Ends, Triple
+from hybrid.scene.ends import Ends, Triple
 from hybrid.scene.sea import RegularWaves, wavenumber
-from hybrid.scene.start_checks import SAME_LENGTH
 
 # Miche (1944): a wave of height H and length L breaks where H / L reaches 0.142 tanh(k depth).
 STEEPEST = 0.142
@@ -25,7 +23,6 @@ LONGEST_PERIOD = 1e5
 # Two depths that differ by less than this part are the same: people write six digits.
 SAME_DEPTH = 1e-6
 
-_WATER = "give environment.fluid, such as `fluid: {density: 1025}` (kg/m^3)"
 _WAVES: Place = ("environment", "fluid", "waves")
 
 
@@ -55,62 +52,6 @@ def fluid_density(environment: Environment) -> Iterator[Finding]:
     if in_kg:
         fix = f"write {in_kg[0]:g}, in kg/m^3" + ("; for thin air, 1.015" if grams and fluid.surface is None else "")
     yield Finding(("environment", "fluid", "density"), expected, fix)
-
-
-# --- attachments and bodies --------------------------------------------------------------------
-
-
-def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
-    """Attachments beyond the end of the cable."""
-    length = cable.length
-    for i, item in enumerate(cable.attachments):
-        place: Place = ("range", 1) if isinstance(item, Modules) else ("at",)
-        if (item.range[1] if isinstance(item, Modules) else item.at) > length * (1 + SAME_LENGTH):
-            expected = f"an arc length between 0 and {length:.8g} m, the cable's length"
-            fix = "move it onto the cable, or make the cable longer (cable.sections)"
-            yield Finding(("cable", "attachments", i, *place), expected, fix)
-
-
-def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Finding]:
-    """Attachments that need a fluid and have none, or that do in it what their kind does not say."""
-    for i, item in enumerate(cable.attachments):
-        here: Place = ("cable", "attachments", i)
-        if isinstance(item, Clump):
-            yield from _needs_fluid(here, item, environment)
-        elif environment.fluid is None:
-            fix = f"{_WATER}; what only weighs is kind: clump"
-            yield Finding((*here, "kind"), "a fluid, because nothing floats without one", fix, item.kind)
-        elif item.buoyancy is not None and environment.gravity == 0.0:
-            measure = "volume (m^3/m)" if isinstance(item, Modules) else "volume (m^3)"
-            expected = f"{measure} instead, because without gravity nothing has weight or buoyancy"
-            yield Finding((*here, "buoyancy"), expected, "give volume and leave buoyancy out")
-        else:
-            yield from _floats(here, item, environment.fluid.density, environment.gravity)
-
-
-def _floats(here: Place, item: Float | Modules, density: float, gravity: float) -> Iterator[Finding]:
-    if isinstance(item, Float) and item.volume is not None and density * item.volume < item.mass:
-        expected = f"more than {item.mass / density:.6g} m^3, the volume of fluid that weighs as much as the float"
-        yield Finding((*here, "volume"), expected, "use kind: clump for what sinks, with the same mass and volume")
-    if isinstance(item, Modules) and item.buoyancy is not None and item.volume_in(density, gravity) < 0.0:
-        weight = item.mass * gravity
-        expected = f"at least {0.0 - weight:.6g} N/m: modules cannot sink with more than their weight, {weight:.6g} N/m"
-        yield Finding((*here, "buoyancy"), expected, "give their mass (kg/m), in air")
-
-
-def bodies_in_fluid(environment: Environment, ends: Ends) -> Iterator[Finding]:
-    """Bodies with what only a fluid gives a meaning to."""
-    for name, body in ends.bodies().items():
-        yield from _needs_fluid(("ends", name), body, environment)
-
-
-def _needs_fluid(here: Place, item: Clump | Body, environment: Environment) -> Iterator[Finding]:
-    if environment.fluid is not None:
-        return
-    names = {"volume": "buoyancy", "drag_area": "drag", "added_mass": "added mass", "height": "height under water"}
-    for key, name in names.items():
-        if getattr(item, key):
-            yield Finding((*here, key), f"no {name} without a fluid", f"{_WATER}, or leave {key} out")
 
 
 # --- waves -------------------------------------------------------------------------------------

@@ -332,6 +332,15 @@ CASES = {
     "a body beside the polyline": (SEA_TOO, "{kind: body, mass", "{kind: body, initial_guess: §[10, 0, 1], mass", "ends.start.initial_guess", "leave initial_guess out"),
     "a body beside the straight cable": (AT_REST.replace(f"equilibrium, {GUESS}", "straight, direction: [0, 0, -1]"), FREE, "{kind: body, mass: 3, initial_guess: §[0, 0, -9]}", "ends.end.initial_guess", "leave initial_guess out"),
     "a number for thrust": (SEA, "thrust: [20.0, 0.0, 0.0]", "thrust: §20", "ends.end.thrust", "`thrust: [20, 0, 0]`"),
+    # --- mass and volume
+    "a body in tonnes": (SEA, "mass: 100.0, volume: 0.09", "mass: §0.1, volume: 0.09", "ends.end.mass", "is mass in t? then mass: 100 (kg); or is volume in litres? then volume: 9e-05 (m^3)"),
+    "a clump in cm^3, a thousandfold": (SEA, CLUMP, "{kind: clump, at: 100, mass: §6, volume: 2e-6}", "cable.attachments[1].mass", "this one is 3e+06 kg/m^3"),
+    "a clump of steel in tonnes": (SEA, CLUMP, "{kind: clump, at: 100, mass: §0.3, volume: 0.04}", "cable.attachments[1].mass", "is mass in t? then mass: 300 (kg)"),
+    "a float in grams": (SEA, FLOAT, "{kind: float, at: 75, mass: §20000, volume: 0.1}", "cable.attachments[0].mass", "is mass in g? then mass: 20 (kg)"),
+    "a float in tonnes": (SEA, FLOAT, "{kind: float, at: 75, mass: §0.02, buoyancy: 420}", "cable.attachments[0].mass", "8.2 to 25000 kg/m^3"),
+    "modules in litres": (SEA, MODULES, "{kind: modules, range: [20, 40], mass: §8, volume: 20}", "cable.attachments[2].mass", "is volume in litres/m? then volume: 0.02 (m^3/m)"),
+    "a float wider than the cable is long": (SEA, FLOAT, "{kind: float, at: 75, volume: §4.0e6}", "cable.attachments[0].volume", "197 m wide, and the cable is 150 m long"),
+    "a mass too large for its cable": (SEA, CLUMP, "{kind: clump, at: 100, mass: §1.0e11}", "cable.attachments[1].mass", "densest metal"),
     # --- motion
     "velocity without ramp": (OCEAN, HEAVE, "§{velocity: [1, 0, 0]}", "ends.end.motion.ramp", "add `ramp: ...` (s)"),
     "ramp of a travel": (OCEAN, HEAVE, "{travel: {by: [1, 0, 0], over: 20}, ramp: §3}", "ends.end.motion.ramp", "travel has `over`"),
@@ -404,6 +413,12 @@ def test_refusal(name: str) -> None:
 
 
 ACCEPTED = {
+    "a lift bag": (SEA, FLOAT, "{kind: float, at: 75, mass: 10, volume: 1}"),
+    "syntactic foam": (SEA, MODULES, "{kind: modules, range: [20, 40], mass: 10, volume: 0.2}"),
+    "a balloon": (AT_REST.replace("cable:", "environment: {fluid: {density: 1.2}}\ncable:"), "mass: 1.0}]", "mass: 1.0, diameter: 0.02}], attachments: [{kind: float, at: 3, mass: 1, volume: 2}]"),
+    "a weight of lead": (SEA, CLUMP, "{kind: clump, at: 100, mass: 1134, volume: 0.1}"),
+    "modules that only weigh, rounded": (SEA, MODULES, "{kind: modules, range: [20, 40], mass: 8, buoyancy: -78.4}"),
+    "a float that has no mass": (SEA, FLOAT, "{kind: float, at: 75, volume: 3}"),
     "current, rising or falling": (SEA_LIST, LIST, "[{z: 0, velocity: [1, 0, 0]}, {z: -1, velocity: [0, 0, 0]}]"),
     "an end a little in the ground": (OCEAN, "  fluid", "  seabed: {z: -99.9, stiffness: 1.0e4}\n  fluid"),
     "the depth again": (SEA, "depth: 100.0", "depth: 100.00001"),
