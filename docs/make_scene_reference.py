@@ -155,8 +155,9 @@ time: {duration: 120.0, step: 0.1}
 
 `buoyancy` is net: the weight of the displaced fluid minus that of the float or the modules.  Where the size is known
 rather than the lift, give `volume` instead.
-Mass and volume together must make a possible density: from 0.008 of that of the fluid (0.05 for a clump) to 25 000 kg/m³.
-Without a mass a float is weightless, without a volume a clump displaces nothing; then neither may be wider than the cable is long.
+Mass and volume must make a possible density: from 0.008 of that of the fluid (0.05 for a clump) to 25 000 kg/m³.
+Without a mass a float is weightless, without a volume a clump displaces nothing; then neither may be wider than the
+cable is long.
 
 ## Bodies, travel, ends that follow the waves
 
