@@ -65,6 +65,29 @@ class Ends(NamedTuple):
     moment: Floats  # (2, 3) N m, applied to the cable; read where a rod ends without an element
 
 
+class Moves(NamedTuple):
+    """How what the two ends impose changes in time (kernels.end_motion); row 0 the start, row 1 the end.
+
+    E harmonics, L loads that act now, K knots of motion files.  What is absent has no rows, or zeros where said.
+    """
+
+    prescribed: NDArray[np.int8]  # (2, 2) 1 where a motion prescribes the position; the frame
+    position: Floats  # (2, 3) m, without motion
+    frame: Floats  # (2, 9) without motion; as Ends.frame
+    ramp: Floats  # (2,) s, over which the harmonics of an end grow; 0: none
+    harmonics: Floats  # (E, 5) end; axis, 0 to 2 along x, y, z, 3 to 5 about them; m or rad; 1/s; rad
+    velocity: Floats  # (2, 3) m/s, steady
+    velocity_ramp: Floats  # (2,) s, over which it grows; 0: no velocity
+    travel: Floats  # (2, 5) m: the way; s: its beginning and duration; duration 0: no travel
+    follows: NDArray[np.int8]  # (2,) 1 where the end follows the surface of the sea
+    file: NDArray[np.int64]  # (2, 2) first and last row of `knots`; equal: no file
+    knots: Floats  # (K,) s
+    cubics: Floats  # (K, 6, 4) coefficients from a knot on, highest power first: m (3), rotation vector in rad (3)
+    missing: Floats  # (2, 4) axis and angle (rad) by which a frame has still to turn at t = 0; angle 0: none
+    bring_in: float  # s, over which it does
+    loads: Floats  # (L, 6) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once
+
+
 class Sea(NamedTuple):
     """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
 
@@ -78,6 +101,7 @@ class Sea(NamedTuple):
     depth: float  # m, for waves; infinite in deep water
     surface: float  # m, z of still water
     now: Floats  # (4,) time, s; grown part of the current; of the waves, and its rate, 1/s
+    ramps: Floats  # (2,) s, over which the current and the waves grow from nothing; 0: there from the start
     normal: Floats  # (3,) unit normal of the seabed, upwards
     offset: float  # m, normal . x on the seabed
     stiffness: float  # N/m per m
@@ -136,7 +160,7 @@ def no_sea(n_cells: int) -> Sea:
     """Nothing around a line of `n_cells` cells: no current but zero, no waves, no seabed."""
     node, nan = (n_cells + 1, 3), float("nan")
     return Sea(
-        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]),
+        np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
         np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
     )  # fmt: skip

@@ -8,7 +8,8 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.kernels.state import Ends, Floats
+from hybrid.kernels.state import Ends, Floats, Moves
+from hybrid.scene.motion import MotionTerms
 
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6
@@ -42,12 +43,16 @@ def transported(first: Floats, tangents: Floats) -> Floats:
     return out
 
 
-class Moves(Protocol):
+class Motion(Protocol):
     """A prescribed motion: position (3,), velocity (3,), frame (3, 3) or None, angular velocity (3,) at a time."""
+
+    base: Floats
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]: ...
 
     def turn_from(self, frame: Floats) -> None: ...
+
+    def terms(self) -> MotionTerms: ...
 
 
 class EndLoad(NamedTuple):
@@ -70,7 +75,12 @@ class EndConditions:
     """
 
     def __init__(
-        self, held: Sequence[bool], position: Floats, frame: Floats, loads: Sequence[EndLoad], motions: dict[int, Moves]
+        self,
+        held: Sequence[bool],
+        position: Floats,
+        frame: Floats,
+        loads: Sequence[EndLoad],
+        motions: Mapping[int, Motion],
     ) -> None:
         zero = np.zeros((2, 3))
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
@@ -162,12 +172,39 @@ class EndConditions:
             self._grow(t)
         return self.values
 
+    def moves(self) -> Moves:
+        """The same as arrays for kernels.end_motion: loads that act now, frames and motions as they are now."""
+        prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)
+        ramp, velocity, velocity_ramp, travel = np.zeros(2), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 5))
+        follows, missing, position = np.zeros(2, np.int8), np.zeros((2, 4)), self.values.position.copy()
+        harmonics: list[tuple[float, ...]] = []
+        knots, cubics = [np.zeros(0)], [np.zeros((0, 6, 4))]
+        for k, motion in self.motions.items():
+            terms = motion.terms()
+            position[k] = motion.base
+            prescribed[k] = terms.translates, terms.rotates
+            ramp[k], velocity[k], velocity_ramp[k] = terms.ramp, terms.velocity, terms.velocity_ramp
+            travel[k], follows[k] = terms.travel, terms.follows
+            harmonics += [(k, *h) for h in terms.harmonics]
+            first = sum(x.size for x in knots)
+            file[k] = first, first + max(terms.knots.size - 1, 0)
+            knots.append(terms.knots)
+            cubics.append(terms.cubics)
+        for k, (axis, angle) in self._turns.items():
+            missing[k] = [*axis, angle]
+        loads = [(x.end, x.what == "moment", *x.value, x.ramp or 0.0) for x in self._acting]
+        return Moves(
+            prescribed, position, self._given[0].copy(), ramp, np.array(harmonics).reshape(-1, 5), velocity,
+            velocity_ramp, travel, follows, file, np.concatenate(knots), np.concatenate(cubics), missing,
+            float(self._bring_in), np.array(loads, float).reshape(-1, 6),
+        )  # fmt: skip
+
     def _grow(self, t: float) -> None:
         self._grown = t >= self._growing_until
         self.values.force[:] = 0.0
         self.values.moment[:] = 0.0
         for load in self._acting:
-            part, _ = rise(t, load.ramp) if load.ramp else (1.0, 0.0)
+            part, _ = rise(t, load.ramp or 0.0)
             (self.values.force if load.what == "force" else self.values.moment)[load.end] += part * load.value
 
     def acceleration(self, t: float, dt: float) -> Floats:
@@ -219,7 +256,9 @@ class EndConditions:
 
 
 def rise(t: float, duration: float) -> tuple[float, float]:
-    """A rise from 0 to 1 with continuous first and second derivative, and its rate (1/s)."""
+    """A rise from 0 to 1 with continuous first and second derivative, and its rate (1/s); duration 0: 1 at once."""
+    if duration == 0.0:
+        return 1.0, 0.0
     x = min(max(t / duration, 0.0), 1.0)
     return x**3 * (10.0 - 15.0 * x + 6.0 * x * x), 30.0 * x * x * (1.0 - x) ** 2 / duration
 

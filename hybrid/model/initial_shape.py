@@ -10,7 +10,7 @@ from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
-from hybrid.model.ends import EndConditions, EndLoad, Moves, first_director, transported
+from hybrid.model.ends import EndConditions, EndLoad, Motion, first_director, transported
 from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.scene.motion import EndMotion
@@ -253,7 +253,7 @@ def _end_conditions(
 ) -> EndConditions:
     position, frame = np.zeros((2, 3)), np.zeros((2, 9))
     loads: list[EndLoad] = []
-    motions: dict[int, Moves] = {}
+    motions: dict[int, Motion] = {}
     for k, end in enumerate(scene.ends.both):
         t = np.array(end.held_tangent or chords[k], float)
         t = t / np.linalg.norm(t)

@@ -34,36 +34,32 @@ LOWEST, HIGHEST = 0.3, 6.0
 class Surroundings:
     """Evaluates the sea at a time into the arrays of `Sea` (overwritten by the next call)."""
 
-    def __init__(self, values: Sea, current_ramp: float | None, wave_ramp: float | None) -> None:
-        self.values, self._current_ramp, self._wave_ramp = values, current_ramp, wave_ramp
+    def __init__(self, values: Sea) -> None:
+        self.values = values
         self.at(np.inf)
 
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
         blank = no_sea(cells)
         values = self.values._replace(flow=blank.flow, axis=blank.axis, slip=blank.slip, slid=blank.slid, bed=blank.bed)
-        return Surroundings(values, self._current_ramp, self._wave_ramp)
+        return Surroundings(values)
 
     def at(self, t: float) -> Sea:
         """The sea at t; t = infinity asks for what stays: the current fully grown, and no waves."""
         now = self.values.now
         now[0] = t if math.isfinite(t) else 0.0
-        now[1] = rise(t, self._current_ramp)[0] if self._current_ramp else 1.0
-        if not math.isfinite(t):
-            now[2], now[3] = 0.0, 0.0
-        elif self._wave_ramp:
-            now[2], now[3] = rise(t, self._wave_ramp)
-        else:
-            now[2], now[3] = 1.0, 0.0
+        current_ramp, wave_ramp = self.values.ramps.tolist()
+        now[1] = rise(t, current_ramp)[0]
+        now[2], now[3] = rise(t, wave_ramp) if math.isfinite(t) else (0.0, 0.0)
         return self.values
 
-    def elevation(self, x: float, y: float, t: float) -> tuple[float, float]:
-        """Elevation of the surface above still water (m) at a place and time, and its rate (m/s)."""
+    def elevation(self, x: float, y: float, t: float) -> tuple[float, float, float, float]:
+        """Elevation of the surface above still water (m) at a place and time, its rate (m/s) and slopes along x, y."""
         A, w, kx, ky, phase, _ = self.values.waves.T
         angle = kx * x + ky * y - w * t + phase
-        part, rate = rise(t, self._wave_ramp) if self._wave_ramp else (1.0, 0.0)
-        eta = float(np.sum(A * np.cos(angle)))
-        return part * eta, part * float(np.sum(A * w * np.sin(angle))) + rate * eta
+        part, rate = rise(t, float(self.values.ramps[1]))
+        eta, down = float(np.sum(A * np.cos(angle))), A * np.sin(angle)
+        return part * eta, part * float(w @ down) + rate * eta, -part * float(kx @ down), -part * float(ky @ down)
 
 
 def surroundings(scene: Scene, cells: int) -> Surroundings:
@@ -91,7 +87,7 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
         if rubs(bed):
             friction = np.array([bed.friction.axial, bed.friction.lateral]) if bed.friction else np.zeros(2)
             sea = sea._replace(friction=friction, slip_length=slip_length(scene, bed))
-    return Surroundings(sea, current_ramp, wave_ramp)
+    return Surroundings(sea._replace(ramps=np.array([current_ramp or 0.0, wave_ramp or 0.0])))
 
 
 def rubs(bed: Seabed | None) -> bool:

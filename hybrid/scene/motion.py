@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,12 +24,29 @@ from hybrid.scene.motion_file import RecordRefused, read_record, spline
 
 Array = NDArray[np.float64]
 
-# Height of the surface above still water [m] and its rate [m/s] at x, y [m], t [s].
-Elevation = Callable[[float, float, float], tuple[float, float]]
+# Height of the surface above still water [m], its rate [m/s] and its slopes along x and y, at x, y [m], t [s].
+Elevation = Callable[[float, float, float], tuple[float, float, float, float]]
 
-# Distance over which the slope of the surface is taken by central differences of fourth order: for waves
-# of 3 m and longer the error (k h)^4 / 30 is below 1e-11 of the slope, and round-off is no larger.
-SLOPE_OVER = 2e-3
+
+class MotionTerms(NamedTuple):
+    """What a motion adds up from, as numbers, for an evaluation elsewhere.
+
+    translates, rotates: whether it moves and turns the end; harmonics: axis (0 to 2 along x, y, z, 3 to 5 about them),
+    amplitude [m or rad], angular frequency [1/s], phase [rad]; ramp [s], 0: none; velocity [m/s] and its ramp [s],
+    0: no velocity; travel: the way [m], its beginning and its duration [s], 0: no travel; follows: the surface of the
+    sea; knots: (K,) [s] of a file; cubics: (K, 6, 4) from each knot on, highest power first [m, rad].
+    """
+
+    translates: bool
+    rotates: bool
+    harmonics: tuple[tuple[float, ...], ...]
+    ramp: float
+    velocity: tuple[float, ...]
+    velocity_ramp: float
+    travel: tuple[float, ...]
+    follows: bool
+    knots: Array
+    cubics: Array
 
 
 class EndMotion:
@@ -37,7 +54,7 @@ class EndMotion:
 
     motion: the scene's table, or None for an end at rest; position: (3,) m, inertial, where the end
     is held (None for a guided end); frame: (3, 3), columns a1, a2, tangent in inertial axes, or None;
-    elevation: the surface of the sea, which a motion with `follow: waves` needs.
+    elevation: the surface of the sea, which a motion with `follow: waves` needs.  base: (3,) m, without motion.
     SceneError if the motion file cannot be read.
     """
 
@@ -48,9 +65,10 @@ class EndMotion:
         frame: ArrayLike | None = None,
         elevation: Elevation | None = None,
     ) -> None:
-        self._base = _constant(np.zeros(3) if position is None else position)
+        self.base = _constant(np.zeros(3) if position is None else position)
         self._frame = None if frame is None else _constant(frame)
         self._still = _constant(np.zeros(3))
+        self._motion = motion
         self._ramp = None if motion is None else motion.ramp
         harmonics = {} if motion is None else motion.harmonics()
         self._shifts = _components(harmonics, SHIFTS, 1.0)
@@ -85,7 +103,7 @@ class EndMotion:
 
         All inertial.  What does not move is returned read-only and shared.
         """
-        position, velocity = self._translation(t) if self._translates else (self._base, self._still)
+        position, velocity = self._translation(t) if self._translates else (self.base, self._still)
         frame, spin = self._rotation(t) if self._rotates else (self._frame, self._still)
         return position, velocity, frame, spin
 
@@ -93,12 +111,32 @@ class EndMotion:
         """Turn another frame (3, 3) from now on."""
         self._frame = None if self._frame is None else _constant(frame)
 
+    def terms(self) -> MotionTerms:
+        """What the motion adds up from."""
+        motion, still = self._motion, (0.0, 0.0, 0.0)
+        velocity = motion.velocity if motion is not None else None
+        travel = motion.travel if motion is not None else None
+        harmonics = (*self._shifts, *((axis + 3, *h) for axis, *h in self._turns))
+        splines = [x for x in (self._shift_spline, self._turn_spline) if x is not None]
+        knots = splines[0].x if splines else np.zeros(0)
+        cubics = np.zeros((knots.size, 6, 4))
+        for first, curve in ((0, self._shift_spline), (3, self._turn_spline)):
+            if curve is not None:
+                cubics[:-1, first : first + 3] = curve.c.transpose(1, 2, 0)
+        ramped = velocity is not None and any(velocity)
+        return MotionTerms(
+            self._translates, self._rotates, harmonics, self._ramp or 0.0,
+            velocity or still, (self._ramp or 0.0) if ramped else 0.0,
+            (*travel.by, travel.begin, travel.over) if travel is not None else (*still, 0.0, 0.0),
+            self._follows, knots, cubics,
+        )  # fmt: skip
+
     def _translation(self, t: float) -> tuple[Array, Array]:
         if self._shift_spline is not None:
             t = min(t, self._last)
-            return self._base + self._shift_spline(t), self._shift_spline(t, 1)
+            return self.base + self._shift_spline(t), self._shift_spline(t, 1)
         r, dr = self._grow(t)
-        position, velocity = self._base.tolist(), [0.0, 0.0, 0.0]
+        position, velocity = self.base.tolist(), [0.0, 0.0, 0.0]
         for axis, amplitude, w, phase in self._shifts:
             sine, cosine = math.sin(w * t + phase), math.cos(w * t + phase)
             position[axis] += r * amplitude * sine
@@ -109,24 +147,11 @@ class EndMotion:
                 position[axis] += far[axis]
                 velocity[axis] += fast[axis]
         if self._follows:
-            eta, rate = self._surface(position[0], position[1], velocity[0], velocity[1], t)
+            assert self._elevation is not None
+            eta, rate, slope_x, slope_y = self._elevation(position[0], position[1], t)
             position[2] += eta
-            velocity[2] += rate
+            velocity[2] += rate + slope_x * velocity[0] + slope_y * velocity[1]
         return np.array(position), np.array(velocity)
-
-    def _surface(self, x: float, y: float, vx: float, vy: float, t: float) -> tuple[float, float]:
-        """Elevation and its rate for someone who travels over the surface: d eta/dt + v . grad eta."""
-        assert self._elevation is not None
-        eta, rate = self._elevation(x, y, t)
-        speed = math.hypot(vx, vy)
-        if speed > 0.0:
-            hx, hy = SLOPE_OVER * vx / speed, SLOPE_OVER * vy / speed
-            near, far = (
-                self._elevation(x + n * hx, y + n * hy, t)[0] - self._elevation(x - n * hx, y - n * hy, t)[0]
-                for n in (1, 2)
-            )
-            rate += speed * (8.0 * near - far) / (12.0 * SLOPE_OVER)
-        return eta, rate
 
     def _rotation(self, t: float) -> tuple[Array | None, Array]:
         if self._turn_spline is not None:

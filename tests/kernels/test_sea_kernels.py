@@ -130,8 +130,8 @@ def _scene(fluid, **environment):
 
 def sea_of(waves, depth, ramp=None, surface=0.0, n=1):
     """Surroundings with these components, and room for n points."""
-    sea = no_sea(n - 1)._replace(waves=waves, depth=depth, surface=surface)
-    return Surroundings(sea, None, ramp)
+    sea = no_sea(n - 1)._replace(waves=waves, depth=depth, surface=surface, ramps=np.array([0.0, ramp or 0.0]))
+    return Surroundings(sea)
 
 
 def stirred(around: Surroundings, t: float, points) -> np.ndarray:
@@ -227,7 +227,7 @@ def test_at_the_moving_surface_is_what_linear_theory_has_at_still_water(depth):
     A, w, k = waves[0, 0], waves[0, 1], waves[0, 5]
     around = sea_of(waves, depth)
     for t in np.linspace(0.0, 8.0, 9):
-        eta, rate = around.elevation(2.0, 3.0, t)
+        eta, rate, *_ = around.elevation(2.0, 3.0, t)
         for above in (0.0, 5.0):  # and so above it
             got = stirred(around, t, (2.0, 3.0, eta + above))[0]
             theta = waves[0, 2] * 2 + waves[0, 3] * 3 - w * t + waves[0, 4]
@@ -282,14 +282,16 @@ def test_waves_add_up():
 
 
 @pytest.mark.parametrize("ramp", [None, 20.0])
-def test_elevation_and_its_rate(ramp):
-    """What an end follows is what the line feels; its rate is the derivative, growth included."""
+def test_elevation_its_rate_and_slopes(ramp):
+    """What an end follows is what the line feels; rate and slopes are its derivatives, growth included."""
     waves = components(JonswapWaves(significant_height=3.0, peak_period=9.0, components=30, direction=120), math.inf, G)
     around = sea_of(waves, math.inf, ramp)
     for t in (2.0, 13.0, 30.0):
-        eta, rate = around.elevation(12.0, -5.0, t)
+        eta, rate, *slopes = around.elevation(12.0, -5.0, t)
         assert stirred(around, t, (12.0, -5.0, -4.0))[0, 6] == pytest.approx(eta, abs=1e-12)
         assert rate == pytest.approx(slope(lambda x: around.elevation(12.0, -5.0, x)[0], t, 1e-3), abs=1e-9)
+        assert slopes[0] == pytest.approx(slope(lambda x, t=t: around.elevation(x, -5.0, t)[0], 12.0, 1e-3), abs=1e-9)
+        assert slopes[1] == pytest.approx(slope(lambda x, t=t: around.elevation(12.0, x, t)[0], -5.0, 1e-3), abs=1e-9)
 
 
 def test_growth_of_the_sea():
