@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gc
 import json
-import os
 import shlex
 import sys
 import time as clock
@@ -21,7 +20,6 @@ import typer
 import hybrid
 import hybrid.cli.result_commands  # registers its commands
 from hybrid.cli.app import (
-    INTERRUPTED,
     REFUSED,
     Drawn,
     Json,
@@ -40,6 +38,7 @@ from hybrid.cli.app import (
     session,
     words,
 )  # fmt: skip
+from hybrid.cli.pipe import guard_output
 from hybrid.cli.plan_tables import ledger_table, plan_lines
 from hybrid.cli.tables import (
     equilibrium_facts,
@@ -121,7 +120,7 @@ def static(
         asked = load(console, scene, settings)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
-        console.compiling(asked)
+        console.compiling(asked, static=True)
         from hybrid.cli.progress_line import span
 
         begin = clock.perf_counter()
@@ -184,6 +183,7 @@ def trade(
         asked = load(console, scene, settings)
         folder = output or scene.with_suffix(".trade")
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
+        console.note(f"runs and tables go to the folder {folder}")
         console.compiling(asked)
         chosen = {"accuracies": accuracies} if accuracies else {}
         with console.study() as listener:
@@ -269,6 +269,7 @@ def main(arguments: list[str] | None = None) -> None:
     """Run a command and leave with its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
     gc.set_threshold(GARBAGE_AFTER)
+    guard_output()
     try:
         code = typer.main.get_command(app).main(arguments, prog_name="hybrid", standalone_mode=False, obj=arguments)
         sys.stdout.flush()
@@ -280,7 +281,4 @@ def main(arguments: list[str] | None = None) -> None:
             "usage", f"{error.format_message()}\n    try:      {command} --help"
         )
         code = REFUSED
-    except BrokenPipeError:  # the reader has gone, as in `hybrid schema | head`
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-        code = INTERRUPTED
     sys.exit(code)

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 from rich.console import Console as RichConsole
 
 import hybrid
+from hybrid.cli.pipe import reader_has_gone
 from hybrid.cli.progress_line import ProgressLine
 from hybrid.errors import EXPECTED, weight_of_event
 
@@ -54,26 +55,27 @@ class Console:
         """A line for programs; nothing for people."""
         if not self.as_json:
             return
-        try:
-            sys.stdout.write(json.dumps({"event": event} | facts, default=str) + "\n")
-            sys.stdout.flush()
-        except BrokenPipeError:  # nobody listens any more: end as if by Ctrl-C, and print nowhere
-            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
-            raise KeyboardInterrupt from None
+        sys.stdout.write(json.dumps({"event": event} | facts, default=str) + "\n")
+        sys.stdout.flush()
+        if event == "progress" and reader_has_gone():
+            raise KeyboardInterrupt  # nobody follows the run: end it as by Ctrl-C
 
     def note(self, text: str) -> None:
         if not (self.quiet or self.as_json):
             self._err.print(text, style="yellow", soft_wrap=not self._err.is_terminal)
 
-    def compiling(self, scene: Scene) -> bool:
-        """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand."""
+    def compiling(self, scene: Scene, static: bool = False) -> bool:
+        """Whether kernels of a scene have to be compiled first, which takes long; if so, say it beforehand.
+
+        static: for its equilibrium alone, whose stability is judged.
+        """
         from hybrid.kernels.cache import is_warm
         from hybrid.simulation.first_use import kernels_of
 
-        if is_warm(kernels_of(scene)):
+        if is_warm(kernels_of(scene, static)):
             return False
         self.json("compiling")
-        self.note("compiling the kernels for this machine (first use only, up to half a minute) ...")
+        self.note("compiling the kernels for this machine (first use only, 5 to 30 s) ...")
         return True
 
     def show(self, content: Callable[[], Any]) -> None:

@@ -114,8 +114,7 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
         found = {name: float(result[name].max()) for name in names if name in result}
         most = max(found.values())
         sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
-        peak = float(result["bending_moment"].max()) if "bending_moment" in result else 0.0
-        table.add_row("moment", *sizes, f"of {_short(peak)} N m" if peak else "no rod, no moment: model: rod")
+        table.add_row("moment", *sizes, _largest_moment(result))
     asked = result.attributes.get("accuracy_asked")
     if not asked:
         return table
@@ -123,6 +122,15 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
 
     verdict = {True: "met", False: "MISSED", None: "not verified, see the note"}[errors["met"]]
     return Group(table, f"asked {asked}: {verdict}")
+
+
+def _largest_moment(result: Result) -> str:
+    """The bending moment that its error is to be compared with, or why there is none."""
+    if "bending_moment" in result:
+        return f"of {_short(float(result['bending_moment'].max()))} N m"
+    if any(zone.kind == "rod" for zones in result.zones for zone in zones):
+        return "the moment is not among the outputs"
+    return "a catenary has no moment; `model: rod` computes it"
 
 
 def _short(x: float, beside: float = 0.0) -> str:

@@ -77,6 +77,9 @@ def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, 
     return _parsed(_text_of(path), str(path), overrides)
 
 
+HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of that format begin
+
+
 def _text_of(path: str | Path) -> str:
     """The text of a scene file; SceneError where there is none."""
     try:
@@ -96,6 +99,9 @@ def _text_of(path: str | Path) -> str:
         utf16 = content[:2] in (b"\xff\xfe", b"\xfe\xff")
         given = "UTF-16" if utf16 else f"the byte {content[error.start]:#04x}"
         complaint = Complaint("scene", given, "a text file in UTF-8", "save it anew as UTF-8", line, column)
+        if content.startswith(HDF5):
+            fix = f"`hybrid plot {path}` or `report` shows it, `resume` continues a run; name the scene that it is of"
+            complaint = Complaint("scene", "an HDF5 file, as results are", "a scene file (YAML text)", fix)
     except (OSError, ValueError):
         complaint = Complaint("scene", str(path), "a readable text file (UTF-8)", "check what kind of file it is")
     raise SceneError([complaint], str(path))

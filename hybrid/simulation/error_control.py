@@ -192,7 +192,10 @@ class ErrorController:
         main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
         free = {"mesh": self.free.mesh, "time step": self.free.steps, "model": self.free.zones}[main]
         fixed = {"mesh": "mesh (or cells of zones)", "time step": "time.step", "model": "model, or its tolerance"}[main]
-        try_ = "ask for less" + ", or compare with model: rod" * (verdict.model > 0.0) if free else f"leave {fixed} out"
+        try_ = f"leave {fixed} out"
+        if free:
+            try_ = f"accuracy: {{{verdict.reached}}}, which this run meets"
+            try_ += ", or compare with model: rod" * (verdict.model > 0.0)
         if main == "model" and not free:
             try_ = "model: adaptive, or rod"
         text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"

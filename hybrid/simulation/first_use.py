@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.kernels.cache import is_warm
 from hybrid.model.build import Model, build
 from hybrid.model.resolution import first_resolution, wants_errors
+from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
@@ -20,6 +21,7 @@ from hybrid.scene.schema import Scene
 # What each process compiles, by the kernel that stands for it: the last that it compiles.
 SOLVER = ("newton.solve_in_plane", "newton.solve_in_space")
 OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_rules._plan", "bending_error.advance_error"
+STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
 # A cable for the second process to compile with; nothing is computed of it.
 SAMPLE = {
@@ -29,10 +31,11 @@ SAMPLE = {
 }  # fmt: skip
 
 
-def kernels_of(scene: Scene) -> list[str]:
+def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     """The kernels that a run of a scene calls, as file.function, by the last of each family; the solver's first.
 
-    Whether it is computed in a plane is told by what is written in the scene; rarely its first shape leaves it.
+    Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
+    static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
     beside = _beside_solver(scene)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
@@ -40,7 +43,15 @@ def kernels_of(scene: Scene) -> list[str]:
     in_space = scene.dimension == 3 or scene.solver != "elimination" or bool(leaves)
     if scene.dimension is None and MODEL_ERROR in beside:
         in_space = True  # what leaving bending out does is followed in space
-    return [SOLVER[in_space], *beside]
+    turned = any(load.what == "moment" for end in scene.ends.both for load in end.loads)
+    judged = static and not in_space and _has_rods(scene) and not turned
+    return [SOLVER[in_space], *beside, *([STABILITY] if judged else [])]
+
+
+def _has_rods(scene: Scene) -> bool:
+    """Whether part of the cable is a rod from the beginning; zones that move (adaptive) may have none."""
+    zones = scene.model.zones if isinstance(scene.model, ZonesModel) else ()
+    return isinstance(scene.model, RodModel) or any(isinstance(zone, RodZone) for zone in zones)
 
 
 def _beside_solver(scene: Scene) -> list[str]:

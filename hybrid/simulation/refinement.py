@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import sqrt
+from math import ceil, floor, log10, sqrt
 from typing import NamedTuple
 
 from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.scene.accuracy import ROUGHEST
 from hybrid.simulation.error_estimate import END_FORCES, Errors, RunSample
 
 # Part of what is asked that the next run aims at.
@@ -36,32 +37,48 @@ class Verdict:
     time: float
     model: float
     text: str
+    reached: str = ""  # what of it is missed, as this run meets it: an accuracy as a scene writes it
 
 
 def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
     """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met."""
-    bounds: list[tuple[str, str, float]] = []
+    bounds: list[tuple[str, str, float, float | None]] = []  # quantity, unit, bound; if a part is asked, of what
     if asked.position is not None:
-        bounds.append(("position", "m", asked.position))
+        bounds.append(("position", "m", asked.position, None))
     for name in END_FORCES.values():
         if asked.tension is not None:
-            bounds.append((name, "N", asked.tension))
+            bounds.append((name, "N", asked.tension, None))
         if asked.of_end_force is not None:
-            bounds.append((name, "N", asked.of_end_force * run.largest_end_force))
+            bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
     if asked.of_curvature is not None and "curvature" in run.values:
-        bounds.append(("curvature", "1/m", asked.of_curvature * float(run.values["curvature"].max())))
-    worst = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked")
-    for name, unit, bound in bounds:
+        sharpest = float(run.values["curvature"].max())
+        bounds.append(("curvature", "1/m", asked.of_curvature * sharpest, sharpest))
+    worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
+    for name, unit, bound, most in bounds:
         if bound <= 0.0:
             continue
         total = errors.largest("total", name)
+        key = {"position": "position", "curvature": "curvature"}.get(name, "tension")
+        if total > max(bound, reached.get(key, (0.0, ""))[0]):
+            reached[key] = total, _reached(key, unit, total, most)
         if total / bound >= worst.ratio:
             model = errors.largest("model", name)
             mesh, time = (errors.largest(cause, name) / bound for cause in ("mesh", "time"))
             quantity = name.replace("end_force_", "force at the ")
             text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text)
-    return worst
+    return replace(worst, reached=", ".join(text for _, text in reached.values()))
+
+
+def _reached(key: str, unit: str, total: float, most: float | None) -> str:
+    """An accuracy that an error of `total` meets, with a tenth to spare; most: that of which a part is asked."""
+    amount = 1.1 * total
+    if most is not None and (amount <= ROUGHEST * most or key == "curvature"):
+        amount, unit = 100.0 * amount / most, "%"
+        if amount > 100.0 * ROUGHEST:
+            return f"curvature: none, its error is {100.0 * total / most:.2g}%"
+    digit = 10.0 ** (floor(log10(amount)) - 1) if amount > 0.0 else 1.0
+    return f"{key}: {ceil(amount / digit) * digit:.6g} {unit}".replace(" %", "%")
 
 
 def refined(resolution: Resolution, verdict: Verdict, free: Free) -> Resolution | None:

@@ -93,10 +93,12 @@ def check_target(path: Path, overwrite: bool) -> None:
         if path.is_dir():
             raise ResultError(f"{path} is a folder\n    try:      name a file in it, such as {path / 'run.h5'}")
         if not overwrite:
-            raise ResultError(f"{path} exists\n    try:      another name, or allow overwriting")
+            advice = "another name, or leave --no-overwrite out (overwrite=True in Python)"
+            raise ResultError(f"{path} exists\n    try:      {advice}")
         if not os.access(path, os.W_OK) or (path.stat().st_size and not is_result(path)):
             why = "is not a result of hybrid" if os.access(path, os.W_OK) else "is write-protected"
-            raise ResultError(f"{path} exists and {why}\n    try:      another name, or delete the file yourself")
+            advice = "another name, or delete the file yourself: only results are replaced, there is no --overwrite"
+            raise ResultError(f"{path} exists and {why}\n    try:      {advice}")
     if not path.parent.is_dir():
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
 

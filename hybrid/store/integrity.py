@@ -44,6 +44,12 @@ def being_written(path: Path) -> bool:
         size = file.seek(0, 2)
     wrong = f"{path} cannot be read as a result\n    detail:   "
     other = "\n    expected: an HDF5 file written by hybrid\n    try:      copy it anew, or run its scene again"
+    if path.suffix.lower() in (".yaml", ".yml") and not head.startswith(_SIGNATURE):
+        written = path.with_suffix(".h5").name
+        advice = f"run it first: `hybrid run {path.name}` writes {written}, which can be read here"
+        raise ResultError(
+            f"{path} is a scene, not a result\n    expected: an HDF5 file written by hybrid\n    try:      {advice}"
+        )
     if not head.startswith(_SIGNATURE):
         raise ResultError(f"{wrong}it does not begin as HDF5 files do{other}")
     if len(head) == _SIZE and head[8] != 3:

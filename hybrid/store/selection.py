@@ -253,7 +253,7 @@ def check_target(path: Path, overwrite: bool) -> None:
         raise ResultError(f"there is no folder {path.parent}\n    try:      mkdir -p {path.parent}")
     elif path.exists():
         if not overwrite:
-            why, advice = "exists", "another name, or allow overwriting"
+            why, advice = "exists", "another name, or leave --no-overwrite out (overwrite=True in Python)"
         elif not os.access(path, os.W_OK):
             why = "exists and is write-protected"
         elif path.stat().st_size and not is_export(path):

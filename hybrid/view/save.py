@@ -40,7 +40,12 @@ def check_target(path: str | Path, formats: Sequence[str], *, overwrite: bool = 
         )
     if target.suffix.lower() not in formats:
         names = " or ".join(filter(None, (", ".join(formats[:-1]), formats[-1])))
-        raise ResultError(f"{target}: unknown file format\n    expected: a name that ends in {names}")
+        advice = f"{target.with_suffix(formats[0]).name}"
+        if ".html" in formats:
+            advice += "; a browser prints it as PDF" * (target.suffix.lower() == ".pdf")
+        raise ResultError(
+            f"{target}: unknown file format\n    expected: a name that ends in {names}\n    try:      {advice}"
+        )
     if not target.parent.is_dir():
         raise ResultError(f"there is no folder {target.parent}\n    try:      mkdir -p {target.parent}")
     if target.exists():

@@ -3,6 +3,9 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -238,7 +241,7 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
     [
         (("run", "absent.yaml"), "absent.yaml"),
         (("plot", "absent.h5"), "there is no file"),
-        (("plot", "wire.yaml"), "cannot be read as a result"),
+        (("plot", "wire.yaml"), "is a scene, not a result"),
         (("run", "wire.yaml", "-o", "no/such/folder.h5"), "there is no folder"),
         (("run", "wire.yaml", "-o", "wire.yaml"), "is not a result of hybrid"),
         (("run", "wire.yaml", "--nonsense"), "hybrid run --help"),
@@ -246,7 +249,7 @@ def test_a_scene_without_time_cannot_be_run(call: Call) -> None:
         (("rum",), "Did you mean 'run'"),
         (("plot", "wire.h5", "--times", "0,x"), "no list of numbers"),
         (("plot", "absent.h5", "--zones"), "there is no file"),
-        (("plot", "wire.yaml", "--zones"), "cannot be read as a result"),
+        (("plot", "wire.yaml", "--zones"), "is a scene, not a result"),
         (("plot", "wire.h5", "--zones", "--times", "0"), "without --zones"),
         (("plot", "wire.h5", "--zones", "--history", "1"), "without --zones"),
     ],
@@ -310,3 +313,36 @@ def test_a_bug_is_called_a_bug(call: Call, monkeypatch: pytest.MonkeyPatch) -> N
     said = call("run", "wire.yaml")
     assert said.code == 2 and said.err.startswith("this is a bug in hybrid") and "ZeroDivisionError: oh" in said.err
     assert call("run", "wire.yaml", "--json").lines[-1]["kind"] == "bug"
+
+
+# ---- the wrong kind of file, a pipe that is closed ----------------------------------------------------
+
+
+@pytest.mark.parametrize("command", ["run", "static", "plan", "trade"])
+def test_a_result_in_the_place_of_a_scene_is_named_as_one(call: Call, command: str) -> None:
+    call("static", "wire.yaml", "-q")
+    called = call(command, "wire.static.h5")
+    assert called.code == 1 and not called.out
+    assert "given:    an HDF5 file" in called.err and "try:      `hybrid plot wire.static.h5`" in called.err
+
+
+@pytest.mark.parametrize("command", ["plot", "report", "resume", "export"])
+def test_a_scene_in_the_place_of_a_result_is_named_as_one(call: Call, command: str) -> None:
+    called = call(command, "wire.yaml")
+    assert called.code == 1 and not called.out
+    assert "is a scene, not a result" in called.err and "`hybrid run wire.yaml` writes wire.h5" in called.err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no such pipes")
+@pytest.mark.parametrize("command", [["schema"], ["--help"], ["--version"], ["plan", "-v", "wire.yaml"]])
+def test_a_closed_pipe_ends_a_command_quietly(call: Call, command: list[str]) -> None:
+    script = "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])"
+    end, begin = os.pipe()
+    os.close(end)  # the reader has gone before anything is written
+    try:
+        done = subprocess.run(
+            [sys.executable, "-c", script, *command], stdout=begin, stderr=subprocess.PIPE, check=False
+        )
+    finally:
+        os.close(begin)
+    assert (done.returncode, done.stderr) == (0, b"")

@@ -470,7 +470,7 @@ def test_nonsense_is_refused_and_nothing_is_left(
 def test_only_older_exports_are_replaced(result: Result, tmp_path: Path, kind: str) -> None:
     file = export(result, format=kind).files[0]
     before = file.read_bytes()
-    with pytest.raises(ResultError, match="exists\n    try:      another name, or allow overwriting"):
+    with pytest.raises(ResultError, match="exists\n    try:      another name, or leave --no-overwrite out"):
         export(result, format=kind, overwrite=False)
     again = export(result, format=kind, times=(0, 4)).files
     assert file.read_bytes() != before

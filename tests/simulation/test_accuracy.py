@@ -252,6 +252,23 @@ def test_explicit_settings_win_and_what_they_miss_is_said():
     assert "leave mesh" in missed.text and "asked" in missed.text
 
 
+def test_what_is_missed_is_named_with_what_is_met():
+    """The accuracy that the text proposes has its tenth to spare: 1.1 times the error, rounded up to two digits."""
+    from types import SimpleNamespace
+
+    from hybrid.model.resolution import RequestedAccuracy
+    from hybrid.simulation.refinement import judge
+
+    largest = {"position": 0.013, "end_force_start": 7.0, "end_force_end": 9.4}
+    errors = SimpleNamespace(largest=lambda cause, name: largest[name] if cause == "total" else 0.0)
+    run = SimpleNamespace(largest_end_force=200.0, values={})
+    asked = RequestedAccuracy(0.01, None, 0.01)
+    assert judge(asked, errors, run).reached == "position: 0.015 m, tension: 5.2%"
+    run.largest_end_force = 20.0  # more than a tenth of it can only be asked in newtons
+    assert judge(asked, errors, run).reached == "position: 0.015 m, tension: 11 N"
+    assert judge(RequestedAccuracy(0.02, None, None), errors, run).reached == ""
+
+
 def test_a_figure_beside_a_run_with_fixed_steps(truth):
     """Without accuracy, output.errors asks for the figure alone; the run is the same as without."""
     settings = {"time": {"duration": 6.0, "step": 0.02}, "mesh": {"cells": 40}}
