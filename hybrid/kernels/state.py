@@ -136,6 +136,41 @@ class State(NamedTuple):
         return State(*(x.copy() for x in self))
 
 
+class Batch(NamedTuple):
+    """What outputs are made of: nb states with their ends and what was reported of them, one row per output.
+
+    float64 but for `held`; arrays may be views of larger ones, contiguous but in the first axis.
+    """
+
+    t: Floats  # (nb,) s
+    r: Floats  # (nb, N+1, 3) m
+    v: Floats  # (nb, N+1, 3) m/s
+    vd: Floats  # (nb, N+1, 3) m/s2, true acceleration
+    e: Floats  # (nb, N, 3) m
+    T: Floats  # (nb, N) N
+    a1: Floats  # (nb, N, 3)
+    w: Floats  # (nb, N) 1/s
+    held: NDArray[np.int8]  # (nb, 2) this and the five that follow: as `Ends` has them
+    position: Floats  # (nb, 2, 3) m
+    frame: Floats  # (nb, 2, 9)
+    spin: Floats  # (nb, 2, 3) 1/s
+    force: Floats  # (nb, 2, 3) N
+    moment: Floats  # (nb, 2, 3) N m
+    report: Floats  # (nb, REPORT_SIZE) as named in kernels.report
+    work: Floats  # (nb, number of powers) J, since the start
+    sea_now: Floats  # (nb, 4) as `Sea.now`
+
+
+def batch_of_one(t: float, ends: Ends, state: State, report: Floats, work: Floats, sea: Sea) -> Batch:
+    """The batch of a single output at time t, s, with copies of what the next step overwrites."""
+    now = State(*(x[None].copy() for x in state))
+    return Batch(
+        np.array([t]), now.r, now.v, now.vd, now.e, now.T, now.a1, now.w, ends.held[None].copy(),
+        ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
+        ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(),
+    )  # fmt: skip
+
+
 class Work(NamedTuple):
     """Arrays that a solver works in; kernels.entry.workspace makes them."""
 

@@ -77,7 +77,8 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
 class Grid:
     """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
 
-    nodes: cubic, from node values (positions, velocities); cells: linear, from values at
+    nodes: cubic, from node values (positions, velocities); chords: linear, from node values, across joints as well
+    (depth, which the contact force is integrated over); cells: linear, from values at
     the middle of the cells; held: the same with the values at both ends of the line as
     well (tensions, which the supports know); sides: linear, from node values that may differ on the two
     sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
@@ -100,6 +101,7 @@ class Grid:
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         self.nodes = _sparse(*_cubic(nodes_s, s, a, b), n)
         self.cells = _sparse(*_linear(middles, s, a, b - 1), n - 1)
+        self.chords = _sparse(*_linear(nodes_s, s, np.zeros_like(a), np.full_like(b, n - 1)), n)
         # columns of `held`: start, cells, end; next to an end its value takes part
         start, end = np.where(s < middles[0], 0, a + 1), np.where(s > middles[-1], n, b)
         self.held = _sparse(*_linear(np.concatenate([nodes_s[:1], middles, nodes_s[-1:]]), s, start, end), n + 1)

@@ -10,6 +10,10 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.errors import ComputationError
+from hybrid.kernels.forces import SEABED
+from hybrid.kernels.report import SEABED_ENERGY
+from hybrid.kernels.seabed import stored
+from hybrid.kernels.state import batch_of_one
 from hybrid.model.build import Model, build
 from hybrid.model.resolution import Resolution, wants_errors
 from hybrid.outputs.probes import Observer, output_points
@@ -81,13 +85,17 @@ class StaticCase:
 
 def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
     """All fields of an equilibrium."""
-    ends, shift = model.ends.at(np.inf), None
+    ends, shifts, sea = model.ends.at(np.inf), None, model.sea.values
     if model.follows_error:
         model.sea.at(np.inf)
         correction = Correction(model)
         correction.begin(ends, found.state, at_rest=True, with_friction=found.with_friction)
-        shift = correction.shift(found.state)
-    return observer.values(ends, found.state, found.report, np.zeros(len(POWERS)), shift=shift)
+        shifts = [correction.shift(found.state)]
+    report = found.report.copy()
+    if model.line.bits & SEABED:
+        report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
+    batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
+    return {name: x[0] for name, x in observer.values_of(batch, shifts=shifts).items()}
 
 
 def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:

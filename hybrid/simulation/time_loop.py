@@ -12,6 +12,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.report import BEND, TWIST_NODE
+from hybrid.kernels.state import batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.diagnostics import Diagnostics, Stop
@@ -128,13 +129,17 @@ class TimeLoop:
         model, switching = run.model, run.switching
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
-        ends, work = model.ends.at(run.t), np.array(run.work)
-        ratios = switching.manager.largest_ratios if switching is not None else None
-        shift = run.correction.shift(run.state) if run.correction is not None else None
-        values = self.observer.values(ends, run.state, run.stepper.work.report, work, ratios, shift)
-        self.recorder.save(run.t, values, self.observer.zone_rows)
+        observer, ends, work = self.observer, model.ends.at(run.t), np.array(run.work)
+        batch = batch_of_one(run.t, ends, run.state, run.stepper.work.report, work, model.sea.values)
+        ratios = None
+        if switching is not None and observer.writes_criteria:
+            ratios = switching.manager.largest_ratios(observer.grid.s)[None]
+        shifts = [run.correction.shift(run.state)] if run.correction is not None else None
+        fields = observer.values_of(batch, ratios, shifts)
+        self.recorder.save_batch(batch.t, fields, observer.zone_rows)
         if self.target is None:
             return
+        values = {name: x[0] for name, x in fields.items()}
         diagnostics.follow(model)
         diagnostics.mesh(run.t, run.state)
         diagnostics.rest(run.t, ends, values, run.state)

@@ -70,6 +70,7 @@ def _add(
     if events:
         table = Table(EVENTS, [file[f"events/{f.name}"] for f in EVENTS])
         table.count = len(file["events/t"])
-        table.rows = [(0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan) for event in events]
+        for event in events:
+            table.add_row((0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan))
         table.write()
         table.commit()

@@ -195,6 +195,17 @@ def checked(field: Field, values: np.ndarray, t: float | None) -> np.ndarray:
     return values
 
 
+def unsound(field: Field, values: np.ndarray, times: np.ndarray) -> tuple[int, str]:
+    """How many outputs of a field's values (nb, ...) can be kept, and why the next cannot."""
+    if values.shape != (times.size, *field.shape):
+        found = values.shape[1:] if len(values) == times.size else values.shape
+        return 0, f"field '{field.name}' has shape {found}, expected {field.shape}"
+    if field.nan_ok or values.dtype.kind != "f" or np.isfinite(values).all():
+        return times.size, ""
+    first, *where = np.argwhere(~np.isfinite(values.reshape(times.size, *(field.shape or (1,)))))[0].tolist()
+    return first, f"field '{field.name}' is not finite at t = {times[first]:.9g} s (first at index {tuple(where)})"
+
+
 def fixed_text(text: str, dtype: np.dtype) -> np.ndarray:
     return np.array(cut(text, dtype.itemsize), dtype=dtype)
 

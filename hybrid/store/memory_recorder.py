@@ -16,7 +16,7 @@ class MemoryRecorder:
     def __init__(self) -> None:
         self.times: list[float] = []
         self.events: list[tuple[str, str]] = []  # kind, text
-        self._kept: dict[str, list[Any]] = {}
+        self._kept: dict[str, list[np.ndarray]] = {}  # batches (nb, ...)
 
     @property
     def last(self) -> float:
@@ -25,14 +25,24 @@ class MemoryRecorder:
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t, s.  ResultError when it is not finite."""
-        self.times.append(t)
+        self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
+
+    def save_batch(
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]]
+    ) -> None:
+        """Append outputs at the times (nb,), s, of the fields (nb, ...).  ResultError when one is not finite."""
         for name, value in values.items():
-            array = np.array(value, float)
-            if not np.isfinite(array).all():
-                raise ResultError(f"{name} is not finite at t = {t:.9g} s")
-            self._kept.setdefault(name, []).append(array)
+            finite = np.isfinite(value).reshape(len(times), -1).all(axis=1)
+            if not finite.all():
+                raise ResultError(f"{name} is not finite at t = {times[np.argmin(finite)]:.9g} s")
+        self.times += times.tolist()
+        for name, value in values.items():
+            self._kept.setdefault(name, []).append(np.asarray(value, float))
 
     def log(self, values: Mapping[str, float | int]) -> None:
+        """Steps are not kept."""
+
+    def log_rows(self, rows: np.ndarray) -> None:
         """Steps are not kept."""
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
@@ -52,4 +62,4 @@ class MemoryRecorder:
 
     def __getitem__(self, name: str) -> np.ndarray:
         """All outputs of a quantity, (nt, ...)."""
-        return np.array(self._kept[name])
+        return np.concatenate(self._kept[name])

@@ -1,4 +1,4 @@
-"""A table of a result file: datasets that grow together by whole rows."""
+"""A table of a result file: datasets that grow together by rows."""
 
 from __future__ import annotations
 
@@ -7,21 +7,40 @@ from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5s
 
 from hybrid.store.format import Field, cut
 
 
 class Table:
-    """Datasets that grow together by whole rows; the first is the dimension scale of all."""
+    """Datasets that grow together by rows; the first is the dimension scale of all.
+
+    Rows wait as arrays until they are written through HDF5's own interface: h5py's slices take twice as long.
+    """
 
     def __init__(self, fields: Sequence[Field], datasets: Sequence[h5py.Dataset]) -> None:
         self.fields, self.datasets = tuple(fields), tuple(datasets)
-        self.rows: list[Sequence[Any]] = []  # waiting to be written
+        self._types = [data.id.get_type() for data in datasets]
+        self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
+        self.waiting = 0  # rows in them
         self.count = 0  # written rows
+
+    def add(self, columns: Sequence[np.ndarray]) -> None:
+        """Let rows wait: one array (n, ...) per field, which nobody changes any more."""
+        if self.fields and len(columns[0]):
+            self._blocks.append([np.asarray(x, field.dtype) for field, x in zip(self.fields, columns, strict=True)])
+            self.waiting += len(columns[0])
+
+    def add_row(self, row: Sequence[Any]) -> None:
+        """Let one row of numbers and texts wait."""
+        self.add([
+            np.array([cut(x, int(f.dtype[1:])) if f.dtype.startswith("S") else x], f.dtype)
+            for f, x in zip(self.fields, row, strict=True)
+        ])  # fmt: skip
 
     def write(self) -> None:
         """Write the waiting rows to all datasets but the scale."""
-        for k in range(1, len(self.fields) if self.rows else 0):
+        for k in range(1, len(self.fields) if self.waiting else 0):
             self._write_column(k)
 
     @property
@@ -35,18 +54,16 @@ class Table:
         Flushed by itself: where its numbers cannot be written, HDF5 then stops before its new length, while a flush of
         the whole file goes on with all lengths (rows of zeros in 1 of 40 files of a full disk).
         """
-        if self.rows:
+        if self.waiting:
             self._write_column(0)
             self.datasets[0].flush()
-            self.count += len(self.rows)
-            self.rows = []
+            self.count += self.waiting
+            self._blocks, self.waiting = [], 0
 
     def _write_column(self, k: int) -> None:
-        field, data = self.fields[k], self.datasets[k]
-        values = [row[k] for row in self.rows]
-        if field.dtype.startswith("S"):
-            column = np.array([cut(v, int(field.dtype[1:])) for v in values], dtype=data.dtype)
-        else:
-            column = np.array(values, dtype=field.dtype)
-        data.resize(self.count + len(values), axis=0)
-        data[self.count :] = column
+        parts, data = [block[k] for block in self._blocks], self.datasets[k].id
+        column = np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
+        data.set_extent((self.count + len(column), *column.shape[1:]))
+        there = data.get_space()
+        there.select_hyperslab((self.count, *[0] * (column.ndim - 1)), column.shape)
+        data.write(h5s.create_simple(column.shape), there, column, self._types[k])

@@ -35,11 +35,11 @@ from hybrid.store.format import (
     BLOCK,
     Field,
     check_names,
-    checked,
     create_scales,
     create_table,
     set_status,
     tables_of,
+    unsound,
     write_attributes,
     write_texts,
 )
@@ -170,24 +170,46 @@ class Recorder:
         self.closed = self._broken = False
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
-        """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then.
+        """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
+        self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
 
-        ResultError when a field is missing, unknown, of another shape, or not finite.
+    def save_batch(
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]]
+    ) -> None:
+        """Append outputs at the times (nb,), s, of the fields (nb, ...), with the zones that hold in all of them.
+
+        The arrays are kept until they are written.  ResultError when a field is missing, unknown, of another shape, or
+        not finite; the outputs before the first that is wrong are kept.
         """
-        if not (isfinite(t) and t > self.last):
-            raise ResultError(f"an output at t = {t!r} s cannot follow the one at t = {self.last!r} s")
         if values.keys() != self._names:
             wrong = ", ".join(sorted(values.keys() ^ self._names))
             raise ResultError(f"the recorder was promised other fields; missing or unknown: {wrong}")
-        row = [t, *(checked(f, np.asarray(values[f.name]), t) for f in self._outputs.fields[1:])]
+        late = np.diff(times, prepend=self.last) > 0.0
+        good = int(np.argmin(np.append(late & np.isfinite(times), False)))  # outputs before the first wrong one
+        fields, error = self._outputs.fields[1:], ""
+        if good < len(times):
+            before = times[good - 1] if good else self.last
+            error = f"an output at t = {float(times[good])!r} s cannot follow the one at t = {float(before)!r} s"
+        for field in fields:
+            first, why = unsound(field, values[field.name], times)
+            if first < good:
+                good, error = first, why
+        if good:
+            self._keep(times[:good], [values[field.name][:good] for field in fields], zones)
+        if error:
+            raise ResultError(error)
+
+    def _keep(self, times: np.ndarray, columns: list[np.ndarray], zones: Sequence[tuple[str, float, float]]) -> None:
+        """Let outputs wait, and their zones where they are others than before."""
         now = [(str(kind), float(a), float(b)) for kind, a, b in zones]
         if not all(isfinite(a) and isfinite(b) for _, a, b in now):
-            raise ResultError(f"a zone is not finite at t = {t:.9g} s: {now}")
+            raise ResultError(f"a zone is not finite at t = {times[0]:.9g} s: {now}")
         if now != self._zones:
-            self._zone_rows.rows += [(t, self._outputs.count + len(self._outputs.rows), *zone) for zone in now]
+            for zone in now:
+                self._zone_rows.add_row((times[0], self._outputs.count + self._outputs.waiting, *zone))
             self._zones = now
-        self._outputs.rows.append(row)
-        self.last = float(t)
+        self._outputs.add([times, *columns])
+        self.last = float(times[-1])
 
     @property
     def due(self) -> bool:
@@ -195,13 +217,21 @@ class Recorder:
         return monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
 
     def log(self, values: Mapping[str, float | int]) -> None:
-        """Append a row to the log of the steps; written with the next output or block."""
-        row = [values[name] for name in self._step_names]
-        for k in self._finite_steps:
-            if not isfinite(row[k]):
-                raise ResultError(f"'{self._step_names[k]}' of the step log is not finite: {row}")
-        self._steps.rows += [row] if row else []
-        if len(self._steps.rows) >= BLOCK:  # alone: outputs are written together with their checkpoint
+        """Append a row to the log of the steps; errors as of `log_rows`."""
+        self.log_rows(np.array([[values[name] for name in self._step_names]], float))
+
+    def log_rows(self, rows: np.ndarray) -> None:
+        """Append rows (n, number of step fields) to the log of the steps; written with the next output or block.
+
+        ResultError when one is not finite where it has to be.
+        """
+        finite = np.isfinite(rows[:, self._finite_steps])
+        if not finite.all():
+            i, k = np.argwhere(~finite)[0]
+            name = self._step_names[self._finite_steps[k]]
+            raise ResultError(f"'{name}' of the step log is not finite: {rows[i].tolist()}")
+        self._steps.add(list(rows.T.copy()))
+        if self._steps.waiting >= BLOCK:  # alone: outputs are written together with their checkpoint
             with self._writing():
                 self._write([self._steps])
 
@@ -223,7 +253,7 @@ class Recorder:
             raise ResultError(f"event '{kind}' is not finite: t = {t} s, s = {s_a} ... {s_b} m")
         self._happened[kind] += 1
         if self._happened[kind] <= MOST_OF_A_KIND:
-            self._events.rows.append((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
+            self._events.add_row((t, s_a, s_b, kind, text, criterion, value, threshold, energy))
 
     def _count_left_out(self) -> None:
         """Of events that were too many to write: how many there were."""
@@ -232,7 +262,7 @@ class Recorder:
             if left > 0:
                 text = f"{left} more events '{kind}' are not written, after the first {MOST_OF_A_KIND}"
                 row = (max(self.last, 0.0), 0.0, 0.0, OMITTED, text, kind, float(left), nan, nan)
-                self._events.rows.append(row)
+                self._events.add_row(row)
 
     def flush(self, content: Callable[[], Mapping[str, Any]] | None = None) -> None:
         """Write what is held back, for readers to see; content: makes `program`, `asks`, `resolution` and `state` of a
@@ -240,7 +270,7 @@ class Recorder:
         begin = monotonic()
         packed = b""
         if content is not None:
-            rows = {table.scale: table.count + len(table.rows) for table in self._all}
+            rows = {table.scale: table.count + table.waiting for table in self._all}
             here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
             packed = pack({**here, "happened": self._happened, "zones": self._zones or [], **content()})
         with self._writing():
@@ -263,7 +293,7 @@ class Recorder:
             raise unwritable(self.path, error, f"free some disk space, then `hybrid resume {self.path}`") from error
 
     def _write(self, tables: Sequence[Table], packed: bytes = b"") -> None:
-        waiting = [table for table in tables if table.rows]
+        waiting = [table for table in tables if table.waiting]
         for table in waiting:
             table.write()
         if packed:

@@ -1,0 +1,318 @@
+"""What is known of a batch of states: quantities on nodes, cells and the output grid, each computed once if needed.
+
+Second order everywhere: positions by cubic Hermite interpolation of the nodes (one-sided
+at joints and at point loads, where the tangent may kink), tensions and tangents from the middle of the
+cells, moments and curvatures from the nodes, zone by zone.
+
+Arrays have the node, cell or output point first, then the component, and the nb outputs of the batch last: one numpy
+operation and one product with a sparse matrix (output_grid) serve the batch.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+from scipy.sparse import csr_array
+
+from hybrid.kernels.energies import observe
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
+from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
+from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.touchdown import Touchdown, contact_pressure, penetration, touchdown
+from hybrid.solve.bending_corrector import Shift
+
+
+def cross(a: Floats, b: Floats) -> Floats:
+    """a x b of vectors (n, 3, nb)."""
+    out = np.empty(np.broadcast(a, b).shape)
+    out[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
+    out[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
+    out[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    return out
+
+
+def dot(a: Floats, b: Floats) -> Floats:
+    """a . b of vectors (n, 3, nb)."""
+    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
+
+
+def size(a: Floats) -> Floats:
+    """Length of vectors (n, 3, nb)."""
+    return np.asarray(np.sqrt(dot(a, a)))
+
+
+def last(x: Floats) -> Floats:
+    """A copy with the first axis, the outputs, moved to the end."""
+    return np.ascontiguousarray(np.moveaxis(x, 0, -1))
+
+
+def on_grid(matrix: csr_array, x: Floats) -> Floats:
+    """A matrix of output_grid applied along the first axis."""
+    return np.asarray((matrix @ x.reshape(x.shape[0], -1)).reshape(matrix.shape[0], *x.shape[1:]))
+
+
+def _of_batch(shifts: Sequence[Shift]) -> Shift:
+    """The shifts of all outputs in one, the outputs last; what a line has for good is that of the first."""
+    made = {name: np.stack([getattr(shift, name) for shift in shifts], axis=-1) for name in Shift._fields[:4]}
+    forces = np.stack([shift.resultants for shift in shifts], axis=-1)
+    return shifts[0]._replace(**made, resultants=forces)
+
+
+class Observation:
+    """A batch of states looked at, as computed and (`corrected`) with what leaving bending out shifts it by."""
+
+    def __init__(self, line: Line, sea: Sea, grid: Grid, batch: Batch) -> None:
+        self.line, self.sea, self.grid, self.batch = line, sea, grid, batch
+        self.shift: Shift | None = None
+        self._plain = self  # the observation that this one corrects
+
+    def corrected(self, shifts: Sequence[Shift]) -> Observation:
+        """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
+        other = copy(self)
+        for name in ("r", "v", "e", "T", "length", "d", "tension", "tangent", "moment", "torque", "curvature_twist"):
+            other.__dict__.pop(name, None)
+        other.shift, other._plain = _of_batch(shifts), self
+        return other
+
+    # ---- what was computed --------------------------------------------------------------------
+
+    @cached_property
+    def r(self) -> Floats:
+        """(N+1, 3, nb) m."""
+        r = last(self.batch.r)
+        return r if self.shift is None else r + self.shift.position
+
+    @cached_property
+    def v(self) -> Floats:
+        """(N+1, 3, nb) m/s."""
+        v = last(self.batch.v)
+        return v if self.shift is None else v + self.shift.velocity
+
+    @cached_property
+    def e(self) -> Floats:
+        """(N, 3, nb) m, chords."""
+        e = last(self.batch.e)
+        return e if self.shift is None else e + np.diff(self.shift.position, axis=0)
+
+    @cached_property
+    def T(self) -> Floats:
+        """(N, nb) N."""
+        T = last(self.batch.T)
+        return T if self.shift is None else T + self.shift.tension
+
+    @cached_property
+    def length(self) -> Floats:
+        """(N, nb) m, of the chords."""
+        return size(self.e)
+
+    @cached_property
+    def d(self) -> Floats:
+        """(N, 3, nb) directions of the chords."""
+        return np.asarray(self.e / self.length[:, None])
+
+    @cached_property
+    def _observed(self) -> tuple[Floats, Floats, Floats]:
+        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad and energies (4, nb) J of what was computed."""
+        if self._plain is not self:
+            return self._plain._observed
+        b, line = self.batch, self.line
+        nb, n = b.T.shape
+        M, strain, energy = np.zeros((nb, n + 1, 3)), np.zeros((nb, n + 1, 3)), np.zeros((nb, 4))
+        for i in range(nb):
+            ends = Ends(b.held[i], b.position[i], b.frame[i], b.spin[i], b.force[i], b.moment[i])
+            observe(line, ends, b.e[i], b.v[i], b.a1[i], b.w[i], M[i], strain[i], energy[i])
+        return last(M), last(strain), last(energy)
+
+    # ---- along the line -----------------------------------------------------------------------
+
+    @cached_property
+    def tension(self) -> Floats:
+        """(ns, nb) N: of the cells, and at the ends the pull of what holds them."""
+        ends = []
+        for k, first, second in ((0, 0, 1), (1, -1, -2)):
+            t = 1.5 * self.d[first] - 0.5 * self.d[second] if len(self.d) > 1 else self.d[first]
+            if self.line.element[first] or (self.shift is not None and self.shift.clamped[k]):
+                t = self.batch.frame[:, k, 2::3].T  # a clamp or guide knows the tangent
+            if self._loaded(k):
+                ends.append(self._end_tension(k))
+            else:
+                force = self.reaction(k) if k else -self.reaction(k)
+                ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
+        return on_grid(self.grid.held, np.concatenate([ends[:1], self.T, ends[1:]]))
+
+    @cached_property
+    def tangent(self) -> Floats:
+        """(ns, 3, nb)."""
+        t = on_grid(self.grid.cells, self.d)
+        length = size(t)
+        if length.min() < 1e-9:  # in the very middle of a fold the two sides cancel: take the nearest cell's
+            middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
+            for g, i in np.argwhere(length < 1e-9):
+                t[g, :, i] = self.d[int(np.argmin(np.abs(middles - self.grid.s[g]))), :, i]
+                length[g, i] = 1.0
+        return np.asarray(t / length[:, None])
+
+    @property
+    def theta(self) -> Floats:
+        """(ns, nb) rad, from the z axis."""
+        return np.arccos(np.clip(self.tangent[:, 2], -1, 1))
+
+    @property
+    def phi(self) -> Floats:
+        """(ns, nb) rad, from the x axis."""
+        return np.arctan2(self.tangent[:, 1], self.tangent[:, 0])
+
+    @property
+    def node_moment(self) -> Floats:
+        """(N+1, 3, nb) N m, inertial."""
+        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
+
+    @cached_property
+    def moment(self) -> Floats:
+        """(ns, 3, nb) N m, inertial."""
+        return on_grid(self.grid.sides, self.node_moment[self.grid.side_nodes])
+
+    @cached_property
+    def torque(self) -> Floats:
+        """(ns, nb) N m, about the tangent."""
+        return dot(self.moment, self.tangent)
+
+    @property
+    def bending_moment(self) -> Floats:
+        """(ns, nb) N m."""
+        return size(self.moment - self.torque[:, None] * self.tangent)
+
+    @property
+    def shear(self) -> Floats:
+        """(ns, nb) N."""
+        V = cross(self.d, np.diff(self.node_moment, axis=0)) / self.length[:, None]
+        if self.shift is None:
+            V[self.line.spin == 0] = 0.0
+        return size(on_grid(self.grid.cells, V))
+
+    # ---- curvature and twist ------------------------------------------------------------------
+
+    @cached_property
+    def curvature_twist(self) -> Floats:
+        """(ns, 2, nb) 1/m."""
+        strains = self._plain._strains
+        if self.shift is not None:
+            strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
+        return on_grid(self.grid.sides, strains)
+
+    @cached_property
+    def _strains(self) -> Floats:
+        """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
+        line = self.line
+        cosine, sine = dot(self.d[:-1], self.d[1:]), size(cross(self.d[:-1], self.d[1:]))
+        sharp = np.zeros((line.s.size, self.batch.t.size))
+        sharp[1:-1] = 2.0 * sine / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1, None])
+        out = np.zeros((len(self.grid.side_nodes), 2, self.batch.t.size))
+        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
+            side = out[o : o + b - a + 1]
+            if zone.kind == "rod":
+                self._strains_of_rod(side, a, b)
+                continue
+            side[:, 0] = sharp[a : b + 1]
+            for row, one, two, x, x1, x2 in (
+                (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
+                (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
+            ):
+                if b - a >= 4:
+                    p = (x - x1) / (x2 - x1)
+                    side[row, 0] = np.maximum(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
+                elif b - a >= 2:
+                    side[row, 0] = side[one, 0]
+        return out
+
+    def _strains_of_rod(self, side: Floats, a: int, b: int) -> None:
+        """Curvature and twist (b - a + 1, 2, nb) of a rod from node a to node b."""
+        k = self._observed[1][a : b + 1] / self.line.hn[a : b + 1, None, None]
+        side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
+        for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
+            if not self.line.element[node]:  # a joint or an end without element: strain of the moment that is given
+                side[row] = self._strain_of_moment(node, cell)
+
+    def _strain_of_moment(self, node: int, cell: int) -> Floats:
+        """Curvature and twist (2, nb) at a rod's end that carries the given moment (zero at a joint)."""
+        line = self.line
+        inner = cell + 1 if cell == node else cell
+        if not line.element[inner]:
+            return np.zeros((2, self.batch.t.size))
+        B = (line.kb[inner] * line.hn[inner])[:, None]
+        k0 = (line.k0[inner] / line.hn[inner])[:, None]
+        a1, d, M = self.batch.a1[:, cell].T[None], self.d[cell : cell + 1], self.node_moment[node : node + 1]
+        body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M)])
+        k = k0 + np.divide(body, B, out=np.zeros_like(body), where=B > 0)
+        return np.stack([np.hypot(k[0], k[1]), k[2]])
+
+    def _curvature_of_moment(self, shift: Shift) -> Floats:
+        """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
+        d, moment = self._plain.d, self.node_moment
+        t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
+        t /= np.maximum(size(t), 1e-12)[:, None]
+        bending = size(moment - dot(moment, t)[:, None] * t)
+        side = self.grid.side_nodes
+        EI = shift.stiffness[side][:, None]
+        return np.divide(bending[side], EI, out=self._plain._strains[:, 0].copy(), where=EI > 0.0)
+
+    # ---- at the ends --------------------------------------------------------------------------
+
+    def reaction(self, k: int) -> Floats:
+        """(3, nb) N: force of the support, or of an end body, on the cable at end k; else the force applied there."""
+        b, first, out = self.batch, -k, 2.0 * k - 1.0
+        held = b.held[:, k] != 0
+        force = -b.report[:, FORCE_A + 3 * k : FORCE_A + 3 * k + 3].T
+        if self.shift is not None:
+            force = force - self.shift.resultants[k]
+        if held.all():
+            return np.asarray(force)
+        given = out * self._end_tension(k) * self.d[first] if self._loaded(k) else b.force[:, k].T
+        return np.where(held, force, given)
+
+    def _loaded(self, k: int) -> bool:
+        """Whether there is a point load at end k."""
+        s = self.line.s
+        return any(abs(x - s[-k]) < 1e-9 * s[-1] for x in self.grid.loads)
+
+    def _end_tension(self, k: int) -> Floats:
+        """Tension (nb,) N of the cable at end k, extrapolated from its last cells."""
+        first, second = (0, 1) if k == 0 else (-1, -2)
+        T, h = self.T, self.line.h
+        return T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0]
+
+    # ---- seabed and energies, of what was computed --------------------------------------------
+
+    @cached_property
+    def _depth(self) -> Floats:
+        """(N+1, nb) m, below where contact begins."""
+        return penetration(self.sea, self._plain.r)
+
+    @cached_property
+    def touchdown(self) -> Touchdown:
+        return touchdown(self.line, self._depth, self._plain.r)
+
+    @property
+    def contact(self) -> Floats:
+        """(ns, nb) N/m."""
+        p = on_grid(self.grid.chords, self._depth)
+        return contact_pressure(self.sea, p, on_grid(self.grid.chords, -(self.sea.normal @ self._plain.v)))
+
+    @property
+    def contact_force(self) -> Floats:
+        """(nb,) N, along the normal."""
+        return self.batch.report[:, CONTACT_FORCE]
+
+    @property
+    def energies(self) -> dict[str, Floats]:
+        """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
+        kinetic, bending, torsion, stretch = self._observed[2]
+        r = self._plain.r
+        potential = -(self.line.force.ravel() @ r.reshape(-1, r.shape[-1]))
+        return {
+            "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
+            "contact": self.batch.report[:, SEABED_ENERGY],
+        }  # fmt: skip

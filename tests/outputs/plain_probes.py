@@ -1,0 +1,275 @@
+"""The quantities of one output, point by point and state by state: what outputs.observation is compared with."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from copy import copy
+from functools import cached_property
+
+import numpy as np
+
+from hybrid.kernels.energies import observe
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A
+from hybrid.kernels.seabed import stored
+from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, blank_state
+from hybrid.model.mesh import Zone
+from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.probes import Observer
+from hybrid.outputs.touchdown import Touchdown
+from hybrid.solve.bending_corrector import Shift
+
+cross = np.cross
+
+
+def penetration(sea: Sea, r: Floats) -> Floats:
+    """How deep points (n, 3) lie below where contact begins, m: half an onset above the seabed; negative above that."""
+    return np.asarray(sea.offset + 0.5 * sea.onset - r @ sea.normal)
+
+
+def touchdown(line: Line, sea: Sea, state: State) -> Touchdown:
+    """First and last contact, exact for the chords that the contact force is integrated over."""
+    p = penetration(sea, state.r)
+    a, b = p[:-1], p[1:]
+    touching = np.maximum(a, b) > 0.0
+    if not touching.any():
+        return Touchdown(np.full(2, np.nan), np.full((2, 3), np.nan), 0.0)
+    # the part x0 .. x1 of every touching cell that is in contact
+    change = np.where(b == a, 1.0, b - a)
+    zero = np.clip(np.where(b == a, 0.0, -a / change), 0.0, 1.0)
+    x0 = np.where((a <= 0.0) & touching, zero, 0.0)
+    x1 = np.where((b <= 0.0) & touching, zero, 1.0)
+    first, last = int(touching.argmax()), int(touching.size - 1 - touching[::-1].argmax())
+    edges = np.array([line.s[first] + x0[first] * line.h[first], line.s[last] + x1[last] * line.h[last]])
+    places = np.array(
+        [state.r[c] + x * (state.r[c + 1] - state.r[c]) for c, x in ((first, x0[first]), (last, x1[last]))]
+    )
+    return Touchdown(edges, places, float(np.sum((x1 - x0) * line.h, where=touching)))
+
+
+def contact_pressure(line: Line, sea: Sea, state: State, s: Floats) -> Floats:
+    """Force per length (ns,) N/m of the seabed along its normal, at the points s of the chords."""
+    p = np.interp(s, line.s, penetration(sea, state.r))
+    v = np.interp(s, line.s, -state.v @ sea.normal)
+    o = sea.onset
+    linear = sea.stiffness * (p - 0.5 * o) + sea.damping * v
+    onset = 0.5 * sea.stiffness * p * p / o + sea.damping * v * p / o
+    return np.where(p <= 0.0, 0.0, np.maximum(np.where(p < o, onset, linear), 0.0))
+
+
+class Plain:
+    """One state looked at."""
+
+    def __init__(
+        self, line: Line, sea: Sea, zones: Sequence[Zone], ends: Ends, state: State, grid: Grid, report: Floats
+    ) -> None:
+        self.line, self.sea, self.zones, self.ends = line, sea, zones, ends
+        self.computed, self.grid, self.report = state, grid, report
+        self.state = state
+        self.shift: Shift | None = None
+        self._plain: Plain | None = None  # the view that this one corrects
+
+    def corrected(self, shift: Shift) -> Plain:
+        """The same state with position, tension, curvature and moment corrected; energies and contact stay."""
+        other, state = copy(self), self.computed
+        for name in ("d", "tension", "tangent", "moment", "torque", "curvature_twist", "shear"):
+            other.__dict__.pop(name, None)
+        other.shift, other._plain = shift, self
+        other.state = state._replace(
+            r=state.r + shift.position, v=state.v + shift.velocity, T=state.T + shift.tension,
+            e=state.e + np.diff(shift.position, axis=0),
+        )  # fmt: skip
+        return other
+
+    @cached_property
+    def touchdown(self) -> Touchdown:
+        return touchdown(self.line, self.sea, self.computed)
+
+    @property
+    def stored(self) -> float:
+        return float(stored(self.line, self.sea, self.computed.r))
+
+    @property
+    def contact(self) -> Floats:
+        return contact_pressure(self.line, self.sea, self.computed, self.grid.s)
+
+    @cached_property
+    def d(self) -> Floats:
+        return np.asarray(self.state.e / np.linalg.norm(self.state.e, axis=1)[:, None])
+
+    @cached_property
+    def tension(self) -> Floats:
+        """Tension on the grid: of the cells, and at the ends the pull of what holds them."""
+        d = self.d
+        ends = []
+        for k, first, second in ((0, 0, 1), (1, -1, -2)):
+            t = 1.5 * d[first] - 0.5 * d[second] if len(d) > 1 else d[first]
+            if self.line.element[first] or (
+                self.shift is not None and self.shift.clamped[k]
+            ):  # a clamp or guide knows the tangent
+                t = self.ends.frame[k].reshape(3, 3)[:, 2]
+            force = self.reaction(k) if k else -self.reaction(k)
+            at_end = self.line.s[first]
+            if any(abs(x - at_end) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
+                ends.append(self._end_tension(k))
+            else:
+                ends.append(float(force @ t) / float(np.linalg.norm(t)))
+        return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
+
+    @cached_property
+    def tangent(self) -> Floats:
+        t = self.grid.cells @ self.d
+        size = np.linalg.norm(t, axis=1)
+        # in the very middle of a fold the two sides cancel: take the nearest cell's
+        middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
+        for g in np.flatnonzero(size < 1e-9):
+            t[g] = self.d[int(np.argmin(np.abs(middles - self.grid.s[g])))]
+            size[g] = 1.0
+        return np.asarray(t / size[:, None])
+
+    @cached_property
+    def _observed(self) -> tuple[Floats, Floats, Floats]:
+        if self._plain is not None:
+            return self._plain._observed
+        n, st = self.line.h.size, self.computed
+        M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
+        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
+        return M, strain, energy
+
+    @property
+    def node_moment(self) -> Floats:
+        """(N+1, 3) N m, inertial."""
+        return self._observed[0] if self.shift is None else self._observed[0] + self.shift.moment
+
+    @property
+    def energy(self) -> Floats:
+        """(4,) J: kinetic, bending, torsion, stretch."""
+        return self._observed[2]
+
+    @cached_property
+    def moment(self) -> Floats:
+        return np.asarray(self.grid.sides @ self.node_moment[self.grid.side_nodes])
+
+    @cached_property
+    def torque(self) -> Floats:
+        return np.einsum("ij,ij->i", self.moment, self.tangent)
+
+    @cached_property
+    def _strains(self) -> Floats:
+        """Curvature and twist (n sides, 2), 1/m."""
+        if self._plain is not None:
+            return self._plain._strains
+        line, out = self.line, np.zeros((len(self.grid.side_nodes), 2))
+        d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
+        cosine = np.einsum("ij,ij->i", d[:-1], d[1:])
+        sine = np.linalg.norm(cross(d[:-1], d[1:]), axis=1)
+        sharp = np.zeros(line.s.size)
+        sharp[1:-1] = 2.0 * sine / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1])
+        strain = self._observed[1]
+        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
+            side = out[o : o + b - a + 1]
+            if zone.kind == "rod":
+                k = strain[a : b + 1] / line.hn[a : b + 1, None]
+                side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
+                for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
+                    if not line.element[node]:  # a joint or an end without element: strain of the moment that is given
+                        side[row] = self._strain_of_moment(node, cell)
+            else:
+                side[:, 0] = sharp[a : b + 1]
+                for row, one, two, x, x1, x2 in (
+                    (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
+                    (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
+                ):
+                    if b - a >= 4:
+                        p = (x - x1) / (x2 - x1)
+                        side[row, 0] = max(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
+                    elif b - a >= 2:
+                        side[row, 0] = side[one, 0]
+        return out
+
+    def _strain_of_moment(self, node: int, cell: int) -> tuple[float, float]:
+        """Curvature and twist at a rod's end that carries the given moment (zero at a joint)."""
+        line = self.line
+        inner = cell + 1 if cell == node else cell
+        if not line.element[inner]:
+            return 0.0, 0.0
+        B = line.kb[inner] * line.hn[inner]
+        k0 = line.k0[inner] / line.hn[inner]
+        a1, d = self.state.a1[cell], self.d[cell]
+        body = np.array(
+            [a1 @ self.node_moment[node], cross(d, a1) @ self.node_moment[node], d @ self.node_moment[node]]
+        )
+        k = k0 + np.divide(body, B, out=np.zeros(3), where=B > 0)
+        return float(np.hypot(k[0], k[1])), float(k[2])
+
+    @cached_property
+    def curvature_twist(self) -> Floats:
+        strains = self._strains
+        if self.shift is not None:
+            strains = np.column_stack([self._curvature_of_moment(self.shift), strains[:, 1]])
+        return np.asarray(self.grid.sides @ strains)
+
+    def _curvature_of_moment(self, shift: Shift) -> Floats:
+        """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
+        d, moment = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None], self.node_moment
+        t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
+        t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
+        bending = np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1)
+        side = self.grid.side_nodes
+        EI = shift.stiffness[side]
+        return np.divide(bending[side], EI, out=self._strains[:, 0].copy(), where=EI > 0.0)
+
+    @cached_property
+    def shear(self) -> Floats:
+        Q = np.diff(self.node_moment, axis=0)
+        V = cross(self.d, Q) / np.linalg.norm(self.state.e, axis=1)[:, None]
+        if self.shift is None:
+            V[self.line.spin == 0] = 0.0
+        return np.asarray(np.linalg.norm(self.grid.cells @ V, axis=1))
+
+    def bending_moment(self) -> Floats:
+        return np.asarray(np.linalg.norm(self.moment - self.torque[:, None] * self.tangent, axis=1))
+
+    def reaction(self, k: int) -> Floats:
+        """Force of the support, or of an end body, on the cable at end k; else the force applied there."""
+        if self.ends.held[k]:
+            force = -self.report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
+            return force if self.shift is None else force - self.shift.resultants[k]
+        first, out = (0, -1.0) if k == 0 else (-1, 1.0)
+        if not any(abs(x - self.line.s[first]) < 1e-9 * self.line.s[-1] for x in self.grid.loads):
+            return self.ends.force[k].copy()
+        return np.asarray(out * self._end_tension(k) * self.d[first])
+
+    def _end_tension(self, k: int) -> float:
+        """Tension of the cable at end k, extrapolated from its last cells."""
+        first, second = (0, 1) if k == 0 else (-1, -2)
+        T, h = self.state.T, self.line.h
+        return float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0])
+
+
+def plain_values(observer: Observer, batch: Batch, i: int, shift: Shift | None, corrected: bool) -> dict[str, object]:
+    """What `observer.values_of` should have at output i, but for work, criteria and factors on the errors of the model."""
+    x = batch
+    state = blank_state(x.T.shape[1])._replace(r=x.r[i], v=x.v[i], e=x.e[i], T=x.T[i], a1=x.a1[i], w=x.w[i])
+    ends = Ends(x.held[i], x.position[i], x.frame[i], x.spin[i], x.force[i], x.moment[i])
+    computed = Plain(observer.line, observer.sea, observer.zones, ends, state, observer.grid, x.report[i])
+    shifted = computed.corrected(shift) if shift is not None else computed
+    v = shifted if corrected else computed
+    t = v.tangent
+    out = {
+        "position": v.grid.nodes @ v.state.r, "velocity": v.grid.nodes @ v.state.v, "tension": v.tension,
+        "theta": np.arccos(np.clip(t[:, 2], -1, 1)), "phi": np.arctan2(t[:, 1], t[:, 0]),
+        "curvature": v.curvature_twist[:, 0], "twist": v.curvature_twist[:, 1], "bending_moment": v.bending_moment(),
+        "torque": v.torque, "shear": v.shear, "reaction_start": v.reaction(0), "reaction_end": v.reaction(1),
+        "moment_start": -v.node_moment[0], "moment_end": v.node_moment[-1], "contact_force": v.report[CONTACT_FORCE],
+        "energy/kinetic": v.energy[0], "energy/bending": v.energy[1], "energy/torsion": v.energy[2],
+        "energy/stretch": v.energy[3], "energy/potential": -np.sum(v.line.force * computed.state.r),
+    }  # fmt: skip
+    if np.isfinite(observer.sea.stiffness):
+        down = v.touchdown
+        out |= {"contact": v.contact, "energy/contact": v.stored, "grounded_length": down.grounded}
+        out |= {"touchdown": down.edges, "touchdown_position": down.places}
+    if shift is not None:
+        out["errors/model/tension"] = np.abs(shifted.tension - computed.tension)
+        out["errors/model/bending_moment"] = np.abs(shifted.bending_moment() - computed.bending_moment())
+        out["errors/model/end_force_end"] = np.linalg.norm(shifted.reaction(1) - computed.reaction(1))
+    return out
