@@ -227,8 +227,8 @@ def _text(figure: Figure, y: float, text: str, most: int = 1, va: str = "top", *
         line.set_text(rest)
         while (share := (1.0 - 2.0 * _LEFT) * figure.bbox.width / max(1.0, line.get_window_extent().width)) < 1.0:
             end = min(int(share * end), end - 1)
-            end = end if cut else max(rest.rfind(" ", 0, end + 1), 0) or end  # lines end between words
-            line.set_text(rest[:end].rstrip() + cut)
+            end = max(rest.rfind(" ", 0, end + 1), 0) or end  # lines end between words
+            line.set_text(rest[:end].rstrip(" ,;:" if cut else None) + cut)
         rows, rest = [*rows, line.get_text()], rest[end:].lstrip()
     line.set_text("\n".join(rows))
     return len(rows)

@@ -90,7 +90,7 @@ def shape(
     items += cable(result, view, -1, joints=True)
     for k, point in enumerate(points):
         at = view.project(_place(np.array([point]), result.s, position[-1]))
-        items.append(Marks(*at, "o", face=_colour(k), edge=_colour(k), size=3.0))
+        items.append(Marks(*at, "o", face=_colour(k), edge=_colour(k), size=2.6))
     return framed(result, view, items, _at(result, -1))
 
 
@@ -117,8 +117,8 @@ def cable(result: Result, view: View, output: int, *, joints: bool = False) -> l
         items.append(Line(*view.project(_place(where, s, position)), kind, colour_of(kind), 2.0))
     if "attached" in result:
         bodies = view.project(_place(result["attached"], s, position))
-        items.append(Marks(*bodies, "o", "float, clump, body", BODY, size=8.0))
-    items += [Marks(*view.project(position[[k]]), "s^"[k], ("start", "end")[k]) for k in (0, -1)]
+        items.append(Marks(*bodies, "o", "float, clump, body", BODY, size=10.0))
+    items += [Marks(*view.project(position[[k]]), "s^"[k], ("start", "end")[k], size=6.0) for k in (0, -1)]
     if joints and len(pieces) > 1:
         at = view.project(_place(np.array([where[-1] for _, where in pieces[:-1]]), s, position))
         items.append(Marks(*at, "o", "joint", "#FFFFFF"))

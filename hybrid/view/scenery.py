@@ -107,17 +107,18 @@ def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
         moves = {axis: store.add(places[..., k]) for k, axis in enumerate("xyz")}
         return {"name": name, "symbol": symbol, "colour": colour, "size": size} | moves
 
-    marks = [mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 5)]
+    marks = []  # the ends come last, over a body that they carry
     if "attached" in result and len(s) > 1:
         where = np.clip(result["attached"], s[0], s[-1])  # output points may cover a part of the cable
         places = result.at(s=where, names=["position"])["position"][shown.frames]
-        marks.append(mark("float, clump, body", places, "circle", BODY, 8))
+        marks.append(mark("float, clump, body", places, "circle", BODY, 10))
     if "touchdown_position" in result:
         places, edges = result["touchdown_position"][shown.frames].copy(), result["touchdown"][shown.frames]
         places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
         if np.isfinite(places).any():
             marks.append(mark("touchdown", places, "diamond", BED, 5))
-    return marks
+    ends = mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 4)
+    return [*marks, *ends]
 
 
 def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:

@@ -152,7 +152,8 @@
     if (colour && colour.legend) for (const [name, shade] of colour.legend) legend.append(swatch(name, shade));
     else if (colour) legend.append(ramp(colour.label, colour.scale.map((c) => c[1]), colour.low, colour.high, "", colour.log));
     for (const plane of scene.planes) if (plane.x) legend.append(swatch(plane.text, plane.line));
-    for (const mark of scene.marks.slice(2)) legend.append(swatch(mark.name, mark.colour));
+    for (const mark of scene.marks.slice(0, -2))  // without the ends
+       legend.append(swatch(mark.name, mark.colour));
     legend.append(swatch("first shape", "#b5b5b5"));
   };
   const swatch = (name, colour) => {
