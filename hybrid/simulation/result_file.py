@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
+from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.model.build import Model
 from hybrid.model.sections import allowed_radius, weakest_bending
@@ -62,6 +63,7 @@ def result_recorder(
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, texts=texts, fixed=fixed, outputs=outputs + 1, overwrite=True, before=before,
+        templates=cache_folder().parent,
     )  # fmt: skip
     if model.layout is not None:
         _note_neglected_bending(scene, model, recorder)

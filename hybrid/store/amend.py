@@ -63,12 +63,12 @@ def _add(
     for name, value in attributes.items():
         file.attrs[name] = value
     for field, values in fields:
-        checked(field, values[0], None)
+        checked(field, values[0])
         data = file.create_dataset(field.name, data=values)
         annotate(data, field.unit, field.description, field.frame)
         attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
     if events:
-        table = Table(EVENTS, [file[f"events/{f.name}"] for f in EVENTS])
+        table = Table(file, "events", EVENTS)
         table.count = len(file["events/t"])
         for event in events:
             table.add_row((0.0, 0.0, float(file["s"][-1]), *event, "", nan, nan, nan))

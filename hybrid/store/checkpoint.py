@@ -49,10 +49,14 @@ class Checkpoint(NamedTuple):
     state: Tree
 
 
-def create_slots(file: h5py.File, before: Tree) -> None:
-    """Make room for checkpoints in a new file; before: what was found before the run, {} if nothing."""
+def create_slots(file: h5py.File) -> None:
+    """Make room for checkpoints in a new file."""
     for name in SLOTS:
         file.create_dataset(name, (0,), "u1", maxshape=(None,), chunks=(_CHUNK,)).make_scale(name)
+
+
+def write_before(file: h5py.File, before: Tree | None) -> None:
+    """Keep what was found before the run in a new file; nothing if that is nothing."""
     if before:  # a dataset is a scale of itself: programs look for dimensions
         file.create_dataset(BEFORE, data=np.frombuffer(pack(before), "u1")).make_scale(BEFORE)
 

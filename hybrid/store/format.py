@@ -9,6 +9,7 @@ import platform
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
+from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 
 import h5py
@@ -75,18 +76,30 @@ def tables_of(fields: Sequence[Field], step_fields: Sequence[Field]) -> dict[str
     return {"/": (TIME, *fields), "steps": step_fields, "zones": ZONES, "events": EVENTS}
 
 
-def write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int]) -> None:
-    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
-    file.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
-    file.attrs["version_python"] = platform.python_version()
+@cache
+def versions() -> dict[str, str]:
+    """Versions of Python and of the packages that a result depends on."""
+    found = {"python": platform.python_version()}
     for package in ("hybrid-cable", "numpy", "h5py", "numba"):
         try:
-            file.attrs[f"version_{package}"] = version(package)
+            found[package] = version(package)
         except PackageNotFoundError:  # run from a checkout that was not installed
-            file.attrs[f"version_{package}"] = "unknown"
+            found[package] = "unknown"
+    return found
+
+
+def create_attributes(file: h5py.File) -> None:
+    """Root attributes that are the same in all files of this version; `write_attributes` adds the others."""
+    file.attrs["format"], file.attrs["format_version"] = FORMAT, FORMAT_VERSION
+    for package, number in versions().items():
+        file.attrs[f"version_{package}"] = number
     for name, text, width in (("status", "running", 32), ("message", "", 2048)):
         dtype = h5py.string_dtype("utf-8", width)  # fixed, to be overwritten by `close`
         file.attrs.create(name, fixed_text(text, dtype), dtype=dtype)
+
+
+def write_attributes(file: h5py.File, attributes: Mapping[str, str | float | int]) -> None:
+    file.attrs["created"] = datetime.now(UTC).isoformat(timespec="seconds")
     for name, value in attributes.items():
         if name in file.attrs:
             raise ResultError(f"the attribute '{name}' is written by the recorder itself")
@@ -102,36 +115,38 @@ def write_texts(file: h5py.File, texts: Mapping[str, str]) -> None:
             file.create_dataset(name, data=text, dtype=h5py.string_dtype())
 
 
-def create_scales(
-    file: h5py.File, grid_s: np.ndarray, fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
-) -> None:
-    """The datasets that do not grow: dimension scales first, then the fixed quantities."""
-    if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
-        raise ResultError("the output grid must be increasing finite arc lengths")
-    scales: dict[str, tuple[Field, np.ndarray]] = {
-        "s": (Field("s", "m", "unstretched arc length from the start, of the output grid"), grid_s)
-    }
-    scales |= {f.name: (f, checked(f, np.asarray(v), None)) for f, v in fixed if f.dims == (f.name,)}
-    for field in (*fields, *(f for f, _ in fixed)):
+def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: Sequence[Field]) -> None:
+    """The datasets that do not grow: dimension scales first, then the fixed quantities; `write_fixed` gives values."""
+    grid = Field("s", "m", "unstretched arc length from the start, of the output grid", (points,), ("s",))
+    scales = {"s": grid} | {f.name: f for f in fixed if f.dims == (f.name,)}
+    for field in (*fields, *fixed):
         for dim, size in zip(field.dims, field.shape, strict=True):
             if dim == "xyz":
-                axes = np.array([b"x", b"y", b"z"])
-                scales.setdefault(dim, (Field("xyz", "", "axes of the inertial frame, z up", dtype="S1"), axes))
-            index = Field(dim, "", "index", dtype="int64")
-            known = scales.setdefault(dim, (index, np.arange(size)))[1]
-            if len(known) != size:
-                raise ResultError(f"field '{field.name}' has {size} along {dim}, others have {len(known)}")
-    for name, (field, values) in scales.items():
-        data = file.create_dataset(name, data=values)
+                axes = Field("xyz", "", "axes of the inertial frame, z up", (3,), ("xyz",), dtype="S1")
+                scales.setdefault(dim, axes)
+            known = scales.setdefault(dim, Field(dim, "", "index", (size,), (dim,), dtype="int64"))
+            if known.shape != (size,):
+                raise ResultError(f"field '{field.name}' has {size} along {dim}, others have {known.shape[0]}")
+    for name, field in scales.items():
+        values = np.arange(field.shape[0]) if field.description == "index" else np.zeros(field.shape, field.dtype)
+        data = file.create_dataset(name, data=np.array([b"x", b"y", b"z"]) if name == "xyz" else values)
         annotate(data, field.unit, field.description, field.frame)
         data.make_scale(name)
         data.dims[0].label = name
-    for field, values in fixed:
+    for field in fixed:
         if field.name not in scales:
-            array = checked(field, np.asarray(values, dtype=field.dtype), None)
-            data = file.create_dataset(field.name, data=array)
+            data = file.create_dataset(field.name, data=np.zeros(field.shape, field.dtype))
             annotate(data, field.unit, field.description, field.frame)
             attach(data, field.dims, [file[d] for d in field.dims])
+
+
+def write_fixed(file: h5py.File, grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
+    """The values of what does not grow: the output grid, and quantities that do not depend on time."""
+    if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
+        raise ResultError("the output grid must be increasing finite arc lengths")
+    file["s"][...] = grid_s
+    for field, values in fixed:
+        file[field.name][...] = checked(field, np.asarray(values, dtype=field.dtype))
 
 
 def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int | None) -> None:
@@ -184,14 +199,13 @@ def check_names(
             raise ResultError(f"field '{field.name}' of the step log must be a number, not of shape {field.shape}")
 
 
-def checked(field: Field, values: np.ndarray, t: float | None) -> np.ndarray:
-    """The values, or ResultError when their shape is wrong or one of them is not finite."""
+def checked(field: Field, values: np.ndarray) -> np.ndarray:
+    """The values of a quantity, or ResultError when their shape is wrong or one of them is not finite."""
     if values.shape != field.shape:
         raise ResultError(f"field '{field.name}' has shape {values.shape}, expected {field.shape}")
     if not (field.nan_ok or values.dtype.kind != "f" or np.isfinite(values).all()):
         bad = np.argwhere(~np.isfinite(np.atleast_1d(values)))[0]
-        at = f" at t = {float(t):.9g} s" if t is not None else ""
-        raise ResultError(f"field '{field.name}' is not finite{at} (first at index {tuple(int(k) for k in bad)})")
+        raise ResultError(f"field '{field.name}' is not finite (first at index {tuple(int(k) for k in bad)})")
     return values
 
 

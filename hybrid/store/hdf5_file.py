@@ -138,14 +138,17 @@ def drafted(path: Path) -> Iterator[h5py.File]:
             raise draft.error
 
 
-def created(path: Path, make: Callable[[Path], None]) -> h5py.File:
-    """Make a file beside its place, open it to readers, and move it into place.
+def created(path: Path, make: bytes | Callable[[Path], None]) -> h5py.File:
+    """Make a file of these bytes, or by `make`, beside its place, open it to readers, and move it into place.
 
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
     new = beside(path)
     try:
-        make(new)
+        if isinstance(make, bytes):
+            new.write_bytes(make)
+        else:
+            make(new)
         file = h5py.File(new, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE)
         file.swmr_mode = True
         os.replace(new, path)

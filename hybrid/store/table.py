@@ -7,9 +7,11 @@ from typing import Any
 
 import h5py
 import numpy as np
-from h5py import h5s
+from h5py import h5d, h5s, h5t
 
 from hybrid.store.format import Field, cut
+
+_NUMBERS = {"float64": h5t.NATIVE_DOUBLE, "int64": h5t.NATIVE_INT64}
 
 
 class Table:
@@ -18,9 +20,11 @@ class Table:
     Rows wait as arrays until they are written through HDF5's own interface: h5py's slices take twice as long.
     """
 
-    def __init__(self, fields: Sequence[Field], datasets: Sequence[h5py.Dataset]) -> None:
-        self.fields, self.datasets = tuple(fields), tuple(datasets)
-        self._types = [data.id.get_type() for data in datasets]
+    def __init__(self, file: h5py.File, group: str, fields: Sequence[Field]) -> None:
+        names = [f"{group}/{field.name}".lstrip("/") for field in fields]
+        self.fields, self._datasets = tuple(fields), [h5d.open(file.id, name.encode()) for name in names]
+        self._types = [_NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
+        self.scale = names[0] if names else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
         self.waiting = 0  # rows in them
         self.count = 0  # written rows
@@ -43,11 +47,6 @@ class Table:
         for k in range(1, len(self.fields) if self.waiting else 0):
             self._write_column(k)
 
-    @property
-    def scale(self) -> str:
-        """Name of the first dataset, which says how many rows are complete."""
-        return self.datasets[0].name.lstrip("/")
-
     def commit(self) -> None:
         """Write the scale, which tells readers that the rows are complete.
 
@@ -56,12 +55,12 @@ class Table:
         """
         if self.waiting:
             self._write_column(0)
-            self.datasets[0].flush()
+            self._datasets[0].flush()
             self.count += self.waiting
             self._blocks, self.waiting = [], 0
 
     def _write_column(self, k: int) -> None:
-        parts, data = [block[k] for block in self._blocks], self.datasets[k].id
+        parts, data = [block[k] for block in self._blocks], self._datasets[k]
         column = np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
         data.set_extent((self.count + len(column), *column.shape[1:]))
         there = data.get_space()

@@ -29,24 +29,24 @@ import h5py
 import numpy as np
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_slot
+from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_before, write_slot
 from hybrid.store.copying import copied, names_in
 from hybrid.store.format import (
     BLOCK,
     Field,
     check_names,
-    create_scales,
-    create_table,
     set_status,
     tables_of,
     unsound,
     write_attributes,
+    write_fixed,
     write_texts,
 )
 from hybrid.store.hdf5_file import check_target, created, drafted, give_up, in_memory, unwritable
 from hybrid.store.integrity import sign
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.table import Table
+from hybrid.store.template import template
 
 # Events of a kind that are written, of some 700 bytes each; a run that has more of them goes on, and says how many.
 MOST_OF_A_KIND = 10_000
@@ -68,6 +68,7 @@ class Recorder:
     outputs: the number of outputs if it is known; it only makes small files smaller.
     overwrite: replace an existing result.  Another program's file is never replaced.
     before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
+    templates: folder where templates of files are kept (store.template); None: in this process alone.
     """
 
     def __init__(
@@ -83,32 +84,26 @@ class Recorder:
         outputs: int | None = None,
         overwrite: bool = False,
         before: Tree | None = None,
+        templates: Path | None = None,
     ) -> None:
         check_names(fields, step_fields, fixed)
-        tables = tables_of(fields, step_fields)
-
-        def fill(file: h5py.File) -> None:
-            write_attributes(file, attributes)
-            write_texts(file, texts)
-            create_scales(file, np.asarray(grid_s, dtype=float), fields, fixed)
-            for group, columns in tables.items():
-                create_table(file, group, columns, outputs if group in ("/", "zones") else None)
-            if before is not None:
-                create_slots(file, before)
-
-        def make(new: Path) -> None:
-            with drafted(new) as file:
-                fill(file)
-
         self._memory = target if isinstance(target, io.BytesIO) else None
-        if isinstance(target, io.BytesIO):
-            path, file = None, in_memory()
-            fill(file)
-        else:
-            path = Path(target).expanduser().resolve()
+        path = None if isinstance(target, io.BytesIO) else Path(target).expanduser().resolve()
+        if path is not None:
             check_target(path, overwrite)
-            file = created(path, make)
-        self._write_to(file, path, tables)
+        shape = [field for field, _ in fixed]
+        points, kept = np.size(grid_s), before is not None
+        file = in_memory(template(points, fields, step_fields, shape, outputs, kept, templates))
+        write_attributes(file, attributes)
+        write_texts(file, texts)
+        write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
+        write_before(file, before)
+        if path is not None:
+            file.flush()
+            image = bytes(file.id.get_file_image())
+            file.close()
+            file = created(path, image)
+        self._write_to(file, path, tables_of(fields, step_fields))
 
     @classmethod
     def again(
@@ -139,7 +134,8 @@ class Recorder:
                 copied(source, file, at.rows, {*later, BEFORE, *SLOTS})
                 set_status(file, "running", "")
                 write_texts(file, texts)
-                create_slots(file, before)
+                create_slots(file)
+                write_before(file, before)
                 write_slot([file[name] for name in SLOTS], at.number, pack(at._asdict()))
                 for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
                     del file.attrs[name]
@@ -154,7 +150,7 @@ class Recorder:
 
     def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
         self._file, self.path = file, path
-        self._all = tuple(Table(columns, [file[f"{g}/{f.name}"] for f in columns]) for g, columns in tables.items())
+        self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
         self._outputs, self._steps, self._zone_rows, self._events = self._all
         self._slots = [file[name] for name in SLOTS if name in file]
         fields, step_fields = tables["/"][1:], tables["steps"]
