@@ -149,9 +149,9 @@ def test_only_what_is_asked_for_has_a_bit_and_numbers(asked: hybrid.Scene, bits:
 
 
 @each_scene
-def test_the_ledger_says_what_the_line_does(asked: hybrid.Scene, bits: int) -> None:
+def test_the_contents_say_what_the_line_does(asked: hybrid.Scene, bits: int) -> None:
     plan = hybrid.plan(asked)
-    said = {entry.what: entry for entry in plan.ledger}
+    said = {entry.what: entry for entry in plan.contents}
     for name, (bit, _) in FORCES.items():
         assert said[name].on == bool(bits & bit), name
         assert said[name].why
@@ -264,14 +264,14 @@ PLANE = "computed in a plane (3 unknowns a node)"
 @each_scene
 def test_the_third_dimension_is_there_where_something_leaves_the_plane(asked: hybrid.Scene, bits: int) -> None:
     """All scenes above lie in a plane; with a guess along x and an end load along y none does."""
-    said = {entry.what: entry for entry in hybrid.plan(asked).ledger}
+    said = {entry.what: entry for entry in hybrid.plan(asked).contents}
     assert said[PLANE].on and not said["torsion"].on
     assert hybrid.plan(asked).unknowns == 3 * build(asked).cells + 2
     data = asked.model_dump(exclude_none=True)
     data["initial"] = {"kind": "equilibrium", "guess": "straight", "direction": [1, 0, -1]}
     data["ends"]["end"] = {"kind": "free", "force": [0.0, 0.1, 0.0]}
     plan = hybrid.plan(hybrid.validate_scene(data))
-    said = {entry.what: entry for entry in plan.ledger}
+    said = {entry.what: entry for entry in plan.contents}
     assert not said[PLANE].on and "ends.end.force leaves" in said[PLANE].why
     assert said["torsion"].on == ("rod" in {zone.kind for zone in plan.zones})
     assert plan.unknowns > 3 * build(asked).cells + 2
@@ -286,15 +286,15 @@ def test_a_plane_has_no_spins_no_torque_and_no_push_in_space() -> None:
     assert build(scene(BENDS, "rod", dimension=2)).line.bits == PLANAR
 
 
-def test_the_ledger_names_every_optional_part() -> None:
+def test_the_contents_name_every_optional_part() -> None:
     """On or off, each with who asked or what would ask for it."""
-    said = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "rod")).ledger}
+    said = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "rod")).contents}
     for what in (
         PLANE, "torsion", "zones that move", "bending that differs in two directions", "curvature without load",
         "attachments: 0", "axial compliance", "gravity", "buoyancy", *FORCES,
     ):  # fmt: skip
         assert said[what].why, what
-    moving = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive")).ledger}
+    moving = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive")).contents}
     assert not moving["criteria as fields"].on
-    asked = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive", output={"criteria": True})).ledger}
+    asked = {entry.what: entry for entry in hybrid.plan(scene(BENDS, "adaptive", output={"criteria": True})).contents}
     assert asked["criteria as fields"].on

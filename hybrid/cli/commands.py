@@ -39,7 +39,7 @@ from hybrid.cli.app import (
     words,
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
-from hybrid.cli.plan_tables import ledger_table, plan_lines
+from hybrid.cli.plan_tables import contents_table, plan_lines
 from hybrid.cli.tables import (
     equilibrium_facts,
     equilibrium_table,
@@ -146,7 +146,7 @@ def plan(
     verbose: Annotated[bool, flag("--verbose", "-v", help="All that is on and off, and why.")] = False,
     as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Say what a run would compute and who asked for it; compute nothing."""
+    """Show what a run would compute, and by which keys of the scene; compute nothing."""
     with session(as_json, False) as console:
         asked = load(console, scene, settings)
 
@@ -155,7 +155,7 @@ def plan(
         console.json("plan", **(asdict(made) | {"zones": zones, "cells": sum(made.cells)}))
         console.show(lambda: "\n".join(plan_lines(asked, made)))
         if verbose:
-            console.show(lambda: ledger_table(made))
+            console.show(lambda: contents_table(made))
 
 
 @app.command()

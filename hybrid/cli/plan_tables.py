@@ -1,4 +1,4 @@
-"""What `hybrid plan` prints: a dozen lines, or everything that is on and off and who asked for it."""
+"""What `hybrid plan` prints: a dozen lines, or everything that is on and off, and by which key."""
 
 from __future__ import annotations
 
@@ -25,14 +25,16 @@ SHORT = {
 
 def plan_lines(scene: Scene, plan: Plan) -> list[str]:
     """The plan in at most LINES lines of COLUMNS columns."""
-    on = {entry.what: entry.why for entry in plan.ledger if entry.on}
+    on = {entry.what: entry.why for entry in plan.contents if entry.on}
     sections, attached = scene.cable.sections, len(scene.cable.attachments)
     length = sum(section.length for section in sections)
     line = [f"{length:.6g} m", _count(len(sections), "section")] + ([_count(attached, "attachment")] * bool(attached))
     plane = any(what.startswith("computed in a plane") for what in on)
     asked = on.get("accuracy", "not asked for") + ("" if _has(on, "error figure") else "; no error figure")
     rows = {
-        "implausible": "; ".join(f"{entry.what}: {entry.why}" for entry in plan.ledger if entry.event == "implausible"),
+        "implausible": "; ".join(
+            f"{entry.what}: {entry.why}" for entry in plan.contents if entry.event == "implausible"
+        ),
         "line": ", ".join(line),
         "ends": "; ".join(what.removeprefix("ends.") for what in on if what.startswith("ends.")),
         "model": _model(plan),
@@ -84,23 +86,23 @@ def _time(scene: Scene, plan: Plan) -> str:
     return f"{steps} of {plan.step:.6g} s{short}; about {span(plan.seconds)} of CPU"
 
 
-def ledger_table(plan: Plan) -> Any:
-    """Everything: what is on and who asked for it, what is off and what would switch it on, cells of every zone."""
+def contents_table(plan: Plan) -> Any:
+    """Everything: what is on and by which key, what is off and what would switch it on, cells of every zone."""
     from rich.console import Group
     from rich.table import Table
 
-    ledger = Table.grid(padding=(0, 3, 0, 0))
-    ledger.add_column(no_wrap=True)
-    ledger.add_column(overflow="fold")
-    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would ask for it")):
-        ledger.add_row(what, why, style="bold")
-        for entry in (e for e in plan.ledger if e.on == on):
-            ledger.add_row(entry.what, entry.why, style="" if on else "dim")
-        ledger.add_row()
+    entries = Table.grid(padding=(0, 3, 0, 0))
+    entries.add_column(no_wrap=True)
+    entries.add_column(overflow="fold")
+    for on, what, why in ((True, "on", "asked for by"), (False, "off", "why, or what would switch it on")):
+        entries.add_row(what, why, style="bold")
+        for entry in (e for e in plan.contents if e.on == on):
+            entries.add_row(entry.what, entry.why, style="" if on else "dim")
+        entries.add_row()
     zones = Table.grid(padding=(0, 3, 0, 0))
     zones.add_row("zone", "from", "to", "cells", style="bold")
     moving = plan.base_cells is not None
     for zone, cells in zip(plan.zones, plan.cells, strict=True):
         kind, count = ("adaptive", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
         zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
-    return Group("", ledger, zones)
+    return Group("", entries, zones)

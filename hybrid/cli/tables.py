@@ -152,7 +152,7 @@ def zones_line(facts: dict[str, Any], file: Path) -> str:
 def judged(table: TradeTable, row: Row) -> dict[str, Any]:
     """What the table says of a row."""
     score = table.score(row) if row.is_choice else None
-    return {"score": score, "front": row in table.front(), "recommended": row == table.recommended}
+    return {"score": score, "pareto": row in table.front(), "recommended": row == table.recommended}
 
 
 def trade_table(table: TradeTable) -> Any:

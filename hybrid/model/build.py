@@ -1,7 +1,7 @@
 """From the scene to the plan: the only place where a Scene becomes arrays.
 
 `build(scene)` decides what the scene requires, fills the line's arrays with it and
-keeps a ledger: what is on and who asked for it, what is off.
+lists its contents: what is on and by which key, what is off.
 """
 
 from __future__ import annotations
@@ -16,10 +16,10 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.state import Floats, Line, State, blank_state
+from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.layout import Layout
-from hybrid.model.ledger import Entry, followed, ledger
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
@@ -58,7 +58,7 @@ class Model:
     start: State
     start_shape: str  # what it is, for people
     other_starts: tuple[tuple[str, State], ...]  # for a search of equilibrium that fails from the first
-    ledger: tuple[Entry, ...]
+    contents: tuple[Entry, ...]
     length: float  # m
     tension_scale: float  # N
     slack_floor: float  # N, tension at or below which a catenary cell is slack
@@ -176,7 +176,7 @@ def build(
         line = planar(line, plane)
     return Model(
         line=line, zones=zones, ends=ends, sea=sea, start=start, start_shape=shape_name, other_starts=tuple(others),
-        ledger=ledger(scene, line, zones, flat, corrected), length=float(s[-1]), tension_scale=scale,
+        contents=contents_of(scene, line, zones, flat, corrected), length=float(s[-1]), tension_scale=scale,
         slack_floor=SLACK_FLOOR * slack_scale,
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),

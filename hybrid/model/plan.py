@@ -1,14 +1,15 @@
-"""What would be computed for a scene, said before anything is."""
+"""What would be computed for a scene, without computing it."""
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from math import ceil
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import build
-from hybrid.model.ledger import Entry
+from hybrid.model.contents import Entry
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import first_resolution
 from hybrid.model.run_time import processor_time
@@ -18,9 +19,9 @@ from hybrid.scene.schema import Scene
 
 @dataclass(frozen=True)
 class Plan:
-    """What a scene requires: the ledger, the mesh, the unknowns, and a cost estimate."""
+    """What a scene requires: the contents (what is on and off), the mesh, the unknowns, and a cost estimate."""
 
-    ledger: tuple[Entry, ...]
+    contents: tuple[Entry, ...]
     zones: tuple[Zone, ...]
     cells: tuple[int, ...]  # per zone
     base_cells: int | None  # where zones move: cells if all were catenary; `cells` are those if all were rod
@@ -28,6 +29,12 @@ class Plan:
     steps: int
     step: float  # s, of most steps: the scene's, shortened to fit between outputs
     seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
+
+    @property
+    def ledger(self) -> tuple[Entry, ...]:
+        """Former name of `contents`."""
+        warnings.warn("ledger is now contents", DeprecationWarning, stacklevel=2)
+        return self.contents
 
 
 MOST_OUTPUTS, MOST_STEPS = 1_000_000, 1e12
@@ -111,6 +118,6 @@ def plan(scene: SceneLike) -> Plan:
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
     seconds = processor_time(scene, model, cells, steps, outputs)
     return Plan(
-        model.ledger, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
+        model.contents, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
         seconds,
     )  # fmt: skip

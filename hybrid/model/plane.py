@@ -9,7 +9,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.state import Ends, Floats, Line, State
-from hybrid.model.ledger import Entry
+from hybrid.model.contents import Entry
 from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.schema import Scene
 
@@ -19,7 +19,7 @@ WHAT = "computed in a plane (3 unknowns a node)"
 
 
 def in_plane(scene: Scene, start: State, others: list[tuple[str, State]], ends: Ends) -> tuple[Floats | None, Entry]:
-    """The plane (3, 3) of a scene, rows p, q and normal, or None; and what the ledger says about it.
+    """The plane (3, 3) of a scene, rows p, q and normal, or None; and its entry in the contents of the model.
 
     What a scene does not write down is looked at as well: the shape that it starts from.  Starts in `others` that
     leave the plane are dropped where the scene insists on it, for they lead nowhere.  SceneError: it insists, and its

@@ -17,6 +17,7 @@ from hybrid.scene.base import (
     NonNegativePair,
     Number,
     Positive,
+    Renamed,
     Table,
     Truth,
     Vector,
@@ -93,9 +94,9 @@ class Equilibrium(Table):
         "inertial frame [m]",
     )
 
-    friction: Literal["left_out", "settled"] = Field(
-        default="left_out",
-        description="on a seabed with friction: left_out (the equilibrium without it, where there is one, which is "
+    friction: Annotated[Literal["neglected", "settled"], Renamed({"left_out": "neglected"})] = Field(
+        default="neglected",
+        description="on a seabed with friction: neglected (the equilibrium without it, where there is one, which is "
         "one with it as well), or settled (the line comes to rest from its first shape with friction, and stays near)",
     )
 

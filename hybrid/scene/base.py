@@ -337,6 +337,19 @@ class Kinds:
 
 
 @dataclass(frozen=True)
+class Renamed:
+    """Annotation of a word that was renamed: its former names are read, with a note of what each is called today."""
+
+    now: Mapping[str, str]
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.today, handler(source))
+
+    def today(self, value: Any) -> Any:
+        return self.now.get(value, value) if isinstance(value, str) else value
+
+
+@dataclass(frozen=True)
 class PlainNumber:
     """Annotation of a table for which a bare number may stand: ``2.0`` is ``{key: 2.0}``, for each of the keys."""
 

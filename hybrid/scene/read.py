@@ -19,7 +19,7 @@ from ruamel.yaml import YAML
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import usual_model
-from hybrid.scene.base import Finding, Place, Table, as_written, dotted
+from hybrid.scene.base import Finding, Place, Renamed, Table, as_written, dotted
 from hybrid.scene.checks import contradictions
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.schema import Scene
@@ -31,7 +31,7 @@ LARGEST_SCENE = 4_000_000
 
 
 class RenamedKey(FutureWarning):
-    """A key of a scene that is called otherwise today; what was written under its former name is read all the same."""
+    """A key or a word of a scene that was renamed; its former name is read, and means what it did."""
 
     def __init__(
         self, where: str, old: str, new: str, file: str = "", line: int | None = None, column: int | None = None
@@ -192,13 +192,17 @@ def _warn_renamed(scene: Scene, renamed: list[RenamedKey]) -> Scene:
     return scene
 
 
-def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, str]]:
-    """Paths of the keys of `data` that are called otherwise today, and how; `scene` is what was made of them."""
+def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, str, str]]:
+    """Paths of the keys and words of `data` that were renamed, and both names; `scene` is what was made of them."""
     if isinstance(scene, Table) and isinstance(data, Mapping):
         for key, value in data.items():
             now = scene.former.get(key, key)
             if now != key:
-                yield (*path, key), now
+                yield (*path, key), key, now
+            field = type(scene).model_fields.get(now)
+            for renamed in (x for x in (field.metadata if field else ()) if isinstance(x, Renamed)):
+                if isinstance(value, str) and value in renamed.now:
+                    yield (*path, key), value, renamed.now[value]
             yield from _renamed(value, getattr(scene, now, None), (*path, key))
     elif isinstance(scene, tuple) and isinstance(data, list | tuple):
         for i, (entry, made) in enumerate(zip(data, scene, strict=False)):
@@ -206,11 +210,11 @@ def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, s
 
 
 def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
-    """A note for each renamed key, where it stands first."""
+    """A note for each renamed key or word, where it stands first."""
     notes: dict[tuple[str, str], RenamedKey] = {}
-    for path, now in _renamed(data, scene):
+    for path, old, now in _renamed(data, scene):
         line, column = _find(root, path, at_key=True)[2] or (None, None)
-        notes.setdefault((str(path[-1]), now), RenamedKey(dotted(path), str(path[-1]), now, file, line, column))
+        notes.setdefault((old, now), RenamedKey(dotted(path), old, now, file, line, column))
     return list(notes.values())
 
 

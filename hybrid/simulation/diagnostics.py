@@ -105,8 +105,8 @@ class Diagnostics:
         self._put_in = self._potential = self._alive = 0.0  # J
 
     def begin(self) -> None:
-        """Note what the ledger says of the scene."""
-        for entry in self._model.ledger:
+        """Note what the contents of the model warn of."""
+        for entry in self._model.contents:
             if entry.event:
                 self.events.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
 

@@ -183,7 +183,7 @@ class TradeTable(_Renamed):
         """All rows, a column for every figure, SI units."""
         out = io.StringIO()
         writer = csv.writer(out, lineterminator="\n")
-        writer.writerow([*COLUMNS, "score", "front", "recommended"])
+        writer.writerow([*COLUMNS, "score", "pareto", "recommended"])
         front, best = self.front(), self.recommended
         for row in self.rows:
             figures = [_plain(getattr(row, name)) for name in COLUMNS]

@@ -1,7 +1,7 @@
 """A report of a result: one HTML file that explains itself, works without a network, and moves.
 
 `write_report(result, path)` puts together facts (what to know first), pictures (plotly, drawn in the browser as they
-come into view), events, the energy ledger and the scene.  Numbers and plotly.js are packed with gzip inside the file:
+come into view), events, the energy balance and the scene.  Numbers and plotly.js are packed with gzip inside the file:
 it takes a third of the space, and browsers of 2023 or later unpack it themselves.
 """
 

@@ -355,7 +355,7 @@ def test_rods_that_come_and_go_have_no_rotary_inertia():
         sagging(rotary_inertia=0.01)
     what = sagging(model={"force_rod": [[0, LENGTH]]}, diameter=0.2)
     same(hybrid.run(what), fixed(sagging(rotary_inertia=0, diameter=0.2), "rod", np.linspace(0, LENGTH, 2 * CELLS + 1)))
-    plan = {x.what: x for x in hybrid.plan(what).ledger}
+    plan = {x.what: x for x in hybrid.plan(what).contents}
     assert not plan["rotary inertia"].on and "come and go" in plan["rotary inertia"].why
 
 

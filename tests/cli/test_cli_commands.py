@@ -159,7 +159,7 @@ def test_plan_says_what_is_on_and_computes_nothing(call: Call) -> None:
         ("catenary", 0, 1, 5),
         ("rod", 1, 2, 5),
     ]
-    assert {"what", "on", "why", "event"} == set(plan["ledger"][0])
+    assert {"what", "on", "why", "event"} == set(plan["contents"][0])
 
 
 def test_plan_of_a_scene_without_time(call: Call) -> None:

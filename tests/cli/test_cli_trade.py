@@ -84,7 +84,7 @@ def test_json_has_a_line_for_every_row(call: Call) -> None:
         (r["model"], r["asked"], r["status"]) for r in read
     ]
     (best,) = (r for r in rows if r["recommended"])
-    assert best["score"] <= 1.0 and best["front"]
+    assert best["score"] <= 1.0 and best["pareto"]
     assert lines[-1]["event"] == "done" and lines[-1]["recommended"] == f"{best['model']} {best['asked']}"
     assert [line["what"] for line in lines if line["event"] == "progress"][1] == "rod 3%"
 

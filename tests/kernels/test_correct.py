@@ -341,7 +341,7 @@ def test_nothing_left_out_is_absent_and_says_why(model, bending, why):
     what["model"], what["time"] = model, {"duration": 0.1, "step": 0.02}
     scene = hybrid.validate_scene(what)
     assert not build(scene).follows_error
-    entry = next(x for x in hybrid.plan(scene).ledger if x.what.startswith("model error"))
+    entry = next(x for x in hybrid.plan(scene).contents if x.what.startswith("model error"))
     assert not entry.on and why in entry.why
     assert not [name for name in hybrid.run(scene).names if name.startswith("errors/model")]
 

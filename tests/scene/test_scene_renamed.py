@@ -142,3 +142,14 @@ def test_names_of_a_scene_are_those_of_a_scene() -> None:
 def test_titles_of_the_schema_have_units() -> None:
     seabed = Scene.model_json_schema()["$defs"]["Seabed"]["properties"]
     assert seabed["stiffness"]["title"] == "stiffness (N/m per m)"
+
+
+def test_a_former_word_is_read_and_told(tmp_path: Path) -> None:
+    text = change(OCEAN, "{kind: equilibrium}", "{kind: equilibrium, friction: left_out}")
+    path = tmp_path / "scene.yaml"
+    path.write_text(text)
+    scene, (note,) = read_scene(path)
+    assert scene == parse_scene(change(text, "left_out", "neglected")) and scene.initial.friction == "neglected"
+    assert (note.where, note.old, note.new) == ("initial.friction", "left_out", "neglected") and note.line is not None
+    (wrong,) = complaints(change(text, "left_out", "left"))
+    assert wrong.where == "initial.friction" and "neglected" in wrong.expected and "left_out" not in wrong.expected

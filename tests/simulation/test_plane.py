@@ -42,7 +42,7 @@ def planes(result: hybrid.Result) -> list[str]:
 
 
 def entry(asked: hybrid.Scene) -> Any:
-    return next(x for x in hybrid.plan(asked).ledger if x.what == WHAT)
+    return next(x for x in hybrid.plan(asked).contents if x.what == WHAT)
 
 
 @pytest.mark.parametrize("name", FLAT)

@@ -285,7 +285,7 @@ def test_table_page_and_picture(tmp_path: Path) -> None:
         assert (read["model"], read["asked"], read["status"]) == (kept.model, kept.asked, kept.status)
         assert read["end_force"] == (f"{kept.end_force:.6g}" if kept.end_force is not None else "")
     assert sum(int(read["recommended"]) for read in rows) == 1
-    assert {r.name for r in found.front()} == {f"{r['model']} {r['asked']}" for r in rows if r["front"] == "1"}
+    assert {r.name for r in found.front()} == {f"{r['model']} {r['asked']}" for r in rows if r["pareto"] == "1"}
     page = (tmp_path / "trade.md").read_text()
     for said in (
         "# a line that sags", found.recommendation, "(trade.png)", "| machine | ", "cores", "| versions | hybrid-cable ",

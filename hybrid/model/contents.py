@@ -1,4 +1,4 @@
-"""The ledger of a plan: what a scene switches on and who asked, what is off and what would switch it on."""
+"""The contents of a model: what a scene switches on and by which key, what is off and what would switch it on."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ PLAUSIBLE = (50.0, 25_000.0)
 
 @dataclass(frozen=True)
 class Entry:
-    """A line of the ledger: what, on or off, and who asked (or what would switch it on)."""
+    """A part of a model: what, on or off, and which key asks for it (or would switch it on)."""
 
     what: str
     on: bool
@@ -145,8 +145,10 @@ def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
     return Entry(what, True, why)
 
 
-def ledger(scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False) -> tuple[Entry, ...]:
-    """What is on and who asked for it, what is off and what would switch it on; flat: whether it is in a plane."""
+def contents_of(
+    scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False
+) -> tuple[Entry, ...]:
+    """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
     entries += _parts(scene, "rod" in kinds, flat)
