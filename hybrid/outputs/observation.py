@@ -46,7 +46,7 @@ def size(a: Floats) -> Floats:
 
 def last(x: Floats) -> Floats:
     """A copy with the first axis, the outputs, moved to the end."""
-    return np.ascontiguousarray(np.moveaxis(x, 0, -1))
+    return np.ascontiguousarray(x.transpose(*range(1, x.ndim), 0))
 
 
 def on_grid(matrix: csr_array, x: Floats) -> Floats:
@@ -121,9 +121,11 @@ class Observation:
         b, line = self.batch, self.line
         nb, n = b.T.shape
         M, strain, energy = np.zeros((nb, n + 1, 3)), np.zeros((nb, n + 1, 3)), np.zeros((nb, 4))
-        for i in range(nb):
-            ends = Ends(b.held[i], b.position[i], b.frame[i], b.spin[i], b.force[i], b.moment[i])
-            observe(line, ends, b.e[i], b.v[i], b.a1[i], b.w[i], M[i], strain[i], energy[i])
+        ends = map(Ends, b.held, b.position, b.frame, b.spin, b.force, b.moment)
+        for row in zip(ends, b.e, b.v, b.a1, b.w, M, strain, energy, strict=True):
+            observe(line, *row)
+        if not (line.element.any() or line.spin.any()):  # a catenary has neither
+            M = strain = np.broadcast_to(np.zeros(1), M.shape)
         return last(M), last(strain), last(energy)
 
     # ---- along the line -----------------------------------------------------------------------

@@ -16,10 +16,11 @@ from hybrid.model.mesh import Zone
 
 
 def _sparse(columns: np.ndarray, weights: Floats, width: int) -> csr_array:
-    """One row per output point: its weights (ns, k) at their columns; those at the same column add up."""
+    """One row per output point: its weights (ns, k) at their columns; those at the same column add up, and zeros go."""
     rows, each = weights.shape
     out = csr_array((weights.ravel(), columns.ravel(), each * np.arange(rows + 1)), shape=(rows, width))
     out.sum_duplicates()
+    out.eliminate_zeros()
     return out
 
 

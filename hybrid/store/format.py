@@ -20,7 +20,7 @@ from hybrid.errors import ResultError
 FORMAT = "hybrid-cable"
 FORMAT_VERSION = 1
 # Bytes of a chunk: several outputs together, for quick histories, yet a static result stays small.
-_CHUNK_BYTES = 16384
+_CHUNK_BYTES = 65536
 # Bytes of chunks that HDF5 keeps of every dataset: what is written is not read again, and its own 8 MB of each would
 # make a long run grow by 80 MB in a million steps (tests/harden/test_harden_long.py).
 CACHE = 4 * _CHUNK_BYTES
