@@ -46,7 +46,7 @@ class Complaint:
 
 
 class SceneError(HybridError):
-    """The scene is refused; `complaints` says every reason that was found."""
+    """The scene is refused; `complaints` holds every reason that was found."""
 
     def __init__(self, complaints: list[Complaint], file: str = "") -> None:
         self.complaints = complaints

@@ -1,6 +1,6 @@
 """From what the criteria say to zones: a pure function, so that the same past gives the same plan.
 
-Compiled, because it is asked for a plan several times in a dwell time, mostly to hear that nothing changes.
+Compiled, because it is asked for a plan several times in a dwell time, mostly without any change.
 """
 
 from __future__ import annotations
@@ -67,7 +67,7 @@ def planned(
 
     rod: (n,) what they are; calm_since: (n,) from the last review; leaving: (n,) rods that are being blended out,
     whose curvature rises for that reason alone: they are kept only above BACK; patience: (n,) dwell times that each
-    cell must be calm, 1 if it is not said.
+    cell must be calm, 1 if not given.
     """
     n = rod.size
     calm = calm_since.copy()

@@ -178,7 +178,7 @@ def trade(
     peers: Annotated[bool, flag("--peers", help="Other programs as well, if installed.")] = False,
     settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Compare models and accuracies on a scene: error against CPU time; say which to take."""
+    """Compare models and accuracies on a scene: error against CPU time; recommend one."""
     with session(as_json, quiet) as console:
         asked = load(console, scene, settings)
         folder = output or scene.with_suffix(".trade")
@@ -241,7 +241,7 @@ def _ended(
     console: Console, asked: Scene, result: Result, target: Path, wall: float, computed: float, cold: bool,
     picture: Path | None,
 ) -> None:  # fmt: skip
-    """What there is to say of a run that has come to its end; computed: s of it, just now."""
+    """Print the summary of a run that has ended; computed: s of it, by this command."""
     from hybrid.cli.progress_line import span, speed
 
     if picture:

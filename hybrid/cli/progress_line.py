@@ -96,7 +96,7 @@ class ProgressLine:
         return line
 
     def _choices(self, p: Progress) -> Iterator[list[str]]:
-        """What to say, from much to little.  Numbers keep their width, so that the line does not dance."""
+        """The facts to print, from many to few.  Numbers keep their width, so that the line does not dance."""
         places = min(6, max(0, 3 - floor(log10(p.duration))))
         widest = len(f"{p.duration:.{places}f}")
         time = f"{p.t:{widest}.{places}f} / {p.duration:.8g} s"
@@ -114,7 +114,7 @@ class ProgressLine:
         yield [time]
 
     def _speed(self, p: Progress) -> str:
-        """Speed of this pass, times real time; "..." until something can be said."""
+        """Speed of this pass, times real time; "..." until it is known."""
         wall, t = self._past[0]
         return f"{speed((p.t - t) / (p.wall - wall)):>4}" if p.wall > wall and p.t > t else " ..."
 

@@ -71,7 +71,7 @@ def export(
     result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to export.", show_default=False)],
     output: Annotated[Path | None, output_option("FILE.nc, .csv or .vtkhdf; else RUN.nc ..")] = None,
     format: Annotated[
-        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else what FILE says.")
+        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else by the name of FILE.")
     ] = None,
     at: Annotated[Any, typer.Option(metavar="S,S,..", parser=numbers, help="Only at these arc lengths (m).")] = None,
     names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
 
 def equilibrium_facts(result: Result) -> dict[str, Any]:
-    """What one asks of an equilibrium first; None for what its solver does not say."""
+    """What one asks of an equilibrium first; None for what its solver does not report."""
     s, tension, position = result.s, result.tension[-1], result.position[-1]
     low, high, bottom = int(tension.argmin()), int(tension.argmax()), int(position[:, 2].argmin())
     force = {end: result[f"reaction_{end}"][-1].tolist() for end in ("start", "end") if f"reaction_{end}" in result}
@@ -150,7 +150,7 @@ def zones_line(facts: dict[str, Any], file: Path) -> str:
 
 
 def judged(table: TradeTable, row: Row) -> dict[str, Any]:
-    """What the table says of a row."""
+    """Score of a row, and whether it is on the Pareto front or recommended."""
     score = table.score(row) if row.is_choice else None
     return {"score": score, "pareto": row in table.front(), "recommended": row == table.recommended}
 
@@ -169,11 +169,11 @@ def trade_table(table: TradeTable) -> Any:
     out.add_column("", overflow="fold")
     front, best = table.front(), table.recommended
     for row in table.rows:
-        said = "recommended" if row == best else "Pareto front" if row in front else ""
-        said = ", ".join(x for x in (said, "" if row.status == "done" else row.status, row.cause) if x)
+        remark = "recommended" if row == best else "Pareto front" if row in front else ""
+        remark = ", ".join(x for x in (remark, "" if row.status == "done" else row.status, row.cause) if x)
         style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
         figures = [part(row.position_part), part(row.end_force_part), str(row.cells or ""), str(row.steps or "")]
-        out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", said, style=style)
+        out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", remark, style=style)
     return out
 
 
@@ -186,5 +186,5 @@ def import_notes(made: ImportedDeck) -> list[str]:
         parts += [f"{name}: {note.text_in(made.file)}" for note in scene.notes if note not in shared]
     settings = [f"    {note.line}: {note.text}" for note in made.notes if note.kind == "not needed"]
     if settings:
-        parts += ["not needed, MoorDyn's own settings and outputs (--json says why):", *settings]
+        parts += ["not needed, MoorDyn's own settings and outputs (reasons with --json):", *settings]
     return parts

@@ -5,7 +5,7 @@ csv     histories at some places, for spreadsheets
 vtkhdf  the cable over time, for ParaView (`vtk`)
 fatigue cycles of tension and curvature at the places that matter, and the histories they are counted in (`fatigue`)
 
-Exports read files and nothing else.  A file appears when it is whole, and not at all if it cannot be made so.
+Exports read files and nothing else.  A file appears when it is complete, and not at all if it cannot be made so.
 """
 
 from __future__ import annotations
@@ -62,10 +62,10 @@ def export(
 ) -> Exported:
     """Write a result as netCDF, CSV, VTKHDF or as cycles for fatigue.
 
-    path: the file, whose ending says the format unless `format` does; None: beside the result.  names: fields or
+    path: the file, whose ending gives the format unless `format` does; None: beside the result.  names: fields or
     groups, None for all (of a CSV: tension).  times: from and to, s, None for no limit.  at: arc lengths, m; None for
     all (of a CSV: the ends, and those recorded as `history`).  An older export is replaced if `overwrite`; what is
-    not one never is.  ResultError when something is unknown, a package is missing, or the disk says no.
+    not one never is.  ResultError when something is unknown, a package is missing, or the file cannot be written.
     """
     kind = _format(path, format)
     if path is None and result.file is None:
@@ -179,11 +179,11 @@ def _errors_of(part: Part) -> list[str]:
     """The largest estimated error of every field at every place."""
     lines = []
     for name in part.names:
-        error, said = error_name(part, name)
+        error, which = error_name(part, name)
         if error and part.result.dims(error) == ("t", "s"):
             most, unit = part.array(error).max(axis=0), part.result.units[error]
             lines += [
-                f"  {name} at s = {s:{_PLACE}} m: at most {x:.3g} {unit}, {said}"
+                f"  {name} at s = {s:{_PLACE}} m: at most {x:.3g} {unit}, {which}"
                 for s, x in zip(part.s, most, strict=True)
             ]
     return ["errors:", *lines] if lines else ["errors: not estimated (output: {errors: true} in the scene asks for it)"]
@@ -200,14 +200,14 @@ def _table(what: str, head: Sequence[str], names: Sequence[str], columns: Sequen
 
 
 def _format(path: str | Path | None, format: str | None) -> str:
-    """The format that was asked for, or that the name says."""
+    """The format that was asked for, or that of the name."""
     expected = f"    expected: {', '.join(SUFFIXES)}"
     suffix = Path(path or "").suffix.lower().removeprefix(".")
     if format is None and path is None:
         return "nc"
     if format is None and suffix not in SUFFIXES:
-        said = f"the name '{Path(path or '').name}' says no format"
-        raise ResultError(f"{said}\n{expected}\n    try:      a name such as run.nc, or say the format")
+        wrong = f"the name '{Path(path or '').name}' has no known ending"
+        raise ResultError(f"{wrong}\n{expected}\n    try:      a name such as run.nc, or `--format`")
     if format is None:
         return suffix
     if format not in SUFFIXES:

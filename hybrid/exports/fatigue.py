@@ -29,7 +29,7 @@ _NOISE = 1e-6
 _SLOPE = 3
 # A bend is counted about one axis; if less than this part of its square lies about it, the head of the file warns.
 _PLANAR = 0.95
-# Histories of one interval that show less than this part of the range of an end force are said to lose some of it.
+# Histories of one interval that show less than this part of the range of an end force are reported to lose some of it.
 _KEPT = 0.99
 # A touchdown so near to an end of the cable (part of its length) is that end.
 _AT_END = 0.005
@@ -38,14 +38,14 @@ _UNITS = {"tension": "N", "end_force": "N", "curvature": "1/m"}
 
 
 class Series(NamedTuple):
-    """One quantity at one place: times (n,) s, values (n,), and what the head of the file says of it."""
+    """One quantity at one place: times (n,) s, values (n,), and how the head of the file describes it."""
 
     place: str
     s: float
     quantity: str
     t: np.ndarray
     values: np.ndarray
-    said: str
+    basis: str
 
 
 class Counted(NamedTuple):
@@ -94,7 +94,7 @@ def count(chosen: Part) -> Counted:
     head += ["cycles: rainflow (ASTM E1049), of every value that was recorded; a count of 0.5 is half a cycle"]
     head += [f"left out: {noise} cycles below {_NOISE:g} of the largest of all places, the solver's tolerance"]
     head += ["not done: stress from tension and curvature, which needs the section; S-N curves; damage"]
-    head += [f"{x.quantity} at s = {x.s:.9g} m ({x.place}): {x.said}" for x in series]
+    head += [f"{x.quantity} at s = {x.s:.9g} m ({x.place}): {x.basis}" for x in series]
     return Counted(
         head, names, [np.array(column) for column in columns], ["t (s)", *names_of], histories, notes, len(places)
     )
@@ -153,18 +153,20 @@ def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Seri
     series = []
     end_force = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
     if end_force and f"steps/{end_force}" in result and len(part.array("steps/t")) > 2:
-        said = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
-        series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), said))
+        basis = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
+        series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), basis))
     else:
         tension = result.at(s=s, names=["tension"])["tension"][part.rows]
         series.append(Series(place, s, "tension", times, tension, "at every output" + _error(part, "tension", s)))
     k = int(np.clip(np.searchsorted(part.s, s, side="right") - 1, 0, len(part.s) - 2))
     w = (s - part.s[k]) / (part.s[k + 1] - part.s[k])
     values, share = _about_main_axis((1.0 - w) * bends[:, k : k + 1] + w * bends[:, k + 1 : k + 2])
-    said = "about the axis it bends most about, at every output; zones: " + _kinds(part, s)
+    basis = "about the axis it bends most about, at every output; zones: " + _kinds(part, s)
     if share[0] < _PLANAR:
-        said += f"; only {100 * share[0]:.0f} % of its square: it bends about other axes too, and those are not counted"
-    series.append(Series(place, s, "curvature", times, values[:, 0], said + _error(part, "curvature", s)))
+        basis += (
+            f"; only {100 * share[0]:.0f} % of its square: it bends about other axes too, and those are not counted"
+        )
+    series.append(Series(place, s, "curvature", times, values[:, 0], basis + _error(part, "curvature", s)))
     return series
 
 
@@ -175,11 +177,11 @@ def _kinds(part: Part, s: float) -> str:
 
 
 def _error(part: Part, name: str, s: float) -> str:
-    error, said = error_name(part, name)
+    error, basis = error_name(part, name)
     if not error:
         return "; error not estimated"
     most = part.result.at(s=s, names=[error])[error][part.rows].max()
-    return f"; error at most {most:.3g} {_UNITS[name]}, {said}"
+    return f"; error at most {most:.3g} {_UNITS[name]}, {basis}"
 
 
 def _cycles(values: np.ndarray) -> list[Any]:

@@ -215,7 +215,7 @@ def _spare_start(scene: Scene, r: Floats, rod: np.ndarray, scale: float, sea: Su
 # over which a cable without tension bends under its weight; the most rod cells in a base cell.
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
-GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends that have been seen
+GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier run
 FEWEST_CELLS = 4  # of a zone, however little is asked
 
 

@@ -1,4 +1,4 @@
-"""Why a scene may have no equilibrium, or none that a flexible line can hold: said when the search has failed."""
+"""Why a scene may have no equilibrium, or none that a flexible line can hold: for messages of a failed search."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ HARDLY = 1e-3
 
 
 def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float = 0.0) -> list[str]:
-    """What speaks against an equilibrium of the scene, in sentences; empty when nothing is known.
+    """Reasons against an equilibrium of the scene, in sentences; empty when nothing is known.
 
     rod_ends: whether the line begins and ends with a rod.  flexible: its longest cell of a catenary, m.
     """

@@ -12,7 +12,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Floats
 
 MOST_CELLS = 1_000_000
-DEFAULT_CELLS = 100  # of a line whose scene says nothing: errors of a smooth sag near 1e-4 of the length
+DEFAULT_CELLS = 100  # of a line whose scene gives none: errors of a smooth sag near 1e-4 of the length
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Where cells should be short: a density of cells along the cable, from how it has been seen to bend.
+"""Where cells should be short: a density of cells along the cable, from how it bent in an earlier run.
 
 Cells follow the angle they turn through (a chord that turns by theta misses its arc by theta/8 of its length), rods
 also the length over which bending fades; neighbours differ by little, so that waves pass without an echo.
@@ -56,7 +56,7 @@ class Grading:
 
 
 def grading(s: Floats, curvature: Floats, fade: Floats, disturbed: Sequence[float], length: float) -> Grading:
-    """The density for a curvature (K,) 1/m seen at s (K,) m.
+    """The density for a curvature (K,) 1/m found at s (K,) m.
 
     fade: (K,) m, sqrt(EI/T) where the cable is a rod, zero where it is not; disturbed: m, clamps, joints and point
     loads, beside which a rod bends within that length.

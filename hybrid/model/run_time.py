@@ -14,7 +14,7 @@ from hybrid.scene.schema import JonswapWaves, Scene
 
 # s per cell and Newton iteration, in space and in a plane.
 COST = {"rod": (0.6e-6, 0.25e-6), "catenary": (0.2e-6, 0.15e-6)}
-# What optional forces add to that; those that are not here add nothing that can be seen.
+# What optional forces add to that; those that are not here add nothing measurable.
 MORE = {
     DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
     ROTARY: (0.025e-6, 0.005e-6), SURFACE: (0.035e-6, 0.015e-6), SEABED: (0.03e-6, 0.018e-6),

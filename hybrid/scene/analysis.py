@@ -48,7 +48,7 @@ def _doubled(points: tuple[tuple[float, float, float], ...]) -> list[Finding]:
 class Straight(Table):
     """The cable starts straight and unstretched.
 
-    It starts at a held start, or ends at a held end; without either, `origin` says where s = 0 is.
+    It starts at a held start, or ends at a held end; without either, `origin` is where s = 0 is.
     """
 
     kind: Literal["straight"] = Field(default="straight", description="straight, unstretched")
@@ -160,7 +160,7 @@ def _zone_tag(value: Any) -> str:
 
 
 def _one_zone_kind(value: Any) -> Any:
-    """Every zone says rod, catenary or corrected: the key is its kind and the value its length."""
+    """Every zone has one of the keys rod, catenary, corrected: the key is its kind and the value its length."""
     if isinstance(value, RodZone | CatenaryZone | CorrectedZone):
         return value
     fix = "write {rod: length} or {catenary: length}"
@@ -217,8 +217,8 @@ class ZonesModel(Table):
 
 def _are_stretches(value: Any) -> Any:
     if isinstance(value, list | tuple) and value and all(isinstance(unwrap(x), int | float) for x in value):
-        said = ", ".join(f"{unwrap(x):g}" for x in value)
-        refuse([Finding((), "a list of stretches [s_a, s_b], in m", f"write [[{said}]]")])
+        pair = ", ".join(f"{unwrap(x):g}" for x in value)
+        refuse([Finding((), "a list of stretches [s_a, s_b], in m", f"write [[{pair}]]")])
     return value
 
 

@@ -1,4 +1,4 @@
-"""The base of every table of a scene: what a number is, what a vector is, how nonsense is refused.
+"""The base of every table of a scene: what a number is, what a vector is, how invalid values are refused.
 
 A table refuses on three levels, all of them pydantic errors until `hybrid.scene.read`
 turns them into complaints: a value of the wrong form (here), a value out of bounds
@@ -115,7 +115,7 @@ def as_written(table: Mapping[str, Any], key: str) -> str:
 
 @dataclass(frozen=True)
 class Words:
-    """How messages call a type whose Python annotation says too little."""
+    """How messages call a type whose Python annotation is not enough."""
 
     text: str
 
@@ -287,7 +287,7 @@ def _of_kind(table: type[Table]) -> str:
 class Kinds:
     """Annotation of a union by `kind`: checks the kind first and takes a bare word as ``{kind: word}``.
 
-    `usual` names what to advise someone who says nothing; `implied`: keys that only one kind has, and that kind.
+    `usual` names what to advise where no kind is given; `implied`: keys that only one kind has, and that kind.
     """
 
     names: tuple[str, ...]

@@ -225,7 +225,7 @@ class EndTable(Table):
 
     @property
     def fixes_frame(self) -> bool:
-        """Whether the scene says how the material frame stands at the end, and the end holds it there."""
+        """Whether the scene gives the orientation of the material frame at the end, and the end holds it there."""
         return self.holds_twist and self.held_normal is not None
 
     @property

@@ -48,7 +48,7 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
         return []
     step = time.step if isinstance(time, Time) else None
     found: list[Finding] = []
-    late: list[Finding] = []  # about the time step, which says nothing where the motion itself is wrong
+    late: list[Finding] = []  # about the time step; left out where the motion itself is wrong
     for here, end, motion in _motions(ends):
         record, wrong = None, list(_harmonic_jump(motion))
         if motion.file is not None:
@@ -126,7 +126,7 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
     def stretch(speed: float, acceleration: float) -> float:
         return min(speed / c, acceleration * cable.length / c**2)
 
-    def said(speed: float, acceleration: float) -> str:
+    def limit_text(speed: float, acceleration: float) -> str:
         strain = 100 * stretch(speed, acceleration)
         return f"{limit}; with tension waves of {c:.4g} m/s, this speed asks for {strain:.3g} %"
 
@@ -138,7 +138,7 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
                          math.sqrt(TOP_ACCELERATION * way * cable.length / most) / c)  # fmt: skip
             given = f"{way:.6g} m in {over:g} s: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
             fix = f"over: {_rounded_up(enough)} (s) or more, if way and time are meant so"
-            yield Finding(("travel", "over"), said(speed, acceleration), fix, given)
+            yield Finding(("travel", "over"), limit_text(speed, acceleration), fix, given)
     if record is not None:
         from hybrid.scene.motion_file import fastest_in
 
@@ -146,7 +146,7 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
         if stretch(speed, acceleration) > most:
             given = f"{record.name}: up to {speed:.3g} m/s and {acceleration:.3g} m/s^2"
             fix = f"check the units of the columns (s, m): {most * c:.3g} m/s would be accepted"
-            yield Finding(("file",), said(speed, acceleration), fix, given)
+            yield Finding(("file",), limit_text(speed, acceleration), fix, given)
 
 
 # --- what the time step resolves ---------------------------------------------------------------

@@ -24,7 +24,7 @@ COLUMNS = "t,x,y,z or t,rx,ry,rz or t,x,y,z,rx,ry,rz"
 # Bytes: twelve hours of seven columns at 100 Hz take 400 MB, and 12 samples a period of any sea a hundredth of that.
 LARGEST_FILE = 200_000_000
 
-# The fewest rows from which the velocity at the start can be told.
+# The fewest rows from which the velocity at the start can be estimated.
 FEWEST_ROWS = 6
 
 # Numbers of one or two digits are typed by hand and meant exactly; longer ones are rounded.
@@ -48,7 +48,7 @@ _KINDS = (
 
 
 class RecordRefused(Exception):
-    """The file cannot be used; `finding` says why, relative to the `motion` table."""
+    """The file cannot be used; `finding` is why, relative to the `motion` table."""
 
     def __init__(self, expected: str, fix: str, given: str | None = None) -> None:
         self.finding = Finding(("file",), expected, fix, given)

@@ -2,7 +2,7 @@
 
 A witness is a vector of the scene with its key.  Some must lie in the plane, some are places in it, and some (end
 moments, axes of rotation) must be along its normal.  The plane is that of the vertical, where there is gravity, and of
-the first witness that says more; what does not fit is a finding.
+the first that does not lie in it; what does not fit is a finding.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, Unif
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the
 # digits that people write.  A scene that does not insist is in a plane to round-off or not at all.
 TYPED, EXACT = 1e-6, 1e-9
-# A witness that is this close (a sine) to those before it says nothing about the plane.
+# A witness that is this close (a sine) to those before it does not define the plane.
 SAYS_NOTHING = 1e-3
 UP: Triple = (0.0, 0.0, 1.0)
 
@@ -160,7 +160,7 @@ def _director(end: End, plane: Plane) -> tuple[float, float] | None:
 
 
 def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterator[Witness]:
-    """Everything in a scene that has a direction, what says most first."""
+    """Everything in a scene that has a direction, the most telling first."""
     for name, end in ends.named().items():
         if end.first_position is not None:
             key = "position" if end.held_position is not None else "initial_guess"
@@ -206,7 +206,7 @@ def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
         try:
             record = read_record(motion.file)
         except RecordRefused:
-            return  # whoever follows it says why
+            return  # the check of its source reports it
         for rows, kind in ((record.shift, "along"), (record.rotation, "normal")):
             if rows is not None:
                 for row in (rows - rows[0]).tolist():

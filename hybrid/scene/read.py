@@ -1,4 +1,4 @@
-"""From text to `Scene`; whatever is wrong with it is said all at once, with line and column."""
+"""From text to `Scene`; all that is wrong with it is reported at once, with line and column."""
 
 from __future__ import annotations
 
@@ -73,7 +73,7 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 
 
 def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
-    """Read a scene file as `load_scene` does; with what is to be told of renamed keys, instead of warning of it."""
+    """Read a scene file as `load_scene` does; with the notes on renamed keys, instead of warnings."""
     return _parsed(_text_of(path), str(path), overrides)
 
 

@@ -80,7 +80,7 @@ def explain(root: type[Table], error: Mapping[str, Any]) -> list[tuple[Finding, 
     if kind == "default_factory_not_called":
         return []  # a key that is absent, and whose default waits for a table that is wrong
     if kind == "too_short" and isinstance(value, list | tuple) and len(value) >= context.get("min_length", 0):
-        return []  # pydantic counts only the entries that are right; those that are wrong speak for themselves
+        return []  # pydantic counts only the entries that are right; those that are wrong have complaints of their own
     spot = follow(root, loc)
     if kind in ("extra_forbidden", "invalid_key"):
         return [(_unknown_key(root, path, spot), True)]
@@ -121,8 +121,8 @@ def _elsewhere(root: type[Table], key: str) -> str:
     """Where in the schema a key belongs that is not of its table; empty if nobody knows."""
     every = dict(every_key(root))
     called = [path for path in every if path.rpartition(".")[2] == key]
-    said = [path for path, text in every.items() if len(key) > 1 and speaks_of(text, key)]
-    found = sorted(called or said, key=lambda path: path.count("."))
+    described = [path for path, text in every.items() if len(key) > 1 and speaks_of(text, key)]
+    found = sorted(called or described, key=lambda path: path.count("."))
     return f"did you mean {' or '.join(found[:2])}?" if found else ""
 
 
@@ -134,7 +134,7 @@ def _named(name: str, own: FieldInfo) -> str:
 
 
 def _missing_fix(key: str, words: str, spot: Spot, bare: bool) -> str:
-    """What to add; `bare`: the table says nothing but its kind, and may be that word alone."""
+    """What to add; `bare`: the table has nothing but its kind, and may be that word alone."""
     unit, what = unit_of(spot.field), meaning(spot.field)
     found = list(arms(spot.annotation, spot.metadata))
     kinds = next((mark for _, marks in found for mark in marks if isinstance(mark, Kinds)), None)

@@ -127,7 +127,7 @@ def meaning(of: FieldInfo | None) -> str:
 
 
 def every_key(root: type[Table], path: Place = ()) -> Iterator[tuple[str, str]]:
-    """The path of every key of the schema, lists without their brackets, and what is said of it."""
+    """The path of every key of the schema, lists without their brackets, and its description."""
     for name, own in root.model_fields.items():
         yield dotted((*path, name)), own.description or ""
         for annotation, _ in arms(own.annotation):

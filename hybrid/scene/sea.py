@@ -105,7 +105,7 @@ _KINDS = ("uniform", "profile", "power_law")
 
 
 def _current_form(value: Any) -> str:
-    """Discriminator: a table says its kind, a list of tables is a profile, anything else must be a vector."""
+    """Discriminator: a table has its kind, a list of tables is a profile, anything else must be a vector."""
     value = unwrap(value)
     if isinstance(value, Mapping | Table) or (isinstance(value, str) and value in _KINDS):
         return "<table>"

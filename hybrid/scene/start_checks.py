@@ -103,7 +103,7 @@ def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Find
 
 
 def start_is_known(cable: Cable, ends: Ends, initial: Initial) -> Iterator[Finding]:
-    """An initial shape that says where the cable is, and agrees with its ends."""
+    """An initial shape that gives the place of the cable, and agrees with its ends."""
     if isinstance(initial, Equilibrium):
         yield from _guess(cable, ends, initial)
     elif isinstance(initial, Straight):
@@ -240,7 +240,7 @@ def _polyline_start(cable: Cable, ends: Ends, initial: Points | Equilibrium, all
 
 
 def _bodies_agree(ends: Ends, first: Triple, last: Triple, near: float) -> Iterator[Finding]:
-    """Bodies that are said to be elsewhere than the initial shape has its ends."""
+    """Bodies whose first position is not where the initial shape has its ends."""
     for name, position in ends.initial_guesses().items():
         there = first if name == "start" else last
         if math.dist(position, there) > near:

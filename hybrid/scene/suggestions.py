@@ -1,4 +1,4 @@
-"""What a word that the schema does not know may have meant: by its spelling, or by what descriptions say."""
+"""What a word that the schema does not know may have meant: by its spelling, or by descriptions."""
 
 from __future__ import annotations
 

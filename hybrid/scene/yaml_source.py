@@ -42,7 +42,7 @@ _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
 class Node:
     """A value of the scene: a scalar, ``{key: Node}`` or ``[Node]``, with its place and its text.
 
-    `note` says where it comes from if not from the text.
+    `note` is where it comes from if not from the text.
     """
 
     value: Any
@@ -75,7 +75,7 @@ class Node:
 
 
 class Unreadable(Exception):
-    """The text is not YAML; `complaint` says where and why."""
+    """The text is not YAML; `complaint` has place and reason."""
 
     def __init__(self, complaint: Complaint) -> None:
         self.complaint = complaint

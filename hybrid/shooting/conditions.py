@@ -112,7 +112,7 @@ def end_rows(
 
     Statics holds place and tangent themselves.  Dynamics holds velocity and spin, as GP's fields
     ask, and adds what the last step's error needs to vanish within SETTLE steps.  spin_free: nothing
-    holds the turn of a round rod about itself; its torsion row, which then says nothing new, gives
+    holds the turn of a round rod about itself; its torsion row, which is then redundant, gives
     way to "do not turn" (statics, or a rod without polar inertia).
     """
     target = hold.at(t)

@@ -2,7 +2,7 @@
 
 A *piece* is a stretch of one kind (rod or catenary) in one section, with uniform
 properties and its own nodes; a *joint* is where a rod piece meets a catenary piece.
-Everything is SI, vectors are inertial with z up unless a comment says body axes.
+Everything is SI, vectors are inertial with z up unless a comment states body axes.
 """
 
 from __future__ import annotations
@@ -252,7 +252,7 @@ def _piece(rod: bool, s: Array, section: Section, around: Environment, i: int) -
 
 
 def _inertia(section: Section) -> Array:
-    """Rotary inertia (3,) kg m: a solid round section unless the scene says otherwise, none without a diameter."""
+    """Rotary inertia (3,) kg m: a solid round section unless the scene gives another, none without a diameter."""
     given = section.rotary_inertia
     if given is None:
         transverse = section.mass * (section.diameter or 0.0) ** 2 / 16.0

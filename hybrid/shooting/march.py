@@ -5,7 +5,7 @@ on a catenary.  At a joint catenary -> rod three columns are born (the turn of t
 catenary knows nothing about); at a joint rod -> catenary the three conditions of no moment, GP (18),
 tie three of the constants and the turn is left behind.  Nothing is re-orthogonalised and nothing is
 pivoted along s: the growth of H, exp(L/lambda) on a taut rod with lambda = sqrt(EI/T), costs
-its digits, and `Fit.condition` says how many.
+its digits, `Fit.condition` measures how many.
 """
 
 from __future__ import annotations

@@ -17,7 +17,7 @@ from .rotations import Array
 TOLERANCE = 1.0e-9  # of the correction, scaled: Newton is quadratic, so the error left is its square
 RESIDUAL = 1.0e-9  # of the balance, scaled: proof that what the march delivered does solve the equations
 ITERATIONS = 40  # poor starts of the gallery need at most 15
-TURN_LIMIT = 0.6  # rad per iteration: beyond it the linearised rotation says nothing
+TURN_LIMIT = 0.6  # rad per iteration: beyond it the linearised rotation is not valid
 KEEP = 0.1  # of a catenary's tension survives an iteration: its sign is the tangent's
 DIGITS = 5.0e13  # condition of the far-end fit beyond which fewer than two digits of a correction are left
 DROWNED = 1.0e13  # growth beyond which a failure is put down to the march: a bad start is not worth telling apart

@@ -1,4 +1,4 @@
-"""A film of a result: the cable coloured by zones, seen from one side or two, and the tension along it; mp4 or gif.
+"""A film of a result: the cable coloured by zones, from one side or two, and the tension along it; mp4 or gif.
 
 Every frame is an output of the result, none is made up between them.  What does not move is drawn once.
 """
@@ -161,11 +161,11 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], rate: float) -> None:
             for picture in pictures:
                 process.stdin.write(picture.tobytes())
             process.stdin.close()
-        except BrokenPipeError:  # it has given up, and says why
+        except BrokenPipeError:  # it has stopped, and reports why
             pass
-        said = process.stderr.read().decode("utf-8", "replace").strip()
+        report = process.stderr.read().decode("utf-8", "replace").strip()
     if process.returncode:
-        raise OSError(said or f"{program} left with code {process.returncode}")
+        raise OSError(report or f"{program} left with code {process.returncode}")
 
 
 def _write_gif(path: Path, pictures: Iterator[np.ndarray], rate: float) -> None:

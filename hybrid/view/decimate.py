@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.store.reader import Result
 
 # A screen is some 1000 pixels wide and a play of the motion lasts seconds: more frames, points or places on a curve
-# are not seen.  Frames times points: a page has up to ten such arrays of 4 bytes, and is to stay below 8 MB.
+# are not visible.  Frames times points: a page has up to ten such arrays of 4 bytes, and is to stay below 8 MB.
 MOST_FRAMES, MOST_POINTS, MOST_VALUES = 1000, 251, 80_000
 MOST_ON_CURVE = 1200
 

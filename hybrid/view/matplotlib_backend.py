@@ -92,7 +92,7 @@ def _map(ax: Axes, item: Map) -> Artist:
 
 
 def draw_panel(panel: Panel, ax: Axes, *, legend: bool | None = None) -> dict[str, Artist]:
-    """Draw a panel on any Axes; the images of its maps, by name. legend: inside, other than the panel says."""
+    """Draw a panel on any Axes; the images of its maps, by name. legend: inside, overriding the panel."""
     (left, right), (bottom, top) = panel.limits()
     _style(ax, panel)
     free = panel.aspect is not None  # then the panel shows more than these limits, in one direction

@@ -71,7 +71,7 @@ def shape(
     times: earlier times to show (s), else those whose shapes differ most. view: None for the
     plane of the largest extent, or two letters such as "xz". points: arc lengths to mark (m).
     most: for a small drawing, so many points on a curve, and no area swept.
-    A cable that is nearly straight is drawn with its deflection magnified, and says so.
+    A cable that is nearly straight is drawn with its deflection magnified, as its title states.
     Seabed, water, what is attached and where the cable touches down: as the file has them.
     """
     view = view_named(view) if isinstance(view, str) else view or views_of(result)[0]
@@ -158,13 +158,13 @@ def profiles(
     """One or two quantities of the same unit along s at one output, and their range over all times.
 
     The zones of that output are shaded, and the estimated error is a band, if the file has one. Further names after
-    the first are dashed, and left out where nothing would be seen of them. times: when else to show the first, in grey.
+    the first are dashed, and left out where they would not be visible. times: when else to show the first, in grey.
     """
     names, s = [names] if isinstance(names, str) else list(names), result.s
     items: list[Item] = _zones_behind(result, output)
     drawn = [(name, _scalar(result, name)) for k, name in enumerate(names) if k == 0 or name in result]
     peak = float(np.abs(drawn[0][1]).max())
-    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(ZERO, 5e-3 * peak)]  # what can be seen
+    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(ZERO, 5e-3 * peak)]  # visible
     peak = max(float(np.abs(v).max()) for _, v in drawn)
     factor, unit = prefix("m" if names[0] in AXES else result.units[names[0]], peak)
     bottom: float | None = None
@@ -333,7 +333,7 @@ def energy(result: Result, group: str) -> Panel | None:
     items.append(Line(result.times, total * factor, "all", width=1.6, dash="dash"))
     left = [name for name in parts if name not in seen]
     if left:
-        caption += f" Too small to be seen: {', '.join(left)}."
+        caption += f" Too small to show: {', '.join(left)}."
     y = Axis(group, unit, peak=peak * factor)
     return Panel(group, title, _time(result), y, items, caption=caption, cursor=True)
 

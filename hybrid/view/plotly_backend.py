@@ -105,11 +105,13 @@ def _traces(item: Item, store: Store, unit: str | None) -> list[Spec]:
         case Map():
             values = store.add(item.values)
             low, high = (float(np.log10(x)) if item.log else x for x in (item.low, item.high))
-            told = f"{item.name}: {item.quantity} %{{customdata:.4g}} {item.unit}<br>t = %{{x:.5g}} s, s = %{{y:.4g}} m"
+            template = (
+                f"{item.name}: {item.quantity} %{{customdata:.4g}} {item.unit}<br>t = %{{x:.5g}} s, s = %{{y:.4g}} m"
+            )
             return [
                 {"type": "heatmap", "x": store.add(item.x), "y": store.add(item.y), "z": values | {"log": item.log}}
                 | {"customdata": values, "colorscale": colour_scale(item.shades), "showscale": False, "zmin": low}
-                | {"zmax": high, "hovertemplate": f"{told}<extra>{item.name}</extra>"}
+                | {"zmax": high, "hovertemplate": f"{template}<extra>{item.name}</extra>"}
             ]
     raise TypeError(f"a page does not draw {type(item).__name__}")
 

@@ -150,7 +150,7 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:
     zones = whole_zones(result.zones[-1]) if len(result.times) else []
     facts = []
-    if 0 < len(zones) <= 4:  # more are to be seen, not to be read
+    if 0 < len(zones) <= 4:  # more do not fit a line
         facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in zones))
     if "error_total_position" in result.attributes:
         size = {x: float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force")}

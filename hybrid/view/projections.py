@@ -1,4 +1,4 @@
-"""What to look at: planes that suit a cable's shape, how much of its surroundings, which times and points tell most."""
+"""What to look at: planes that suit a cable's shape, how much of its surroundings, which times and points to show."""
 
 from __future__ import annotations
 
@@ -114,7 +114,7 @@ def bed_in(view: View, result: Result) -> tuple[float, float] | None:
 
 
 def extent_in(view: View, result: Result) -> np.ndarray:
-    """What is to be seen, low and high, across and up (2, 2): the cable, and a seabed or a surface near to it."""
+    """What is in view, low and high, across and up (2, 2): the cable, and a seabed or a surface near to it."""
     across, up = view.project(result.position)
     box = np.array([[across.min(), across.max()], [up.min(), up.max()]])
     room = _NEAR * max(np.ptp(box[1]), 0.3 * np.ptp(box[0]))

@@ -146,7 +146,7 @@ def _show(fact: Fact, several: bool) -> str:
 
 
 def _facts(facts: list[Fact], several: bool) -> str:
-    """The rows of the summary; a warning that stands above is not told twice."""
+    """The rows of the summary; a warning that stands above is not repeated."""
     rows = []
     for fact in facts:
         if fact.key == "warning" and fact.weight == "alarm":
@@ -210,18 +210,18 @@ def _graphs(result: Result, groups: dict[str, list[tuple[int, Panel]]], several:
         out += f'<section id="histories"><h2>Over time</h2>{text}<div class="grid">{figures}</div></section>'
     if groups["ranges"]:
         figures = "".join(_figure(k, f) for k, f in groups["ranges"])
-        said = "Lowest, mean and highest of all outputs, and now: the time of the slider."
+        explained = "Lowest, mean and highest of all outputs, and now: the time of the slider."
         if not several:
             kinds = list(dict.fromkeys(zone.kind for zone in result.zones[0]))
-            said = f"{shares(result)} Shaded as in the picture above: {', '.join(kinds)}." if kinds else ""
-        out += f'<section id="ranges"><h2>Along the cable</h2><p class="quiet">{said}</p>'
+            explained = f"{shares(result)} Shaded as in the picture above: {', '.join(kinds)}." if kinds else ""
+        out += f'<section id="ranges"><h2>Along the cable</h2><p class="quiet">{explained}</p>'
         out += f'<div class="grid">{figures}</div></section>'
     return out
 
 
 def _figure(k: int, panel: Panel) -> str:
-    said = f"<figcaption>{escape(panel.caption)}</figcaption>" if panel.caption else ""
-    return f"<figure><h3>{escape(panel.title[:1].upper() + panel.title[1:])}</h3>{said}{_plot(k, panel)}</figure>"
+    caption = f"<figcaption>{escape(panel.caption)}</figcaption>" if panel.caption else ""
+    return f"<figure><h3>{escape(panel.title[:1].upper() + panel.title[1:])}</h3>{caption}{_plot(k, panel)}</figure>"
 
 
 def _plot(k: int, panel: Panel) -> str:

@@ -18,7 +18,7 @@ from hybrid.view.zones import COLOURS, span_of
 
 # Pale shades would be lost on white: of nine, those from here on.
 _FROM_SHADE = 2
-_THIN = 0.12  # of the largest extent: the least depth of the box around a flat cable, so that planes in it are seen
+_THIN = 0.12  # of the largest extent: the least depth of the box around a flat cable, so that planes in it are visible
 _OPEN = 0.45  # of the largest extent: what a thin direction is opened to where axes are stretched
 _NEAR = 1.0  # of the largest extent: a seabed or a surface farther from the cable is not drawn
 

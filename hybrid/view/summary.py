@@ -1,7 +1,7 @@
-"""What a result says, in numbers and plain sentences: warnings, tension, bends, slack, torque, seabed, errors, status.
+"""A result in numbers and plain sentences: warnings, tension, bends, slack, torque, seabed, errors, status.
 
 `facts_of(result)` reads every output and every grid point, whatever a page later draws of them.  A fact has a weight:
-"alarm", a limit is broken or a warning was given; "note", worth knowing; "plain"; "absent", and then it says why.
+"alarm", a limit is broken or a warning was given; "note", worth knowing; "plain"; "absent", with the reason.
 """
 
 from __future__ import annotations
@@ -114,7 +114,7 @@ def warnings_of(result: Result) -> list[tuple[Event, int]]:
     kinds: dict[str, list[Event]] = {}
     failed = result.message if result.status == "failed" else ""
     for event in sorted(result.events, key=lambda e: (e.kind in NEWS, weight_of_event(e.kind), e.t)):
-        if event.kind in EVENTS_BY_WEIGHT and event.text[:80] not in failed:  # that is told as how it ended
+        if event.kind in EVENTS_BY_WEIGHT and event.text[:80] not in failed:  # that is reported as how it ended
             kinds.setdefault(event.kind, []).append(event)
     return [(found[0], len(found)) for found in kinds.values()]
 
@@ -195,13 +195,13 @@ def _bend(result: Result) -> Fact:
         times = int((np.nan_to_num(ratio) > 1.0).any(axis=1).sum())
         part = f", at {times} of {len(result.times)} outputs" if len(result.times) > 1 else ""
         there = f": {amount(values['radius_there'], 'm')} {place(result, s)}{moment(result, t)}"
-        said = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
-        return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
+        verdict = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
+        return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
     if unknown:
-        said = f"Allowed are {amount(allowed, 'm')}; whether that holds there is not known."
-        return Fact("bend", title, f"{text} {said}", "alarm", values, t, s)
-    said = f"Allowed are {amount(allowed, 'm')}: {short(100 * worst, 3)} % of that bend is used."
-    return Fact("bend", title, f"{text} {said}", "plain", values, t, s)
+        verdict = f"Allowed are {amount(allowed, 'm')}; whether that holds there is not known."
+        return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
+    verdict = f"Allowed are {amount(allowed, 'm')}: {short(100 * worst, 3)} % of that bend is used."
+    return Fact("bend", title, f"{text} {verdict}", "plain", values, t, s)
 
 
 def _bends_left_out(result: Result) -> str:

@@ -92,11 +92,11 @@ def _panel(
         dash, name = ("", model) if ours else ("dot", code)
         items.append(Line(*_places(rows, figure_of), name, colour, 1.2, dash, symbol=symbol, size=4.5))
         for k, row in enumerate(rows if named else ()):
-            said = row.asked if ours else row.asked.split()[0]
+            text = row.asked if ours else row.asked.split()[0]
             side, lift = _BESIDE_A_POINT[(n + 2 * k) % len(_BESIDE_A_POINT)]
             x, y = row.cpu or 0.0, figure_of(row) or 0.0
             across = "left" if side > 0 else "right"
-            items.append(Text(x, y, said, colour, (side, lift), across, "baseline", SMALL - 1.0))
+            items.append(Text(x, y, text, colour, (side, lift), across, "baseline", SMALL - 1.0))
     front = [row for row in table.front() if figure_of(row)]
     best = [row for row in front if row == table.recommended]
     for chosen, symbol, name, face, size in (

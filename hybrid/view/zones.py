@@ -249,7 +249,7 @@ def _thinned(result: Result, frames: np.ndarray, points: np.ndarray) -> Any:
 
 
 def _touchdown(result: Result) -> list[Item]:
-    """Where contact begins and ends; a gap while there is none, a dot where it is seen at one output only."""
+    """Where contact begins and ends; a gap while there is none, a dot where it is there at one output only."""
     items: list[Item] = []
     for k in free_edges(result):
         s = result["touchdown"][:, k]
@@ -309,7 +309,7 @@ def _events(events: Sequence[Event]) -> list[Item]:
 
 
 def _event_lines(event: Event) -> list[str]:
-    """What an event says of itself, line by line."""
+    """An event in words, line by line."""
     where = f"s = {event.s_a:.4g} m" if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m"
     energy = [] if event.energy is None else [f"energy put in: {event.energy:.3g} J"]
     return [event.kind, f"t = {event.t:.5g} s, {where}", *wrap(event.text, _WIDE)[:12], *energy]

@@ -435,7 +435,7 @@ def test_the_command_in_json_and_quietly(result: Result, tmp_path: Path, capsys:
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ({"path": "run.h5"}, "the name 'run.h5' says no format\n    expected: nc, csv, vtkhdf, fatigue"),
+        ({"path": "run.h5"}, "the name 'run.h5' has no known ending\n    expected: nc, csv, vtkhdf, fatigue"),
         ({"path": "x.nc", "format": "csv"}, "the format is csv, but the name ends with .nc"),
         ({"path": "x.nc", "format": "fatigue"}, "the format is fatigue, but the name ends with .nc"),
         ({"format": "xlsx"}, "there is no format 'xlsx'"),

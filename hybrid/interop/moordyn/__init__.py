@@ -8,7 +8,7 @@
     scenes   the scene of a cable
     notes    what could not be carried over as it stands
 
-docs/import.md says what becomes of what.
+docs/import.md lists what becomes of each part.
 """
 
 from __future__ import annotations

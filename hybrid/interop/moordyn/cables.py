@@ -23,8 +23,8 @@ _MOTION = "give ends.{end}.motion: harmonics, or a file with t,x,y,z"
 class End:
     """An end of a cable: held at a place, and in the direction of a rod, or loose with what is on its point.
 
-    line: of the deck, that says so.  along: the direction of a rod that holds it, into the rod; None if nothing does.
-    point: of a loose end.  lost: the kind and the words of the note that says why no scene can hold it so.
+    line: of the deck, for messages.  along: the direction of a rod that holds it, into the rod; None if nothing does.
+    point: of a loose end.  lost: the kind and the words of the note on why no scene can hold it so.
     """
 
     place: Triple

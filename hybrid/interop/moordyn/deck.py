@@ -59,7 +59,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body; angles in degrees, as MoorDyn takes them whatever the row of units says."""
+    """A rigid body; angles in degrees, as MoorDyn takes them whatever the row of units."""
 
     id: int
     row: Row
@@ -95,7 +95,7 @@ class Line:
 
 @dataclass
 class Deck:
-    """What a deck says."""
+    """The contents of a deck."""
 
     file: str
     types: dict[str, LineType]

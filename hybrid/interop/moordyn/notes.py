@@ -1,4 +1,4 @@
-"""What is said of a deck beside the scenes made of it."""
+"""Notes on a deck beside the scenes made of it."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from hybrid.interop.moordyn.rows import Row
 
 # Kinds of notes, the weightiest first.
 LEFT_OUT = "left out"  # it acts in MoorDyn, and not in the scene
-TAKEN = "taken as"  # it acts in the scene in another way than the deck says
-DIFFERS = "differs"  # the programs differ whatever the deck says
+TAKEN = "taken as"  # it acts in the scene in another way than in the deck
+DIFFERS = "differs"  # the programs differ whatever the deck gives
 NOT_NEEDED = "not needed"  # a setting of MoorDyn's own method
 KINDS = (LEFT_OUT, TAKEN, DIFFERS, NOT_NEEDED)
 

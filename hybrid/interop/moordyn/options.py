@@ -1,4 +1,4 @@
-"""OPTIONS of a deck: what acts on the lines is read, the rest is told apart."""
+"""OPTIONS of a deck: what acts on the lines is read, the rest is sorted by what it concerns."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import Row, Source, number
 from hybrid.scene.suggestions import nearest
 
-# What MoorDyn takes where a deck says nothing: measured with MoorDyn 2.7 (bench/test_moordyn_measured.py).
+# What MoorDyn takes where a deck gives nothing: measured with MoorDyn 2.7 (bench/test_moordyn_measured.py).
 GRAVITY, DENSITY, BED_STIFFNESS, BED_DAMPING = 9.80665, 1025.0, 3.0e6, 3.0e5
 
 # Numbers that are read, by the names that versions of MoorDyn know, in lower case; and what each must be at least.
@@ -24,12 +24,12 @@ _READ: dict[str, tuple[str, ...]] = {
 }
 _FIELD = {name: field for field, names in _READ.items() for name in names}
 
-_STEPS = ("a setting of MoorDyn's time steps", "time.step, or accuracy, says how finely hybrid steps")
+_STEPS = ("a setting of MoorDyn's time steps", "time.step, or accuracy, sets how finely hybrid steps")
 _REST = (
     "a setting of MoorDyn's search for the rest; hybrid solves for it (initial: equilibrium)",
     "hybrid static SCENE.yaml shows it",
 )
-_OUTPUT = ("a setting of MoorDyn's own output", "output.every says how often results are kept")
+_OUTPUT = ("a setting of MoorDyn's own output", "output.every sets how often results are kept")
 _SLIDING = ("it blurs MoorDyn's friction; hybrid's holds and slides without it", "")
 _UNUSED: dict[str, tuple[str, str]] = (
     dict.fromkeys(("dtm", "dt", "cfl", "tscheme", "inertialf", "inertialf_rampt"), _STEPS)
@@ -40,7 +40,7 @@ _UNUSED: dict[str, tuple[str, str]] = (
     | dict.fromkeys(("dtwave", "unifycurrentgrid", "wavekin_rampt"), ("a setting of MoorDyn's grid of waves", ""))
 )
 
-# What acts, and has another form in a scene; a value of 0 says that there is none.
+# What acts, and has another form in a scene; a value of 0 means none.
 _ELSEWHERE: dict[str, tuple[str, str]] = {
     "wavekin": ("waves of MoorDyn come from files or from the calling program", "give environment.fluid.waves"),
     "currents": ("currents of MoorDyn come from files", "give environment.fluid.current, a list of {z, velocity}"),
@@ -55,7 +55,7 @@ _NAMES = (*_FIELD, *_UNUSED, *_ELSEWHERE)
 
 @dataclass
 class Options:
-    """What surrounds the lines; None where the deck says nothing.  rows: where each was said."""
+    """What surrounds the lines; None where the deck gives nothing.  rows: where each was given."""
 
     rows: dict[str, Row]
     gravity: float = GRAVITY

@@ -36,7 +36,7 @@ _SECTIONS = {title: name for name, titles in TITLES.items() for title in titles}
 _ENDS = ("", "NEED THIS LINE", "END")
 _TABLES = tuple(name for name in TITLES if name not in ("options", "outputs"))
 _NUMBER = re.compile(r"[+-]?(\d+\.?\d*|\.\d+)([eEdD][+-]?\d+)?")
-# MoorDyn 1 of OpenFAST says before a table how many rows it has: "3  NLines  - number of lines".
+# MoorDyn 1 of OpenFAST writes the number of rows before a table: "3  NLines  - number of lines".
 _COUNT = re.compile(r"\s*\d+\s+N(types|connects|conns|points|lines)\b", re.IGNORECASE)
 SHOWN = 70  # characters of a row that a complaint or a note shows
 # No quantity of a cable in SI units is larger, and none that must not vanish is smaller than its inverse; squares of
@@ -192,7 +192,7 @@ def _uncommented(row: Row) -> Row:
 
 
 def number(cell: str) -> float | None:
-    """The finite number that a cell says, Fortran's 1.0D+8 included; None if it says none."""
+    """The finite number in a cell, Fortran's 1.0D+8 included; None if there is none."""
     if not _NUMBER.fullmatch(cell) or not cell.isascii():
         return None
     value = float(cell.lower().replace("d", "e"))
@@ -221,11 +221,11 @@ def simple(name: str) -> str:
 def check_names(source: Source, section: str, columns: Sequence[tuple[str, ...]], least: int) -> None:
     """Complain of columns named otherwise than MoorDyn reads them; by place, whatever their names.
 
-    columns: the names that are usual for each place, in `simple` form, the first to be told; `least` must be there.
+    columns: the names that are usual for each place, in `simple` form, the first for messages; `least` must be there.
     """
     names = source.sections[section].names
     if names is None or not least <= len(names.cells) <= len(columns):
-        return  # names of several words, or a row of another kind: nothing can be said
+        return  # names of several words, or a row of another kind: nothing can be checked
     where = {name: i for i, usual in enumerate(columns) for name in usual}
     for i, cell in enumerate(names.cells):
         j = where.get(simple(cell))

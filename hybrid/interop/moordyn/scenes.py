@@ -45,7 +45,7 @@ class ImportedScene:
 
 
 def scene_of(deck: Deck, cable: Cable) -> ImportedScene:
-    """SceneError, in lines of the deck, if what it says makes no scene."""
+    """SceneError, in lines of the deck, if it makes no scene."""
     made = _Maker(deck, cable)
     text = made.text()
     try:
@@ -85,7 +85,7 @@ class _Maker:
             "initial: equilibrium",
             *self._model(bends),
             *self._mesh(),
-            "# A deck says neither how ends move nor for how long: add ends.*.motion and, for motion,",
+            "# A deck gives neither the motion of the ends nor the duration: add ends.*.motion and, for motion,",
             "# time: {duration: 60}",
         ]
         self._differences(bends)
@@ -100,8 +100,8 @@ class _Maker:
             f"  gravity: {_number(options.gravity)}{self._origin('gravity', 'default of MoorDyn')}",
         ]
         if self.wet:
-            said = self._origin("density", "default of MoorDyn")
-            parts.append(f"  fluid: {{density: {_number(options.density)}, surface: 0.0}}{said}")
+            origin = self._origin("density", "default of MoorDyn")
+            parts.append(f"  fluid: {{density: {_number(options.density)}, surface: 0.0}}{origin}")
         bed = self._bed()
         return parts + ([bed] if bed else [])
 
@@ -215,7 +215,7 @@ class _Maker:
         return parts
 
     def _held(self, end: End, bends: bool) -> tuple[dict[str, Any], int]:
-        """The end as a table, and the line of the deck that says where it is."""
+        """The end as a table, and the line of the deck that gives its place."""
         line = end.line
         if end.point is None:
             if end.along is not None and bends:
@@ -244,8 +244,8 @@ class _Maker:
     def _mesh(self) -> list[str]:
         counts = [line.segments for line, _ in self.cable.lines]
         cells = [length / n for length, n in zip(self.lengths, counts, strict=True)]
-        said = _lines([line.row.line for line, _ in self.cable.lines])
-        why = "  # NumSegs; leave mesh out and cells are placed where the cable bends" + said.replace("  #", ";")
+        origin = _lines([line.row.line for line, _ in self.cable.lines])
+        why = "  # NumSegs; leave mesh out and cells are placed where the cable bends" + origin.replace("  #", ";")
         if sum(counts) == 1:
             row = self.cable.lines[0][0].row
             self.notes.append(note(TAKEN, row, "one segment is no mesh; the scene has two cells"))
@@ -265,7 +265,7 @@ class _Maker:
 
     def _differences(self, bends: Sequence[bool]) -> None:
         """What the programs do differently with this cable."""
-        said = [
+        found = [
             (
                 "MoorDyn lumps mass at nodes and takes segments as straight springs; hybrid's cells converge to the "
                 "continuous cable, and MoorDyn with more segments to the same",
@@ -274,21 +274,21 @@ class _Maker:
         ]
         if not all(bends):
             why = "without EI the cable is a catenary, which stops where tension vanishes; MoorDyn's goes on, crumpled"
-            said.append((why, "if it does, give bending_stiffness (small for a chain), and leave model out"))
+            found.append((why, "if it does, give bending_stiffness (small for a chain), and leave model out"))
         if any(bends):
             why = "MoorDyn has no torsion; hybrid's rods have GJ = EI/1.3 where torsional_stiffness is left out"
-            said.append((why, "with both ends free to turn it does nothing"))
+            found.append((why, "with both ends free to turn it does nothing"))
         if any(kind.ba for kind in self.types) and any(bends):
             why = "MoorDyn damps stretch (BA); damping.stiffness of hybrid damps bending and twist by the same time"
-            said.append((why, ""))
+            found.append((why, ""))
         if self.options.bed_stiffness and self.options.bed_damping:
             why = "MoorDyn's bed damps on the way up as well and can hold a line down; hybrid's never pulls"
-            said.append((why, ""))
+            found.append((why, ""))
         friction = self.options.friction or self.options.friction_along or self.options.friction_across
         if friction:
             why = "MoorDyn's friction fades with the speed and holds nothing at rest; hybrid's holds"
-            said.append((why, ""))
-        self.notes += [Note(DIFFERS, None, "", why, instead) for why, instead in said]
+            found.append((why, ""))
+        self.notes += [Note(DIFFERS, None, "", why, instead) for why, instead in found]
 
     def _origin(self, key: str, otherwise: str) -> str:
         row = self.options.rows.get(key)

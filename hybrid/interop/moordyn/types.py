@@ -61,7 +61,7 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
     ea, trouble, instead = _stiffness(source, row, row.cells[3], notes)
     ba = _damping(source, row, row.cells[4], notes)
     if old and ba > 0.0:
-        why = "BA is taken in N s, as MoorDyn 2 does, whatever the row of units says"
+        why = "BA is taken in N s, as MoorDyn 2 does, whatever the row of units"
         notes.append(note(TAKEN, row, why, "if it is in Pa s, multiply damping.stiffness by the area of the line"))
     rest = row.cells[5:]
     ei = 0.0
