@@ -80,6 +80,22 @@ In scipy: `Rotation.from_euler("xyz", [roll, pitch, yaw], degrees=True)`.
 Columns rx, ry, rz of a motion file are something else: a rotation vector, whose direction is the axis and whose length
 the angle, in degrees.
 
+## Turns of an end
+
+The rotation of an end is a path, not a first and a last frame: harmonics and files may turn it any number of times.
+Automatic steps are so short that no end turns by more than a radian in one (two in runs to compare with), fixed ones
+are cut to that, with an event, so no step or output interval loses a turn.  A rotation vector of a file may be longer
+than 360 degrees and must not jump back by a turn: `rx: 720` is two turns about x.
+
+In statics and at the start of a run, `turns: 27` at a clamped end, or a guided one with `normal`, twists it about its
+tangent by 27 turns against the other end, right-handed, from the twist of less than half a turn that joins the two
+`normal` in the initial shape; fractions count, and -27 turns it the other way.
+The rod is wound evenly before its equilibrium is sought, and what is found must have this twist to within half a turn;
+else the computation stops (a slack cable that forms loops, too few cells).
+The torque of a straight rod of length L is GJ 2π turns / L.
+A catenary zone between the ends transmits no torque: the turns have no effect then, and an event says so.
+Cells that are left to the program are short enough for the twist that `turns` and motions prescribe.
+
 ## Air and wind
 
 A line in air is a line in a fluid of density 1.225 whose current is the wind, here 12 m/s along y:

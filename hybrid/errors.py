@@ -77,6 +77,7 @@ class Outcome(IntEnum):
     ILL_CONDITIONED = 9
     BURIED = 10
     OVERSTRETCHED = 11
+    TURNS_LOST = 12
 
     @property
     def cause(self) -> str:
@@ -105,6 +106,7 @@ EVENTS_BY_WEIGHT = (
     "vibrations damped",
     "snap",
     "coarse step",
+    "steps cut",
     "torque neglected",
     "ignored",
     "undamped",
@@ -147,6 +149,7 @@ _CAUSE = {
     Outcome.TWISTED_TOO_FAR: "the twist from one cell to the next nears half a turn, and could be its opposite",
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
+    Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
     Outcome.OVERSTRETCHED: "the cable is stretched beyond what a section bears",
 }
 
@@ -161,6 +164,7 @@ _REMEDY = {
     Outcome.ILL_CONDITIONED: "take solver: elimination",
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
+    Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }

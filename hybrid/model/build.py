@@ -29,6 +29,7 @@ from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free
 from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.sections import merged_sections
+from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (
     AdaptiveModel,
     CorrectedModel,
@@ -216,6 +217,9 @@ def _spare_start(scene: Scene, r: Floats, rod: np.ndarray, scale: float, sea: Su
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
 GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier run
+# Twist, rad, that a cell takes of what the ends prescribe, at fineness 1: runs to compare with have cells four times as
+# long, and must stay below the twist at which a run stops (simulation.diagnostics).
+TWIST = 0.25
 FEWEST_CELLS = 4  # of a zone, however little is asked
 
 
@@ -235,13 +239,16 @@ def _placed(
 ) -> tuple[Floats, tuple[Zone, ...]]:
     """Nodes and zones; usual: cells of a line whose scene does not say."""
     mesh, free = scene.mesh, mesh_is_free(scene)
+    twisted = prescribed_twist(scene.ends) / TWIST if scene.model.kind == "rod" else 0.0  # cells, at fineness 1
     if free and resolution.grading is not None:
         bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
         bounds[-1] = scene.length
         zones = tuple(Zone(plan.kind, float(a), float(b)) for plan, (a, b) in zip(plans, pairwise(bounds), strict=True))
-        return resolution.grading.nodes(sorted({*bounds.tolist(), *cuts}), resolution.fineness), zones
+        seen = resolution.grading
+        dense = Grading(seen.s, np.maximum(seen.density, twisted / scene.length))
+        return dense.nodes(sorted({*bounds.tolist(), *cuts}), resolution.fineness), zones
     if free:
-        cells = max(round(usual * resolution.fineness), FEWEST_CELLS * len(plans))
+        cells = max(round(max(usual, twisted) * resolution.fineness), FEWEST_CELLS * len(plans))
         return place_nodes(plans, cuts, None, None, cells)
     if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)

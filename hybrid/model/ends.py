@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import sqrt
+from math import ceil, sqrt
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
+from hybrid.kernels.end_motion import turn_on_the_way
 from hybrid.kernels.state import Ends, Floats, Moves
 from hybrid.scene.motion import MotionTerms
 
@@ -90,6 +91,7 @@ class EndConditions:
         self._given = (frame.copy(), np.zeros((2, 3)))  # frames and their spins without motion
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
+        self._moves: Moves | None = None  # made when first asked for
         self.set_loads(0.0)
         self.at(np.inf)
 
@@ -104,6 +106,7 @@ class EndConditions:
 
     def set_loads(self, t: float) -> None:
         """Choose the loads that act just after t."""
+        self._moves = None
         self._acting = [x for x in self._loads if t < x.until]
         self._growing_until = max((x.ramp or 0.0 for x in self._acting), default=0.0)
         self._grown = False
@@ -124,7 +127,7 @@ class EndConditions:
         self._stand_at(old._given[0])
 
     def _stand_at(self, frame: Floats) -> None:
-        self._given = (frame.copy(), self._given[1])
+        self._given, self._moves = (frame.copy(), self._given[1]), None
         self.values.frame[:] = frame
         for k, motion in self.motions.items():
             motion.turn_from(frame[k].reshape(3, 3))
@@ -172,8 +175,26 @@ class EndConditions:
             self._grow(t)
         return self.values
 
+    def turn_between(self, a: float, b: float) -> float:
+        """Upper bound (rad) of the angle that an end turns through between times a and b (s): full turns count."""
+        moves = self.moves()
+        if not (moves.prescribed[:, 1].any() or self._turns):
+            return 0.0
+        return float(turn_on_the_way(a, b, moves))
+
+    def until_turned(self, t: float, end: float, most: float) -> float:
+        """The end (s) of a step from t, or an earlier one until which no end of the cable turns by more than `most`."""
+        while (angle := self.turn_between(t, end)) > most:
+            end = t + (end - t) / ceil(angle / most)
+        return end
+
     def moves(self) -> Moves:
         """The same as arrays for kernels.end_motion: loads that act now, frames and motions as they are now."""
+        if self._moves is None:
+            self._moves = self._as_moves()
+        return self._moves
+
+    def _as_moves(self) -> Moves:
         prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)
         ramp, velocity, velocity_ramp, travel = np.zeros(2), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 5))
         follows, missing, position = np.zeros(2, np.int8), np.zeros((2, 4)), self.values.position.copy()

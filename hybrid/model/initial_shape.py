@@ -220,31 +220,32 @@ def corners(scene: Scene) -> list[float]:
 def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundings) -> tuple[EndConditions, Floats]:
     """End conditions, and first directors of all cells, carried without twist from the start.
 
-    An end whose `normal` is given fixes the material frame there; a clamp without one
-    holds the twist that the initial shape has.  Only where both ends fix it, and rod
-    joins them, is there a twist to close, and it is spread over the line.
+    An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
+    shape has.  Where both ends fix it, and rod joins them, there is a twist to close, less than half a turn; it is
+    spread over the line, and so are the `turns` by which one end is twisted against the other.
     """
-    d = e / np.linalg.norm(e, axis=1)[:, None]
+    l = np.linalg.norm(e, axis=1)
+    d = e / l[:, None]
     start, end = scene.ends.start, scene.ends.end
     first = first_director(start.held_tangent or tuple(d[0]), start.held_normal)
     tangents = np.vstack([start.held_tangent or d[0], d, end.held_tangent or d[-1]])
     carried = transported(first, tangents)
+    closing = 0.0  # turns
+    t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
     if end.held_tangent is not None and end.held_normal is not None:
         wanted = first_director(end.held_tangent, end.held_normal)
-        t = tangents[-1] / np.linalg.norm(tangents[-1])
-        last = carried[-1]
-        twist = float(np.arctan2(np.dot(np.cross(last, wanted), t), np.dot(last, wanted)))
-        n = e.shape[0]
-        if not start.fixes_frame:
-            part = np.ones(n + 2)  # the whole line takes the end's orientation
-        elif rod.all():
-            part = np.concatenate([[0.0], (np.arange(n) + 0.5) / n, [1.0]])
-        else:
+        closing = float(np.arctan2(np.dot(np.cross(carried[-1], wanted), t[-1]), np.dot(carried[-1], wanted)))
+        closing /= 2.0 * np.pi
+    if closing or start.held_turns or end.held_turns:
+        n = l.size
+        part = np.concatenate([[0.0], (np.cumsum(l) - 0.5 * l) / l.sum(), [1.0]])
+        if not rod.all():
             part = np.ones(n + 2)  # the rod at the end takes it; joints let the rest be
             part[: n - int(np.argmin(rod[::-1])) + 1] = 0.0
-        t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
-        cosine, sine = np.cos(part * twist)[:, None], np.sin(part * twist)[:, None]
-        carried = carried * cosine + np.cross(t, carried) * sine
+        whole = part if start.fixes_frame else np.ones(n + 2)  # the whole line takes the end's orientation
+        turned = start.held_turns + part * scene.ends.turns + whole * closing
+        angle = 2.0 * np.pi * (turned - np.round(turned))[:, None]  # so that a full turn is none, to the last digit
+        carried = carried * np.cos(angle) + np.cross(t, carried) * np.sin(angle)
     return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1]
 
 

@@ -27,6 +27,9 @@ COARSEST, FINEST = 0.5, 20.0
 STEP_FOR_TENSION, STEP_FOR_POSITION = 3e-5, 5e-4
 # Steps to the shortest period that the scene names: fewer cannot show it, whatever the error control thinks.
 PER_PERIOD = 12
+# An end may turn so far in a step (rad), in runs of longer steps twice as far: with LARGEST_TWIST of
+# simulation.diagnostics, an element can then not pass half a turn, where its twist would be taken for the opposite one.
+TURN, MOST_TURN = 1.0, 2.0
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
 LEAST_STEPS, SHORTEST = 10, 1e-6
 
@@ -76,6 +79,11 @@ class Resolution:
         local = None if self.local is None else self.local * steps**3
         every = round(steps) if steps > 1.0 else 1
         return replace(self, fineness=self.fineness / cells, step=self.step * steps, local=local, every=every)
+
+    @property
+    def turn(self) -> float:
+        """Angle, rad, through which an end may turn in a step."""
+        return min(TURN * self.every, MOST_TURN)
 
     @property
     def shortest(self) -> float:

@@ -14,6 +14,7 @@ from hybrid.scene import attachment_checks, sea_checks, start_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
+    CatenaryModel,
     CatenaryZone,
     CorrectedModel,
     CorrectedZone,
@@ -212,6 +213,25 @@ def _rod_over(cable: Cable, model: Model, i: int) -> str:
     return ""
 
 
+def _turns_are_held(cable: Cable, ends: Ends, model: Model, solver: str) -> Iterator[Finding]:
+    """Turns twist a rod between two ends that both hold it."""
+    for name, end in ends.named().items():
+        if not end.held_turns:
+            continue
+        here, given = ("ends", name, "turns"), f"{end.held_turns:g}"
+        if solver == "shooting":
+            expected = "0, because shooting knows the twist of a frame to within a turn only"
+            yield Finding(here, expected, "leave turns out, or leave solver out", given)
+        for which, other in ends.named().items():
+            if not other.holds_twist:
+                fix = f"leave turns out, or clamp ends.{which} (guided: give `normal`) without a swivel"
+                yield Finding(here, f"0, because ends.{which} turns freely, so that nothing is twisted", fix, given)
+        for i, section in enumerate(cable.sections):
+            if section.torsional_stiffness is None and not isinstance(model, CatenaryModel | CorrectedModel):
+                expected = f"a number > 0, in N m^2, because ends.{name}.turns twists the cable"
+                yield Finding(("cable", "sections", i, "torsional_stiffness"), expected, "add it")
+
+
 def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
     if mesh is None or mesh.nodes is None:
         return
@@ -261,6 +281,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _accuracy_has_errors,
     _sections_that_come_and_go,
     _in_a_plane,
+    _turns_are_held,
     _mesh_spans,
     _output_on_cable,
 )

@@ -34,7 +34,10 @@ TURNS = ("roll", "pitch", "yaw")
 
 _TANGENT = "direction of increasing s at this end, inertial frame; any length [-]"
 _NORMAL = "direction of the material axis a1 at this end; only its part across the tangent counts; any length [-]"
-
+_TURNS = (
+    "turns about the tangent by which this end is twisted against the other, right-handed, counted from `normal`, or "
+    "from where the shape carries the frame; may be a fraction; both ends must hold the twist [-]"
+)
 
 Triple = tuple[float, float, float]
 
@@ -219,6 +222,12 @@ class EndTable(Table):
         return normal
 
     @property
+    def held_turns(self) -> float:
+        """Turns about its tangent by which the scene twists the end."""
+        turns: float | None = self._own("turns")
+        return turns or 0.0
+
+    @property
     def holds_twist(self) -> bool:
         """Whether the end resists that the cable turns about its tangent."""
         return False
@@ -285,6 +294,7 @@ class Clamped(EndTable):
     position: Vector = Field(description="position of the end, inertial frame [m]")
     tangent: Direction = Field(description=_TANGENT)
     normal: Direction | None = Field(default=None, description=_NORMAL)
+    turns: Number = Field(default=0.0, description=_TURNS)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
 
@@ -299,6 +309,7 @@ class Guided(EndTable):
     kind: Literal["guided"] = Field(default="guided", description="direction held, position free")
     tangent: Direction = Field(description=_TANGENT)
     normal: Direction | None = Field(default=None, description=_NORMAL)
+    turns: Number = Field(default=0.0, description=_TURNS)
     force: Loading | None = Field(default=None, description="force on the end, inertial frame [N]")
     motion: Motion | None = Field(
         default=None, description="how the direction turns; a guided end takes no translation"
@@ -384,6 +395,11 @@ class Ends(Table):
     def initial_guesses(self) -> dict[str, Triple]:
         """First positions [m] of the bodies that have one, by name (`start`, `end`)."""
         return {name: end.initial_guess for name, end in self.bodies().items() if end.initial_guess is not None}
+
+    @property
+    def turns(self) -> float:
+        """Turns by which the end is twisted against the start, right-handed about the tangent."""
+        return self.end.held_turns - self.start.held_turns
 
     def bodies(self) -> dict[str, Body]:
         """The bodies at the ends, by name (`start`, `end`)."""

@@ -24,8 +24,6 @@ if TYPE_CHECKING:
 AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
 SAMPLES, RAMP_STEPS = 6, 3
-# The most that an end may be turned in a step (rad): beyond half a turn nobody knows which way it went.
-MOST_TURN = 1.0
 
 # Speed of tension waves, m/s, in what is given as inextensible: that of steel; ropes and chains are slower.
 STEEL_WAVES = 5000.0
@@ -180,6 +178,23 @@ def shortest_period(ends: Ends, environment: Environment | None) -> float:
     return min(times, default=math.inf)
 
 
+def prescribed_twist(ends: Ends) -> float:
+    """The most (rad) by which both ends together can twist a rod, turns and motions added; 0 where one turns freely."""
+    if not all(end.holds_twist for end in ends.both):
+        return 0.0
+    twist = 2.0 * math.pi * abs(ends.turns)
+    for _, _, motion in _motions(ends):
+        harmonics = [h for name, given in motion.harmonics().items() if name not in SHIFTS for h in given]
+        twist += math.radians(sum(abs(h.amplitude) for h in harmonics))
+        if motion.file is not None:
+            from hybrid.scene.motion_file import read_record
+
+            rotation = read_record(motion.file).rotation
+            if rotation is not None:
+                twist += math.radians(float(abs(rotation).max()) * math.sqrt(3.0))
+    return twist
+
+
 def ramp_ends(scene: Scene) -> list[float]:
     """Times, s, at which something stops growing or moving: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
@@ -193,14 +208,8 @@ def ramp_ends(scene: Scene) -> list[float]:
 def _unresolved(
     here: Place, motion: Motion, record: Record | None, environment: Environment | None, step: float
 ) -> Iterator[Finding]:
-    """Turns, ramps, moves and records that a fixed time step cannot follow."""
+    """Ramps, moves and records that a fixed time step cannot follow."""
     harmonics = list(_periods(here, motion))
-    for key, name, h in harmonics:
-        rate = 2 * math.pi * math.radians(abs(h.amplitude)) / h.period if name not in SHIFTS else 0.0
-        if rate * step > MOST_TURN:
-            expected = f"at most {_rounded_down(MOST_TURN / rate)} s: the end turns by a radian in that, by {key}"
-            fix = f"time.step: {0.3 * MOST_TURN / rate:.3g}, or less"
-            yield Finding(("time", "step"), expected, fix, f"{step:g}")
     shortest, steps = RAMP_STEPS * step * (1 - 1e-9), f"{RAMP_STEPS} time steps of {step:g} s"
     if motion.ramp is not None and motion.ramp < shortest:
         slow = max((h.period for _, _, h in harmonics), default=None)

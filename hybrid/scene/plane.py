@@ -145,6 +145,10 @@ def _twisted(ends: Ends, plane: Plane) -> Iterator[Finding]:
     if start is not None and end is not None and math.dist(start, end) > TYPED:
         expected = "the material axis as at ends.start, carried along, because dimension is 2 and there is no torsion"
         yield Finding(("ends", "end", "normal"), expected, "leave it out, or write `dimension: 3`")
+    for name, held in ends.named().items():
+        if held.held_turns:
+            expected = "0, because dimension is 2 and there is no torsion"
+            yield Finding(("ends", name, "turns"), expected, "leave it out, or write `dimension: 3`")
 
 
 def _director(end: End, plane: Plane) -> tuple[float, float] | None:

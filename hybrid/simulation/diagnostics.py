@@ -27,8 +27,9 @@ UNRESOLVED = 1.0
 OFF = 0.02
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
-# Twist of an element (rad) that could just as well be its opposite: the log strain ends at pi.
-LARGEST_TWIST = 2.8
+# Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
+# an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
+LARGEST_TWIST = 2.0
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0

@@ -5,9 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from hybrid.errors import ComputationError
+import numpy as np
+
+from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.forces import FRICTION, PLANAR
 from hybrid.kernels.state import State
+from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
@@ -16,11 +19,16 @@ from hybrid.scene.schema import Scene
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium, solve_statics
 
+# Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
+CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
+
 
 def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
     """Equilibrium with the loads of time t; infinity stands for loads that have grown to their full size."""
     try:
-        return _by_coarser(scene, model, t) or _statics(scene, model, t)
+        found = _by_coarser(scene, model, t) or _statics(scene, model, t)
+        _count_turns(scene, model, t, found.state)
+        return found
     except ComputationError as failed:
         flexible = float(model.line.h[model.line.spin == 0].max(initial=0.0))
         reasons = reasons_against(scene, (bool(model.line.spin[0]), bool(model.line.spin[-1])), flexible)
@@ -31,6 +39,29 @@ def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
         tried = f"{ways} tried, the last: {roads[-1].strip()}"
         because = "\n              ".join([*reasons, tried])
         raise ComputationError(failed.outcome, None, failed.s, because) from None
+
+
+def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
+    """ComputationError where a rod between two ends is not twisted by the turns of the scene.
+
+    What closes the frames of the initial shape comes to at most half a turn, and the shape itself takes the writhe of
+    the equilibrium, less than half a turn unless the cable forms a loop.
+    """
+    asked = scene.ends.turns
+    if not asked or not model.line.element[1:-1].all():
+        return
+    frames = model.ends.at(t).frame
+    wound, found = (twist_of_rods(model.line, frames, x.e, x.a1) / (2.0 * np.pi) for x in (model.start, state))
+    name = "end" if scene.ends.end.held_turns else "start"
+    s = model.length if name == "end" else 0.0
+    where = f"ends.{name}.turns: {getattr(scene.ends, name).held_turns:g}"
+    if abs(wound - asked) > CLOSING:
+        least = int(np.ceil(2.0 * np.pi * abs(asked) / MOST_TWIST))
+        detail = f"{where}; {model.cells} cells cannot hold {asked:g} turns, which take at least {least} equal ones"
+        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
+    if abs(found - wound) > 0.5:
+        detail = f"{where}; the rods start with {wound:.4g} turns, those of the equilibrium have {found:.4g}"
+        raise ComputationError(Outcome.TURNS_LOST, None, s, detail)
 
 
 def solve_model(

@@ -33,3 +33,11 @@ class EventLog:
         for event, more in self._waiting:
             sink.event(*event, **more)
         self._waiting.clear()
+
+
+def steps_cut_text(angle: float, step: float, most: float) -> str:
+    """Text of the event of fixed steps, s, in which an end turns by more than `most`, rad."""
+    return (
+        f"an end turns by {angle:.3g} rad in a step of {step:.4g} s: this step and others like it are cut, so that it "
+        f"turns by at most {most:g} rad in each and no turn is lost; time.step: {0.3 * step / angle:.2g} follows it"
+    )

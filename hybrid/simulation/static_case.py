@@ -26,6 +26,7 @@ from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, RunSample, 
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
 from hybrid.simulation.result_file import result_recorder
+from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
 
@@ -39,7 +40,7 @@ class StaticCase:
     def record(self, resolution: Resolution, target: Path | io.BytesIO) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it."""
         begin = clock.process_time()
-        model, found = self._equilibrium(resolution)
+        model, found, switching = self._equilibrium(resolution)
         observer = self._observer(model)
         texts = {"scene": scene_text(self.scene)}
         with result_recorder(self.scene, model, observer, target, texts, found) as recorder:
@@ -48,6 +49,9 @@ class StaticCase:
             diagnostics.begin()
             diagnostics.equilibrium(found)
             diagnostics.mesh(0.0, found.state)
+            if switching is not None:
+                manager = switching.manager
+                diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)
             stop = stretched or diagnostics.still(ends, found.state)
             events.write_to(recorder)
@@ -62,17 +66,17 @@ class StaticCase:
     def sample(self, resolution: Resolution) -> RunSample:
         """Compute for comparison only."""
         begin = clock.process_time()
-        model, found = self._equilibrium(resolution)
+        model, found, _ = self._equilibrium(resolution)
         values = _values(model, found, self._observer(model, COMPARED))
         return _sample(resolution, model, values, clock.process_time() - begin)
 
-    def _equilibrium(self, resolution: Resolution) -> tuple[Model, Equilibrium]:
+    def _equilibrium(self, resolution: Resolution) -> tuple[Model, Equilibrium, ZoneSwitching | None]:
         model = build(self.scene, resolution)
         if model.layout is None:
-            return model, equilibrium_of(self.scene, model, np.inf)
-        model, found, _ = zones_at_start(self.scene, model, resolution, np.inf, None, at_rest=True)
+            return model, equilibrium_of(self.scene, model, np.inf), None
+        model, found, switching = zones_at_start(self.scene, model, resolution, np.inf, None, at_rest=True)
         assert found is not None
-        return model, found
+        return model, found, switching
 
     def _observer(self, model: Model, only: Sequence[str] | None = None) -> Observer:
         s = output_points(self.scene.output.points, model.length)

@@ -24,7 +24,7 @@ from hybrid.model.plane import in_space, planar
 from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.events import EventLog
+from hybrid.simulation.events import EventLog, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
@@ -38,7 +38,7 @@ LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may
 HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
-PLAIN = ("t", "dt", "steps", "iterations", "changes", "_stored", "_beyond")  # plain values of a checkpoint
+PLAIN = ("t", "dt", "steps", "iterations", "changes", "_stored", "_beyond", "_turned")  # plain values of a checkpoint
 
 
 class Step(NamedTuple):
@@ -78,6 +78,7 @@ class Transient:
         """It has no state before `begin` or `restore`."""
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self._beyond = switching, correction, -np.inf
+        self._turned = False  # whether an event has told of steps cut by the turn of an end
         self.stepper = self._new_stepper(model.slack_floor if model.slack == "stop" else -np.inf)
         self.control = (
             None if resolution.local is None else Controller(resolution.local, resolution.step, resolution.shortest)
@@ -170,7 +171,8 @@ class Transient:
             manager = self.switching.manager if self.switching is not None else None
             blending = manager is not None and manager.ramping
             self.control.most = LONGEST_IN_PACE * manager.pace if manager is not None and blending else np.inf
-            yield self.control.until(self.t, stop)
+            until = self.control.until(self.t, stop)
+            yield self.model.ends.until_turned(self.t, until, self.resolution.turn)
 
     def advance(self, until: float) -> Iterator[Step]:
         """To `until` (s): in one step if all is well, else in halves of halves; with a controller, one step towards it.
@@ -184,6 +186,8 @@ class Transient:
         repeats = wasted = rescues = 0
         while self.t < until:
             end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
+            if control is None:
+                end = self._cut(end)
             taken, switching = self._try(end), self.switching
             rescue = switching.rescue(taken, end, end - self.t, self.before, rescues) if switching is not None else None
             if rescue is not None:
@@ -213,6 +217,16 @@ class Transient:
                 dt = 0.5 * dt if control is None else control.fails(end - self.t)
         if repeats and self.model.line.bits & SEABED:
             self._reset_after_impact(until - begin)
+
+    def _cut(self, end: float) -> float:
+        """The end (s) of a fixed step, earlier if an end of the cable turned too far in it: an event for the first."""
+        most, ends = self.resolution.turn, self.model.ends
+        earlier = ends.until_turned(self.t, end, most)
+        if earlier < end and not self._turned:
+            text = steps_cut_text(ends.turn_between(self.t, end), end - self.t, most)
+            self.events.event(self.t, 0.0, self.model.length, "steps cut", text)
+            self._turned = True
+        return earlier
 
     def _try(self, end: float) -> Taken:
         """A step to `end`, from `state` to `before`, which is not yet swapped with it."""

@@ -253,7 +253,7 @@ def twists() -> Iterator[Case]:
     """A taut shaft clamped at both ends, one of them rolled by up to 50 turns."""
     source = (
         "M = GJ θ/L while it is straight, and straight is stable below Greenhill's 2 sqrt(EI T); round-off 1e-9; more than "
-        "2.8 rad a cell: stopped; beyond Greenhill: an event says that only symmetry keeps it straight; zones that move carry no "
+        "2 rad a cell: stopped; beyond Greenhill: an event says that only symmetry keeps it straight; zones that move carry no "
         "torque while a part is catenary, and say so"
     )
     draws = spread(
@@ -267,7 +267,7 @@ def twists() -> Iterator[Case]:
         T = (torque / d["part"]) ** 2 / (4 * EI)
         along = AXES[d["axis"]]
         which, sign = {"x": "roll", "y": "pitch", "z": "yaw"}[d["axis"][1]], 1.0 if d["axis"][0] == "+" else -1.0
-        steps = max(80, int(25 * turns))  # within a radian a step at the most; fewer are refused
+        steps = max(80, int(25 * turns))  # within a radian a step at the most; longer ones are cut
 
         def truth(
             result: Any, torque: float = torque, L: float = L, along: Floats = along, part: float = d["part"]
@@ -293,7 +293,7 @@ def twists() -> Iterator[Case]:
             must, cause = "warned or refused", "unstable|torque neglected|twist from one cell to the next"
         elif d["model"] == "adaptive":
             must, cause = "warned", "torque neglected"
-        if angle / n > 2.8 and d["model"] == "rod":
+        if angle / n > 2.0 and d["model"] == "rod":
             must, cause = "refused", "twist from one cell to the next"
         name = told(EI=EI, L=L, turns=turns, T=f"{T:.2g}", **{"M/Greenhill": d["part"]}, n=n, axis=d["axis"])
         yield Case("twist of many turns", name, d["model"], tables, truth, source, must, cause)

@@ -1,0 +1,194 @@
+"""Turns of an end are counted: in statics by `turns`, in motion whatever the steps and the outputs are."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import hybrid
+from hybrid.model.build import build
+from hybrid.scene.motion import EndMotion
+from hybrid.scene.schema import Motion
+from hybrid.simulation import equilibrium
+
+GJ, LENGTH = 0.789, 100.0
+SECTION = {"length": LENGTH, "mass": 1.0, "axial_stiffness": 1e4, "bending_stiffness": 1.345,
+           "torsional_stiffness": GJ, "damping": {"mass": 0.1}}  # fmt: skip
+X, Z = [1, 0, 0], [0, 0, 1]
+
+
+def clamped(place, **more):
+    return {"kind": "clamped", "position": place, "tangent": X, "normal": Z, **more}
+
+
+def taut(first=None, second=None, section=None, **more) -> hybrid.Scene:
+    """A rod along x without weight, pulled by 5 N; first, second: more of its ends."""
+    return hybrid.validate_scene(
+        {
+            "environment": {"gravity": 0.0},
+            "cable": {"sections": [SECTION | (section or {})]},
+            "ends": {"start": clamped([0, 0, 0], **(first or {})), "end": clamped([100.05, 0, 0], **(second or {}))},
+            "initial": "equilibrium",
+            "model": "rod",
+            **more,
+        }
+    )
+
+
+def torque_of(turns: float) -> float:
+    return GJ * 2.0 * math.pi * turns / LENGTH
+
+
+def kinds(result) -> set[str]:
+    return {event.kind for event in result.events}
+
+
+# --- statics -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("turns", [27, -3.25, 0.5, 1])
+def test_torque_of_a_rod_twisted_by_turns(turns):
+    """G J 2 pi n / L, exact; the mesh is left to the program, so it must resolve the twist: no event."""
+    result = hybrid.static(taut(second={"turns": turns}))
+    np.testing.assert_allclose(result["torque"][0], torque_of(turns), rtol=1e-9)
+    assert not result.events
+    other = hybrid.static(taut(first={"turns": -turns}))
+    np.testing.assert_allclose(other["torque"][0], torque_of(turns), rtol=1e-9)
+    both = hybrid.static(taut(first={"turns": 0.75}, second={"turns": turns + 0.75}))
+    np.testing.assert_allclose(both["torque"][0], torque_of(turns), rtol=1e-9)
+
+
+def test_turns_count_from_the_normal():
+    """A normal a quarter of a turn further and a quarter of a turn less are the same rod."""
+    turned = hybrid.static(taut(second={"turns": 2.75, "normal": [0, -1, 0]}))
+    np.testing.assert_allclose(turned["torque"][0], torque_of(3.0), rtol=1e-9)
+
+
+def test_turns_of_a_clamp_without_a_normal():
+    result = hybrid.static(taut(first={"normal": None}, second={"normal": None, "turns": 4}))
+    np.testing.assert_allclose(result["torque"][0], torque_of(4.0), rtol=1e-9)
+
+
+def test_turns_of_a_sagging_rod():
+    """Two stiffnesses in series: the torque is one, and the twists add up to the turns (discretisation: 1 %)."""
+    soft = SECTION | {"length": 40.0, "axial_stiffness": 1e6, "torsional_stiffness": 2.0, "mass": 0.1}
+    stiff = soft | {"length": 60.0, "torsional_stiffness": 5.0}
+    scene = taut(cable={"sections": [soft, stiff]}, second={"turns": 6, "position": [90, 0, 0]}, environment={})
+    result = hybrid.static(scene)
+    np.testing.assert_allclose(result["torque"][0], 12.0 * math.pi / (40.0 / 2.0 + 60.0 / 5.0), rtol=1e-2)
+
+
+def test_too_few_cells_for_the_turns_are_refused():
+    with pytest.raises(hybrid.ComputationError, match=r"(?s)s = 100 m.*ends.end.turns: 27; 20 cells.*at least 170"):
+        hybrid.static(taut(second={"turns": 27}, mesh={"cells": 20}))
+
+
+def test_an_equilibrium_that_has_lost_a_turn_is_refused(monkeypatch):
+    scene = taut(second={"turns": 3})
+    model = build(scene)
+    lost = build(taut(second={"turns": 2})).start
+    with pytest.raises(hybrid.ComputationError, match=r"(?s)ends.end.turns: 3;.*start with 3 turns.*have 2\n.*try"):
+        equilibrium._count_turns(scene, model, 0.0, model.start._replace(a1=lost.a1))
+    equilibrium._count_turns(scene, model, 0.0, model.start)
+
+
+REFUSED = {
+    "swivel": ({"first": {"swivel": True}}, r"ends.start turns freely"),
+    "free": ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": clamped([100, 0, 0], turns=2)}},
+             r"ends.start turns freely"),
+    "torsion": ({"section": {"torsional_stiffness": None}}, r"torsional_stiffness(?s:.*)ends.end.turns"),
+    "shooting": ({"solver": "shooting"}, r"ends.end.turns(?s:.*)shooting"),
+    "plane": ({"dimension": 2}, r"ends.end.turns(?s:.*)dimension"),
+    "nan": ({"second": {"turns": math.nan}}, r"ends.end.turns"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_turns_that_mean_nothing_are_refused(name):
+    more, text = REFUSED[name]
+    with pytest.raises(hybrid.SceneError, match=text):
+        taut(**{"second": {"turns": 2}, **more})
+
+
+@pytest.mark.parametrize("model", ["catenary", {"kind": "zones", "zones": [{"rod": 50}, {"catenary": 50}]}, "adaptive"])
+def test_turns_that_a_catenary_does_not_transmit(model):
+    assert "torque neglected" in kinds(hybrid.static(taut(second={"turns": 3}, model=model)))
+
+
+def test_a_run_starts_with_the_turns():
+    time = {"duration": 0.5, "step": 0.05}
+    result = hybrid.run(taut(second={"turns": 5}, time=time))
+    np.testing.assert_allclose(result["torque"][:], torque_of(5.0), rtol=1e-7)
+    straight = {"kind": "straight", "direction": X}
+    end = {"turns": 5, "position": [100, 0, 0]}
+    result = hybrid.run(taut(second=end, time=time, initial=straight))
+    np.testing.assert_allclose(result["torque"][0], torque_of(5.0), rtol=1e-9)
+
+
+# --- motion --------------------------------------------------------------------------------------
+
+
+def wound(folder: Path, turns: float, over: float, until: float) -> dict:
+    """Motion of an end that is turned about x."""
+    t = np.arange(0.0, until + 1.0, 2.0)
+    x = np.clip(t / over, 0.0, 1.0)
+    angle = 360.0 * turns * x**3 * (10.0 - 15.0 * x + 6.0 * x**2)
+    table = np.column_stack([t, angle, 0 * t, 0 * t])
+    np.savetxt(folder / "turns.csv", table, delimiter=",", header="t,rx,ry,rz", comments="", fmt="%.10g")
+    return {"motion": {"file": str(folder / "turns.csv")}}
+
+
+@pytest.mark.parametrize(("every", "step"), [(25.0, 25.0), (25.0, 5.0), (1.0, 1.0), (25.0, None), (1.0, None)])
+def test_turns_between_outputs(tmp_path, every, step):
+    """27 turns in 1000 s: 1.3385 N m, however long steps and outputs are; only steps that are cut are an event."""
+    time = {"duration": 1100.0} | ({"step": step} if step else {"tolerance": 1e-3})
+    scene = taut(second=wound(tmp_path, 27, 1000, 1100), time=time, output={"every": every})
+    result = hybrid.run(scene)
+    np.testing.assert_allclose(result["torque"][-1], 1.3385, rtol=1e-4)
+    assert ("steps cut" in kinds(result)) == (step is not None and step > 4.0)
+    assert not {"unresolved twist", "gains energy"} & kinds(result)
+
+
+@pytest.mark.parametrize(("every", "step"), [(25.0, 5.0), (25.0, 0.5), (1.0, 1.0), (25.0, None), (1.0, None)])
+def test_two_turns_of_yaw(every, step):
+    """15 N m2 x 4 pi / 100 m at the peak of yaw; torsion waves have died down to a percent."""
+    section = {"axial_stiffness": 1e6, "bending_stiffness": 20.0, "torsional_stiffness": 15.0}
+    end = {"kind": "clamped", "tangent": [0, 0, -1], "normal": X}
+    yaw = {"ramp": 60.0, "yaw": {"amplitude": 720.0, "period": 60.0}}
+    ends = {"start": end | {"position": [0, 0, 0], "motion": yaw}, "end": end | {"position": [0, 0, -100.05]}}
+    time = {"duration": 75.0} | ({"step": step} if step else {})
+    result = hybrid.run(taut(section=section, ends=ends, time=time, mesh={"cells": 200}, output={"every": every}))
+    np.testing.assert_allclose(np.abs(result["torque"][-1]), 0.6 * math.pi, rtol=1e-2)
+
+
+def test_a_rotated_scene_is_the_rotated_scene(tmp_path):
+    """Roll, pitch and yaw together are Rz Ry Rx about fixed axes: turned as a whole, they are a rotation vector."""
+    angles = {"roll": (100.0, 3.0), "pitch": (40.0, 2.5), "yaw": (70.0, 4.0)}
+    motion = {"ramp": 2.0} | {name: {"amplitude": a, "period": p} for name, (a, p) in angles.items()}
+    q = Rotation.from_rotvec([0.4, -0.7, 1.1])
+    t = np.arange(0.0, 2.0001, 0.005)
+    law = EndMotion(Motion(**motion), [0, 0, 0], np.eye(3))
+    vectors = q.apply([Rotation.from_matrix(law.at(x)[2]).as_rotvec(degrees=True) for x in t])
+    np.savetxt(tmp_path / "r.csv", np.column_stack([t, vectors]), delimiter=",", header="t,rx,ry,rz", comments="")
+    assert np.abs(np.diff(vectors, axis=0)).max() < 10.0, "beyond half a turn the vector would jump"
+
+    def found(turn, moved):
+        first = {"position": [0, 0, 0], "tangent": turn.apply(X).tolist(), "normal": turn.apply(Z).tolist()}
+        ends = {"start": {"kind": "clamped", **first, "motion": moved}, "end": "free"}
+        straight = {"kind": "straight", "direction": turn.apply(X).tolist()}
+        section = SECTION | {"length": 2.0, "axial_stiffness": None, "bending_stiffness": [8.0, 3.0]}
+        time = {"duration": 1.5, "step": 0.005}
+        mesh = {"cells": 20}
+        return hybrid.run(taut(cable={"sections": [section]}, ends=ends, initial=straight, time=time, mesh=mesh))
+
+    one, other = found(Rotation.identity(), motion), found(q, {"file": str(tmp_path / "r.csv")})
+    turned = q.apply(np.array(one.position[-1]))
+    assert np.abs(one.position[-1] - one.position[0]).max() > 0.3
+    # the spline through samples 0.005 s apart: some 1e-6 of the angle
+    np.testing.assert_allclose(other.position[-1], turned, atol=2e-5)
+    scale = np.abs(one["torque"][-1]).max()
+    np.testing.assert_allclose(other["torque"][-1], one["torque"][-1], atol=1e-3 * scale)
