@@ -395,6 +395,7 @@ class Transient:
             monitor.push = Push(model.line, model.length, model.time_scale)
         self._set_model(model)
         self.state = blank_state(model.cells)
+        saved = {"_turned": False} | dict(saved)  # files of 0.6.0 do not have it
         saved = matched(saved, self.checkpoint() | {"mesh": None, "plane": None}, "state")
         vars(self).update({name: saved[name] for name in PLAIN})
         self.work, self.power = saved["work"].tolist(), saved["power"].tolist()

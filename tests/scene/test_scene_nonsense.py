@@ -34,6 +34,14 @@ ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: zones, zones: [{corrected: 4.0}, {rod: 6.0}]}
 """
+TWISTED = """\
+cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]}
+ends:
+  start: {kind: clamped, position: [0.0, 0.0, 0.0], tangent: [1.0, 0.0, 0.0], turns: -0.5}
+  end: {kind: guided, tangent: [1.0, 0.0, 0.0], normal: [0.0, 0.0, 1.0], turns: 3.0}
+initial: {kind: equilibrium}
+model: {kind: rod}
+"""
 TEXTS = {
     "adaptive": ADAPTIVE,
     "everything": EVERYTHING,
@@ -41,6 +49,7 @@ TEXTS = {
     "ocean": OCEAN,
     "at rest": AT_REST,
     "corrected": CORRECTED,
+    "twisted": TWISTED,
 } | SEAS
 
 
@@ -156,7 +165,7 @@ def _loaded(name: str) -> Any:
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
 SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "correct", "errors"}
-SIGNED |= {"z", "slope", "surface", "top", "bottom", "veer", "initial_guess", "thrust", "by", "shape"}
+SIGNED |= {"z", "slope", "surface", "top", "bottom", "veer", "initial_guess", "thrust", "by", "shape", "turns"}
 
 
 @pytest.mark.parametrize("case", LEAVES, ids=_id)
