@@ -160,13 +160,16 @@ def _unfold(columns: dict[str, np.ndarray], part: Part, name: str) -> None:
     array, dims = part.array(name), part.result.dims(name)
     unit = part.result.units[name]
     for index in np.ndindex(array.shape[1:]):
-        title, place = name, ""
+        title, place, after = name, "", None
         for dim, k in zip(dims[1:], index, strict=True):
             if dim == "s":
-                place = f" at s = {part.s[k]:{_PLACE}} m"
+                place, after = f" at s = {part.s[k]:{_PLACE}} m", part.after(name, float(part.s[k]))
             else:
                 title += f" {'xyz'[k] if dim == 'xyz' else k}"
-        columns[title + (f" ({unit})" if unit else "") + place] = array[(slice(None), *index)]
+        title += (f" ({unit})" if unit else "") + place
+        columns[title + (" before" if after is not None else "")] = array[(slice(None), *index)]
+        if after is not None:
+            columns[title + " after"] = after
 
 
 def _usual_places(result: Result) -> np.ndarray:

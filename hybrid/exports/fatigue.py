@@ -156,8 +156,12 @@ def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Seri
         basis = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
         series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), basis))
     else:
-        tension = result.at(s=s, names=["tension"])["tension"][part.rows]
-        series.append(Series(place, s, "tension", times, tension, "at every output" + _error(part, "tension", s)))
+        tension, said = result.at(s=s, names=["tension"], side="left")["tension"][part.rows], "at every output"
+        after = part.after("tension", s)
+        if after is not None:  # the side that is worse
+            worse = np.ptp(after) > np.ptp(tension)
+            tension, said = (after, f"{said}, just after the point") if worse else (tension, f"{said}, just before it")
+        series.append(Series(place, s, "tension", times, tension, said + _error(part, "tension", s)))
     k = int(np.clip(np.searchsorted(part.s, s, side="right") - 1, 0, len(part.s) - 2))
     w = (s - part.s[k]) / (part.s[k + 1] - part.s[k])
     values, share = _about_main_axis((1.0 - w) * bends[:, k : k + 1] + w * bends[:, k + 1 : k + 2])

@@ -71,10 +71,20 @@ class Observation:
 
     def corrected(self, shifts: Sequence[Shift]) -> Observation:
         """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
-        other = copy(self)
-        for name in ("r", "v", "e", "T", "length", "d", "tension", "tangent", "moment", "torque", "curvature_twist"):
+        other = self.on(self.grid)
+        for name in ("r", "v", "e", "T", "length", "d"):
             other.__dict__.pop(name, None)
         other.shift, other._plain = _of_batch(shifts), self
+        return other
+
+    def on(self, grid: Grid) -> Observation:
+        """The same on other points of the same stretches."""
+        other = copy(self)
+        other.grid = grid
+        for name in ("tension", "tangent", "moment", "torque", "curvature_twist"):
+            other.__dict__.pop(name, None)
+        if self._plain is self:
+            other._plain = other
         return other
 
     # ---- what was computed --------------------------------------------------------------------
@@ -237,6 +247,13 @@ class Observation:
         for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
             if not self.line.element[node]:  # a joint or an end without element: strain of the moment that is given
                 side[row] = self._strain_of_moment(node, cell)
+            elif node in self._changes and self.line.element[2 * cell + 1 - node]:
+                side[row] = self._strain_of_moment(node, cell)  # the moment is one, the stiffness is not
+
+    @cached_property
+    def _changes(self) -> set[int]:
+        """Nodes where one section ends and the next begins."""
+        return {int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes}
 
     def _strain_of_moment(self, node: int, cell: int) -> Floats:
         """Curvature and twist (2, nb) at a rod's end that carries the given moment (zero at a joint)."""

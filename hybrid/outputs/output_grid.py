@@ -83,13 +83,20 @@ class Grid:
     the middle of the cells; held: the same with the values at both ends of the line as
     well (tensions, which the supports know); sides: linear, from node values that may differ on the two
     sides of a joint (one entry per stretch and node, `side_nodes`).  A point on a joint
-    shows the side before it.
+    shows the side before it, or the one `after` it.
     """
 
-    def __init__(self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = ()) -> None:
+    def __init__(
+        self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
+        changes: Sequence[float] = (), after: bool = False,
+    ) -> None:  # fmt: skip
+        """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
+
+        and the next begins; after: a point on a cut shows the side after it.
+        """
         n = nodes_s.size
         self.s = s
-        self.loads = tuple(loads)
+        self.loads, self.changes = tuple(loads), tuple(changes)
         self.parts = stretches(zones, loads)
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
@@ -97,7 +104,7 @@ class Grid:
         self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
         self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
 
-        stretch = np.searchsorted(bounds[1:-1] + 1e-12 * nodes_s[-1], s)
+        stretch = np.searchsorted(bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1], s)
         a, b = cuts[stretch], cuts[stretch + 1]
         middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
         self.nodes = _sparse(*_cubic(nodes_s, s, a, b), n)

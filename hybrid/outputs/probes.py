@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -88,6 +88,8 @@ WORK = {
 }
 
 
+# Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
+SIDED = ("tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear")
 # Probes that a corrected catenary has as a rod has them.
 CORRECTED = ("bending_moment", "moment_start", "moment_end", "shear")
 # What leaving bending out makes of each quantity, by name: unit, description, dimensions.
@@ -130,15 +132,20 @@ class Observer:
         only: Sequence[str] | None = None,
         errors: bool = False,
         corrected: bool = False,
+        jumps: Sequence[float] = (),
+        changes: Sequence[float] = (),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
         criteria: name and description of those that are written as well; only: names of probes, None: all.
         errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
         for it.  `values_of` gets the criteria, and for both of the latter the shifts.
+        jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
+        section ends and the next begins.
         """
-        self.line, self.sea, self.zones, self.grid = line, sea, tuple(zones), Grid(line.s, zones, s, loads)
-        self._loads = tuple(loads)
+        self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
+        self.jumps = np.array(jumps if only is None else (), float)
+        self._place(line, sea, zones, s)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {
             name: p
@@ -153,6 +160,12 @@ class Observer:
             Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in MAY_BE_NAN)
             for name, p in self._probes.items()
         ]
+        right = [f for f in fields if f.name in SIDED and self.jumps.size]
+        fields += [
+            replace(f, name=f"right/{f.name}", shape=self.jumps.shape, dims=("right/s",),
+                    description=f"{f.description}, just after the point") for f in right
+        ]  # fmt: skip
+        self._right = [f.name for f in right]
         if with_work:
             fields += [Field(f"work/{name}", "J", text) for name, text in WORK.items()]
         self._criteria = [f"criteria/{name}" for name, _ in criteria]
@@ -177,13 +190,13 @@ class Observer:
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
         """The same fields of a line whose zones have changed."""
         other = copy(self)
-        other.line, other.sea, other.zones, other.grid = (
-            line,
-            sea,
-            tuple(zones),
-            Grid(line.s, zones, self.grid.s, self._loads),
-        )
+        other._place(line, sea, zones, self.grid.s)
         return other
+
+    def _place(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats) -> None:
+        self.line, self.sea, self.zones = line, sea, tuple(zones)
+        self.grid = Grid(line.s, zones, s, self._cuts, self._changes)
+        self._after = Grid(line.s, zones, self.jumps, self._cuts, self._changes, after=True)
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:
@@ -207,6 +220,9 @@ class Observer:
         corrected = plain.corrected(shifts) if shifts is not None else plain
         view = corrected if self._corrected else plain
         found = {name: p.value(view) for name, p in self._probes.items()}
+        if self._right:
+            after = view.on(self._after)
+            found |= {f"right/{name}": self._probes[name].value(after) for name in self._right}
         if self._errors:
             part = LEFT if self._corrected else 1.0
             found |= {f"errors/model/{name}": part * x for name, x in model_errors(plain, corrected).items()}
@@ -224,6 +240,13 @@ class Observer:
         return out
 
 
-def output_points(points: int | Sequence[float], length: float) -> Floats:
-    """Output grid (ns,), m: that many points from end to end, or the ones listed."""
-    return np.linspace(0.0, length, points) if isinstance(points, int) else np.array(points, float)
+def output_points(points: int | Sequence[float], length: float, more: Sequence[float] = ()) -> Floats:
+    """Output grid (ns,), m: that many points from end to end, or the ones listed, and `more` points.
+
+    What lies within round-off of one of the latter is replaced by it.
+    """
+    usual = np.linspace(0.0, length, points) if isinstance(points, int) else np.array(points, float)
+    if not len(more):
+        return usual
+    near = np.abs(usual[:, None] - np.asarray(more)).min(axis=1) <= 1e-9 * length
+    return np.unique(np.concatenate([usual[~near], more]))

@@ -371,7 +371,9 @@ class Output(Table):
         default=None, description="time between outputs; absent: a hundredth of the duration [s]"
     )
     points: OutputPoints = Field(
-        default=101, description="number of output points, evenly spread, or a list of their arc lengths [m]"
+        default=101,
+        description="number of output points, evenly spread, or a list of their arc lengths; points of `history`, "
+        "point loads, changes of section and joints are added [m]",
     )
     history: tuple[NonNegative, ...] | None = Field(
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"

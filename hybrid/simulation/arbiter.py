@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import Floats
 from hybrid.model.plan import output_times
-from hybrid.model.sections import borne_tension
+from hybrid.model.sections import borne_tension, marked_points
 from hybrid.outputs.probes import PROBES, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -90,7 +90,7 @@ def _target(output: str | Path | None) -> Path | io.BytesIO:
 
 
 def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: tuple[Field, ...]) -> Recorder:
-    s = output_points(scene.output.points, scene.length)
+    s = output_points(scene.output.points, scene.length, marked_points(scene))
     size = {"s": s.size, "xyz": 3}
     fields = [
         Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame)
@@ -103,7 +103,7 @@ def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: t
 
 
 def _values(scene: Scene, state: ShootingState) -> dict[str, Any]:
-    s = output_points(scene.output.points, scene.length)
+    s = output_points(scene.output.points, scene.length, marked_points(scene))
 
     def at(x: Floats) -> Floats:
         flat = x.reshape(x.shape[0], -1)

@@ -17,6 +17,7 @@ from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import Resolution, mesh_is_free, wants_errors
+from hybrid.model.sections import jump_points, marked_points, section_changes
 from hybrid.outputs.probes import Observer, output_points
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
@@ -236,8 +237,9 @@ class Case:
         if correction is None and model.follows_error:
             correction = Correction(model, switching)
         run = Transient(scene, model, resolution, switching, correction, EventLog())
-        s = output_points(self.scene.output.points, model.length) if points is None else points
-        observer = self._observer(model, switching is not None, s, None if target is not None else COMPARED)
+        if points is None:
+            points = output_points(self.scene.output.points, model.length, marked_points(self.scene))
+        observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)
         return TimeLoop(run, observer, target, self._report, self.interrupted)
 
     def _observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
@@ -248,7 +250,7 @@ class Case:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
-            model.corrected,
+            model.corrected, () if only else jump_points(self.scene), section_changes(self.scene),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

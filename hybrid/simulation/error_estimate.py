@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.sections import marked_points
 from hybrid.outputs.probes import output_points
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
@@ -270,7 +271,7 @@ def restored_notes(tree: Any) -> Notes:
 
 def _restored_outputs(tree: Any, scene: Scene, count: int) -> dict[str, np.ndarray]:
     """Outputs (count, ...) by name from a checkpoint.  ResultError: they are of another shape."""
-    ns, points = output_points(scene.output.points, scene.length).size, {"position": (3,)}
+    ns, points = output_points(scene.output.points, scene.length, marked_points(scene)).size, {"position": (3,)}
     template = {}
     for name, value in tree.items():
         full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else (count, ns)

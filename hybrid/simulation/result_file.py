@@ -60,6 +60,9 @@ def result_recorder(
         fixed.append(
             (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
         )
+    if observer.jumps.size:
+        text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
+        fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
     recorder = Recorder(
         target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, texts=texts, fixed=fixed, outputs=outputs + 1, overwrite=True, before=before,

@@ -194,21 +194,48 @@ class Result:
         head = f"{name}({', '.join(self._dims[name])})" + (f" in {unit}" if unit else "")
         return f"{head}: {description}" + (f" ({frame} frame)" if frame else "")
 
-    def at(self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None) -> dict[str, Any]:
+    def at(
+        self, *, t: Any = None, s: Any = None, names: Sequence[str] | None = None, side: str | None = None
+    ) -> dict[str, Any]:
         """Every field at the times t (s) and arc lengths s (m), linear between outputs and grid points.
 
         t and s are a number, an array, or None for all; a number takes its dimension away.
-        `names` limits the answer to some fields.
+        `names` limits the answer to some fields.  Nothing is interpolated across places where a quantity jumps.
+        Exactly there its value is the one just before, and `right/<name>` in the answer is the one just after; side:
+        "left" or "right" to have that one alone, under the name itself.
         """
+        if side not in (None, "left", "right"):
+            raise ResultError(f"side = {side!r} is no side\n    expected: 'left' or 'right'")
         answer = {}
-        wanted = [n for n in self.names if self._dims[n][:1] == ("t",) and n != "t"] if names is None else names
+        listed = (n for n in self.names if self._dims[n][:1] == ("t",) and n != "t")
+        wanted = [n for n in listed if s is None or not n.startswith("right/")] if names is None else names
         for name in wanted:
-            array, dims = self[name], self.dims(name)
-            for dim, where in (("s", s), ("t", t)):  # s first: it comes later, so the axis of t stays put
-                if where is not None and dim in dims:
-                    array = _interpolate(array, dims.index(dim), self[dim], where, dim, "m" if dim == "s" else "s")
-            answer[name] = array
+            found = {name: self[name]}
+            dims = self.dims(name)
+            if s is not None and "s" in dims:  # s first: it comes later, so the axis of t stays put
+                found = self._at_places(name, dims.index("s"), s, side)
+            for key, array in found.items():
+                along = t is not None and "t" in dims
+                answer[key] = _interpolate(array, dims.index("t"), self["t"], t, "t", "s") if along else array
         return answer
+
+    def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
+        """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
+        right, grid, values = f"right/{self._known(name)}", self["s"], self[name]
+        if right not in self._dims or name == "s":
+            return {name: _interpolate(values, axis, grid, s, "s", "m")}
+        x, jumps = np.asarray(s, dtype=float), self["right/s"]
+        which = np.abs(x[..., None] - jumps).argmin(axis=-1)
+        exact = np.abs(x - jumps[which]) <= 1e-9 * (grid[-1] - grid[0])
+        places, behind = np.searchsorted(grid, jumps) + 1, np.nextafter(jumps, np.inf)
+        doubled, values = np.insert(grid, places, behind), np.insert(values, places, self[right], axis)
+        found = {
+            key: _interpolate(values, axis, doubled, np.where(exact, at[which], x), "s", "m")
+            for key, at in (("left", jumps), ("right", behind))
+        }
+        if side is None and exact.any():
+            return {name: found["left"], right: found["right"]}
+        return {name: found[side or "left"]}
 
     def to_xarray(
         self,

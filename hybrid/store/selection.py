@@ -37,7 +37,10 @@ _KINDS = "fiuU"
 
 @dataclass(frozen=True)
 class Part:
-    """Fields `names` of a result, at its outputs `rows`, on its own grid or at the arc lengths `at` (m)."""
+    """Fields `names` of a result, at its outputs `rows`, on its own grid or at the arc lengths `at` (m).
+
+    Where a quantity jumps, fields have the value before; `after` has the other.
+    """
 
     result: Result
     names: tuple[str, ...]
@@ -65,7 +68,7 @@ class Part:
             return self.s
         dims = self.result.dims(name)
         if self.at is not None and "s" in dims:
-            array = np.asarray(self.result.at(s=self.at, names=[name])[name])
+            array = np.asarray(self.result.at(s=self.at, names=[name], side="left")[name])
         else:
             array = np.asarray(self.result[name])
         first = dims[0] if dims else ""
@@ -74,6 +77,16 @@ class Part:
         if first.endswith("/t"):
             return array[self._rows_of(first)]
         return array
+
+    def after(self, name: str, s: float) -> np.ndarray | None:
+        """A field just after the arc length s (m), (nt,), if it jumps there; None if it does not."""
+        if f"right/{name}" not in self.result:
+            return None
+        jumps = self.result["right/s"]
+        k = int(np.abs(jumps - s).argmin())
+        if abs(jumps[k] - s) > 1e-9 * float(np.ptp(self.result["s"])):
+            return None
+        return np.asarray(self.result[f"right/{name}"][self.rows, k])
 
     def zone_kinds(self, s: np.ndarray) -> tuple[np.ndarray, list[str]]:
         """Kind of the zone at arc lengths s (m): numbers (nt, len(s)), and what they mean.

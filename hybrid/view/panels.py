@@ -249,7 +249,8 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     """
     if "s" not in result.dims(name):
         raise ResultError(f"'{name}' does not depend on s; plot it as result[{name!r}] over result.times")
-    values = result.at(s=np.asarray(s, dtype=float), names=[name])[name]
+    values = result.at(s=np.asarray(s, dtype=float), names=[name], side="left")[name]
+    jumps = result["right/s"] if f"right/{name}" in result else np.zeros(0)
     if component is not None:
         values = values[..., component] - values[0, ..., component]
         label = f"Δ{AXES[component]}" if name == "position" else f"Δ{title_of(name)} {AXES[component]}"
@@ -270,6 +271,7 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     for k, point in enumerate(s):
         width = max(1.8 - 0.4 * k, 1.0)  # later curves are thinner, so that coinciding ones all show
         y, label_of = values[:, k] * factor, f"s = {point:.4g} m"
+        label_of += ", before the point" if np.isclose(point, jumps, rtol=0.0, atol=1e-9 * result.s[-1]).any() else ""
         items.append(Line(result.times, y, label_of, _colour(k), width, symbol="o", last_only=True))
     changes = np.unique(result["zones/t"])[1:]
     if 0 < len(changes) <= MOST_CHANGES:

@@ -170,8 +170,9 @@ class Plain:
             if zone.kind == "rod":
                 k = strain[a : b + 1] / line.hn[a : b + 1, None]
                 side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
-                for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
-                    if not line.element[node]:  # a joint or an end without element: strain of the moment that is given
+                for node, row, cell, beside in ((a, 0, a, a + 1), (b, -1, b - 1, b - 1)):
+                    change = any(abs(line.s[node] - x) < 1e-9 for x in self.grid.changes)
+                    if not line.element[node] or (change and line.element[beside]):
                         side[row] = self._strain_of_moment(node, cell)
             else:
                 side[:, 0] = sharp[a : b + 1]
@@ -246,12 +247,14 @@ class Plain:
         return float(T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0])
 
 
-def plain_values(observer: Observer, batch: Batch, i: int, shift: Shift | None, corrected: bool) -> dict[str, object]:
+def plain_values(
+    observer: Observer, batch: Batch, i: int, shift: Shift | None, corrected: bool, grid: Grid
+) -> dict[str, object]:
     """What `observer.values_of` should have at output i, but for work, criteria and factors on the errors of the model."""
     x = batch
     state = blank_state(x.T.shape[1])._replace(r=x.r[i], v=x.v[i], e=x.e[i], T=x.T[i], a1=x.a1[i], w=x.w[i])
     ends = Ends(x.held[i], x.position[i], x.frame[i], x.spin[i], x.force[i], x.moment[i])
-    computed = Plain(observer.line, observer.sea, observer.zones, ends, state, observer.grid, x.report[i])
+    computed = Plain(observer.line, observer.sea, observer.zones, ends, state, grid, x.report[i])
     shifted = computed.corrected(shift) if shift is not None else computed
     v = shifted if corrected else computed
     t = v.tangent

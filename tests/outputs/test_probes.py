@@ -96,7 +96,7 @@ def compare(found: dict[str, Floats], expected: dict[str, Floats]) -> None:
         x, y = found[name], expected[name]
         assert x.shape == y.shape, name
         assert np.array_equal(np.isnan(x), np.isnan(y)), name
-        size = np.nan_to_num(expected[SIZED_BY.get(name, name)])
+        size = np.nan_to_num(expected[SIZED_BY.get(name.removeprefix("right/"), name)])
         np.testing.assert_allclose(x, y, rtol=0.0, atol=SAME * float(np.abs(size).max()), err_msg=name)
 
 
@@ -110,8 +110,11 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
     ) -> dict[str, Floats]:
         found = values_of(self, batch, ratios, shifts)
         corrected = self.zone_rows[0][0] == "corrected" or self.zone_rows[-1][0] == "corrected"
-        rows = [plain_values(self, batch, i, shifts[i] if shifts else None, corrected) for i in range(batch.t.size)]
-        expected = {field: np.array([row[field] for row in rows], float) for field in rows[0]}
+        expected: dict[str, Floats] = {}
+        for prefix, grid in (("", self.grid), ("right/", self._after)) if self.jumps.size else (("", self.grid),):
+            each = range(batch.t.size)
+            rows = [plain_values(self, batch, i, shifts[i] if shifts else None, corrected, grid) for i in each]
+            expected |= {prefix + field: np.array([row[field] for row in rows], float) for field in rows[0]}
         part = LEFT if corrected else 1.0
         compare(found, {field: x * (part if field.startswith("errors/") else 1.0) for field, x in expected.items()})
         checked.update(found.keys() & expected.keys())

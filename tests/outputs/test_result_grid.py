@@ -28,14 +28,17 @@ def line(x: Floats, y: Floats, at: float) -> Floats:
     return y[k - 1] + (y[k] - y[k - 1]) * (at - x[k - 1]) / (x[k] - x[k - 1])
 
 
-def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats) -> dict[str, Floats]:
+def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats, after: bool) -> dict[str, Floats]:
     """The matrices, as what interpolation makes of the values 1, 0, 0, ... and 0, 1, 0, ... and so on."""
     n, sides = nodes.size, sum(b - a + 1 for a, b, _ in spans)
     middles = 0.5 * (nodes[:-1] + nodes[1:])
     with_ends = np.concatenate([[0.0], middles, nodes[-1:]])
     rows: dict[str, list[Floats]] = {"nodes": [], "cells": [], "held": [], "sides": []}
     for at in s.tolist():
-        a, b, offset = next(span for span in spans if at <= nodes[span[1]] * (1 + 1e-13))
+        if after:
+            a, b, offset = next(span for span in reversed(spans) if at >= nodes[span[0]] * (1 - 1e-13))
+        else:
+            a, b, offset = next(span for span in spans if at <= nodes[span[1]] * (1 + 1e-13))
         x, own = nodes[a : b + 1], np.eye(n)[a : b + 1]
         slopes = np.array([slope(x, own, i) for i in range(x.size)])
         rows["nodes"].append(CubicHermiteSpline(x, own, slopes)(at))
@@ -47,8 +50,9 @@ def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats) -> dict[s
     return {name: np.array(x) for name, x in rows.items()}
 
 
+@pytest.mark.parametrize("after", [False, True])
 @pytest.mark.parametrize("seed", range(60))
-def test_matrices_are_those_of_a_plain_interpolation(seed: int) -> None:
+def test_matrices_are_those_of_a_plain_interpolation(seed: int, after: bool) -> None:
     """Stretches of one, two and more cells, cut by joints and by loads; points on nodes, middles and in between."""
     random = np.random.default_rng(seed)
     cells = random.integers(1, 2 + seed % 5, random.integers(1, 7))
@@ -61,14 +65,14 @@ def test_matrices_are_those_of_a_plain_interpolation(seed: int) -> None:
     zones = [Zone(kinds[i % 2], float(nodes[a]), float(nodes[b])) for i, (a, b) in enumerate(pairwise(joints))]
     s = np.unique([*nodes, *(0.5 * (nodes[:-1] + nodes[1:])), *random.uniform(0.0, nodes[-1], 20)])
 
-    grid = Grid(nodes, zones, s, loads)
+    grid = Grid(nodes, zones, s, loads, after=after)
 
     assert grid.spans == [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts))]
     assert grid.side_nodes == [k for a, b in pairwise(cuts) for k in range(a, b + 1)]
     assert [(part.s_a, part.s_b) for part in grid.parts] == [(nodes[a], nodes[b]) for a, b in pairwise(cuts)]
     assert grid.loads == tuple(loads)
     assert grid.s is s
-    for name, expected in plain(nodes, grid.spans, s).items():
+    for name, expected in plain(nodes, grid.spans, s, after).items():
         matrix = getattr(grid, name)
         assert matrix.has_canonical_format
         np.testing.assert_allclose(matrix.toarray(), expected, rtol=0.0, atol=1e-12, err_msg=name)

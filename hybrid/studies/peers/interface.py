@@ -10,6 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.model.build import build
+from hybrid.model.sections import marked_points
 from hybrid.outputs.probes import output_points
 from hybrid.scene.ends import Pinned
 from hybrid.scene.motion import EndMotion
@@ -144,7 +145,7 @@ def line_of(scene: Scene) -> Line:
         scene.environment.gravity, fluid.density, (bed.z + up, bed.stiffness, bed.damping) if bed else None,
         (EndMotion(ends[0].motion, ends[0].position), EndMotion(ends[1].motion, ends[1].position)),
         min(shortest_period(scene.ends, scene.environment), scene.require_time().duration),
-        up, np.asarray(output_points(scene.output.points, section.length)), scene,
+        up, np.asarray(output_points(scene.output.points, section.length, marked_points(scene))), scene,
     )  # fmt: skip
 
 

@@ -1,0 +1,123 @@
+"""Points where a quantity has two values: both are written, and nothing is interpolated across them."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ResultError
+
+G, MASS, CLUMP = 9.81, 2.0, 5.0  # m/s2, kg/m, kg
+AT, LENGTH = 4.1, 10.0  # m
+
+
+def chain(**output: Any) -> dict[str, Any]:
+    """A chain of 10 m that hangs straight down, with a clump at 4.1 m."""
+    return {
+        "cable": {
+            "sections": [{"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6}],
+            "attachments": [{"kind": "clump", "at": AT, "mass": CLUMP}],
+        },
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+        "initial": "equilibrium", "model": "catenary", "output": {"points": 11, **output},
+    }  # fmt: skip
+
+
+def weight_below(s: float) -> float:
+    return MASS * G * (LENGTH - s) + CLUMP * G * (s < AT)
+
+
+@pytest.fixture(scope="module")
+def hung() -> hybrid.Result:
+    return hybrid.static(hybrid.validate_scene(chain()))
+
+
+def test_a_load_is_a_point_of_the_grid_with_two_values(hung: hybrid.Result) -> None:
+    assert hung.s.tolist() == sorted([*np.linspace(0.0, LENGTH, 11).tolist(), AT])
+    assert hung["right/s"].tolist() == [AT]
+    below = MASS * G * (LENGTH - AT)
+    k = int(np.searchsorted(hung.s, AT))
+    assert hung.tension[0, k] == pytest.approx(below + CLUMP * G, rel=1e-9)  # the solver's tolerance
+    assert hung["right/tension"][0, 0] == pytest.approx(below, rel=1e-9)
+
+
+def test_nothing_is_interpolated_across_it(hung: hybrid.Result) -> None:
+    for s in (3.5, AT - 1e-3, AT + 1e-3, 4.5):
+        assert hung.at(s=s, t=0.0)["tension"] == pytest.approx(weight_below(s), rel=1e-9), s
+    both = [hung.at(s=[2.0, AT], t=0.0, names=["tension"], side=side)["tension"] for side in ("left", "right")]
+    below = MASS * G * (LENGTH - AT)
+    assert both[0] == pytest.approx([weight_below(2.0), below + CLUMP * G], rel=1e-9)
+    assert both[1] == pytest.approx([weight_below(2.0), below], rel=1e-9)
+
+
+def test_exactly_there_both_values_are_given(hung: hybrid.Result) -> None:
+    found = hung.at(s=[1.5, AT], t=0.0, names=["tension"])
+    below = MASS * G * (LENGTH - AT)
+    assert found["tension"] == pytest.approx([weight_below(1.5), below + CLUMP * G], rel=1e-9)
+    assert found["right/tension"] == pytest.approx([weight_below(1.5), below], rel=1e-9)
+    assert set(hung.at(s=AT, names=["tension"], side="right")) == set(hung.at(s=1.5, names=["tension"])) == {"tension"}
+    assert set(hung.at(s=AT, names=["position"])) == {"position"}
+    with pytest.raises(ResultError, match=r"side = 'above'(?s:.*)'left' or 'right'"):
+        hung.at(s=AT, side="above")
+
+
+def test_a_csv_has_a_column_for_each_side(hung: hybrid.Result, tmp_path: Path) -> None:
+    hybrid.export(hung, tmp_path / "chain.csv", at=[1.0, AT])
+    lines = (line for line in (tmp_path / "chain.csv").read_text().splitlines() if not line.startswith("#"))
+    (row,) = csv.DictReader(lines)
+    before, after = (float(row[f"tension (N) at s = {AT} m {side}"]) for side in ("before", "after"))
+    assert before - after == pytest.approx(CLUMP * G, rel=1e-9)
+    assert float(row["tension (N) at s = 1 m"]) == pytest.approx(weight_below(1.0), rel=1e-9)
+
+
+def test_in_xarray_both_are_variables(hung: hybrid.Result) -> None:
+    pytest.importorskip("xarray")
+    found = hung.to_xarray()
+    jump = found.tension.sel(s=AT) - found.right_tension.sel(right_s=AT)
+    assert float(jump[0]) == pytest.approx(CLUMP * G, rel=1e-9)
+
+
+@pytest.mark.parametrize("points", [11, [0.0, 2.5, 10.0]])
+def test_points_of_the_history_are_points_of_the_grid(points: int | list[float]) -> None:
+    found = hybrid.static(hybrid.validate_scene(chain(points=points, history=[0.0, 3.3, AT, 10.0])))
+    usual = points if isinstance(points, list) else np.linspace(0.0, LENGTH, points).tolist()
+    assert found.s.tolist() == sorted([*usual, 3.3, AT]) and found["right/s"].tolist() == [AT]
+
+
+def test_a_smooth_cable_has_neither() -> None:
+    scene = chain()
+    scene["cable"]["attachments"] = []
+    found = hybrid.static(hybrid.validate_scene(scene))
+    assert np.array_equal(found.s, np.linspace(0.0, LENGTH, 11)) and not [x for x in found.names if "right" in x]
+
+
+def test_curvature_jumps_with_the_stiffness_and_the_moment_does_not() -> None:
+    """A cantilever of two sections under its weight: M = EI kappa on both sides, the same M."""
+    stiff, soft = 400.0, 100.0
+    section = {"mass": 0.05, "axial_stiffness": 1e7}
+    parts = [
+        section | {"length": 0.6, "bending_stiffness": stiff},
+        section | {"length": 0.4, "bending_stiffness": soft},
+    ]
+    found = hybrid.static(
+        hybrid.validate_scene(
+            {
+                "cable": {"sections": parts},
+                "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, "end": "free"},
+                "initial": "equilibrium",
+                "model": "rod",
+                "mesh": {"cells": 100},
+            }
+        )
+    )
+    before, after = (found.at(s=0.6, t=0.0, side=side) for side in ("left", "right"))
+    moment = 0.05 * G * 0.4**2 / 2  # N m, of a beam that bends little
+    assert before["bending_moment"] == pytest.approx(moment, rel=2e-3)
+    assert after["bending_moment"] == pytest.approx(before["bending_moment"], rel=1e-9)
+    assert stiff * before["curvature"] == pytest.approx(before["bending_moment"], rel=1e-6)
+    assert soft * after["curvature"] == pytest.approx(after["bending_moment"], rel=1e-6)
