@@ -267,16 +267,24 @@ def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
 
 @contextmanager
 def _interrupts() -> Iterator[Callable[[], bool]]:
-    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is whole."""
+    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is complete.
+
+    A signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
-    seen: list[int] = []
+    caught: list[int] = []
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, lambda got, _frame: seen.append(got))
+        before[number] = signal.signal(number, lambda got, _frame: caught.append(got))
     try:
-        yield lambda: bool(seen)
+        yield lambda: bool(caught)
+    except KeyboardInterrupt:
+        caught.clear()
+        raise
     finally:
         for number, handler in before.items():
             signal.signal(number, handler)
+        for number in caught[:1]:
+            signal.raise_signal(number)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.simulation.progress import Progress
 
 WIRE: dict[str, Any] = {
     "cable": {"sections": [{"length": 2.0, "mass": 1.0}]},
@@ -86,3 +88,48 @@ def test_snapshots_of_runs_in_memory_have_names_of_their_own(tmp_path: Path, mon
     assert os.stat(one).st_mode & 0o077 == 0, "nobody else reads it"
     with np.load(one) as snapshot:
         assert float(snapshot["t"]) >= 0.0
+
+
+# --- signals -------------------------------------------------------------------------------------
+
+
+class Late:
+    """A listener that raises a signal when the run has ended, before its handlers are back."""
+
+    def __init__(self, number: signal.Signals) -> None:
+        self.number = number
+
+    def __call__(self, _: Progress) -> None:
+        pass
+
+    def close(self) -> None:
+        signal.raise_signal(self.number)
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("scene", [WIRE, PUSHED], ids=["complete", "failed"])
+def test_a_signal_at_the_very_end_of_a_run_is_not_lost(
+    scene: dict[str, Any], number: signal.Signals, tmp_path: Path
+) -> None:
+    before = signal.signal(number, signal.default_int_handler)
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.run(scene, tmp_path / "run.h5", progress=Late(number))
+        assert signal.getsignal(number) is signal.default_int_handler
+    finally:
+        signal.signal(number, before)
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == ("complete" if scene is WIRE else "failed")
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
+def test_a_signal_that_has_stopped_a_run_is_raised_once(number: signal.Signals, tmp_path: Path) -> None:
+    heard: list[int] = []
+    before = signal.signal(number, lambda got, _frame: heard.append(got))
+    try:
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.run(WIRE, tmp_path / "run.h5", progress=lambda _: signal.raise_signal(number))
+    finally:
+        signal.signal(number, before)
+    with hybrid.open(tmp_path / "run.h5") as result:
+        assert result.status == "interrupted" and not heard
