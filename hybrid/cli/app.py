@@ -112,10 +112,14 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
     except KeyboardInterrupt:
         console.interrupted()
         code = INTERRUPTED
-    except Exception:
-        head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
-        console.error("bug", f"{head}\n{traceback.format_exc()}")
-        code = FAILED
+    except Exception as error:
+        if isinstance(error.__cause__, KeyboardInterrupt):  # Python wraps one that comes while a class is made
+            console.interrupted()
+            code = INTERRUPTED
+        else:
+            head = f"this is a bug in hybrid {hybrid.__version__}; please report it with the scene and these lines"
+            console.error("bug", f"{head}\n{traceback.format_exc()}")
+            code = FAILED
     finally:
         if in_main:
             signal.signal(signal.SIGTERM, before)
