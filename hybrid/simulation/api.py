@@ -46,6 +46,9 @@ from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
 
+# s between two signals of which the second ends a run at once: process managers may send the same one twice.
+IMPATIENT = 1.0
+
 Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 
 
@@ -269,15 +272,25 @@ def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
 def _interrupts() -> Iterator[Callable[[], bool]]:
     """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is complete.
 
-    A signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.
+    A second one, `IMPATIENT` s later, is raised at once, as in a long compilation or search of an equilibrium.  A
+    signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: False
         return
     caught: list[int] = []
+    first = 0.0  # s of the clock
+
+    def catch(number: int, _frame: object) -> None:
+        nonlocal first
+        if caught and clock.monotonic() - first > IMPATIENT:
+            raise KeyboardInterrupt
+        first = first if caught else clock.monotonic()
+        caught.append(number)
+
     before = {}
     for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, lambda got, _frame: caught.append(got))
+        before[number] = signal.signal(number, catch)
     try:
         yield lambda: bool(caught)
     except KeyboardInterrupt:

@@ -6,6 +6,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Sequence
+from pathlib import Path
 from threading import Thread
 
 import numpy as np
@@ -69,11 +70,22 @@ def compile_beside(scene: Scene) -> None:
     Does nothing where all is compiled, or where there is one core.
     """
     missing = [name for name in _beside_solver(scene) if not is_warm([name])]
-    if missing and (os.cpu_count() or 1) > 1 and sys.executable:
-        command = [sys.executable, "-c", f"from hybrid.simulation.first_use import compile_all; compile_all({missing})"]
+    frozen = getattr(sys, "frozen", False)  # an application made by PyInstaller would start itself again
+    if missing and (os.cpu_count() or 1) > 1 and sys.executable and not frozen:
+        command = command_to_compile(missing)
         nothing = subprocess.DEVNULL
         streams = {"stdin": nothing, "stdout": nothing, "stderr": nothing}
         Thread(target=subprocess.run, args=(command,), kwargs=streams, daemon=True).start()  # which waits for its end
+
+
+def command_to_compile(names: Sequence[str]) -> list[str]:
+    """Command of a process that compiles kernels with this package, wherever it is started.
+
+    -P: a file of the present folder that is called as a module of this package or of Python is not run.
+    """
+    package = str(Path(__file__).parents[2])
+    call = f"from hybrid.simulation.first_use import compile_all; compile_all({list(names)})"
+    return [sys.executable, "-P", "-c", f"import sys; sys.path.insert(0, {package!r}); {call}"]
 
 
 def compile_all(names: Sequence[str]) -> None:

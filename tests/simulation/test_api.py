@@ -133,3 +133,19 @@ def test_a_signal_that_has_stopped_a_run_is_raised_once(number: signal.Signals, 
         signal.signal(number, before)
     with hybrid.open(tmp_path / "run.h5") as result:
         assert result.status == "interrupted" and not heard
+
+
+def test_a_second_signal_ends_a_run_at_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """As in an equilibrium that takes long, where no step looks at the first."""
+    monkeypatch.setattr("hybrid.simulation.api.IMPATIENT", 0.0)
+    reached: list[str] = []
+
+    def search(*_: object, **__: object) -> None:
+        for name in ("first", "second", "third"):
+            reached.append(name)
+            signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr("hybrid.simulation.case.Case._start", search)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(WIRE, tmp_path / "run.h5")
+    assert reached == ["first", "second"]

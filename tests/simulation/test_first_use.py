@@ -1,0 +1,40 @@
+"""The process that compiles beside the first run."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.simulation import first_use
+
+
+@pytest.mark.parametrize("name", ["hybrid", "numpy", "signal"])
+def test_files_of_the_present_folder_are_not_run(name: str, tmp_path: Path) -> None:
+    """A user's numpy.py beside the scene is no module of the second process."""
+    (tmp_path / f"{name}.py").write_text("open('run', 'w').close()\nraise SystemExit(3)\n")
+    done = subprocess.run(first_use.command_to_compile([]), cwd=tmp_path, capture_output=True, text=True)
+    assert (done.returncode, done.stderr) == (0, "") and not (tmp_path / "run").exists()
+
+
+@pytest.mark.parametrize("frozen", [False, True])
+def test_a_frozen_application_does_not_start_itself(frozen: bool, monkeypatch: pytest.MonkeyPatch) -> None:
+    started: list[Any] = []
+
+    class Started:
+        def __init__(self, **arguments: Any) -> None:
+            started.append(arguments)
+
+        def start(self) -> None:
+            pass
+
+    monkeypatch.setattr(sys, "frozen", frozen, raising=False)
+    monkeypatch.setattr(first_use, "is_warm", lambda _: False)
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    monkeypatch.setattr(first_use, "Thread", Started)
+    first_use.compile_beside(hybrid.validate_scene(first_use.SAMPLE))
+    assert len(started) == (not frozen)
