@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate
+from itertools import accumulate, pairwise
 
 import numpy as np
 
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section, ZonesModel
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, RodZone, Scene, Section, ZonesModel
 
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
@@ -128,14 +128,16 @@ def section_changes(scene: Scene) -> tuple[float, ...]:
 def jump_points(scene: Scene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where quantities may have two values, one on each side.
 
-    Point loads, changes of section, ends of modules, joints of zones that stay where they are.
+    Point loads, changes of section, ends of modules, joints of rod and catenary in zones that stay where they are.
     """
     found = [*section_changes(scene)]
     for item in scene.cable.attachments:
         found += list(item.range) if isinstance(item, Modules) else [item.at]
     if isinstance(scene.model, ZonesModel):
-        lengths = [next(iter(zone.model_dump().values())) for zone in scene.model.zones[:-1]]
-        found += accumulate(lengths)
+        zones = scene.model.zones
+        ends = accumulate(next(iter(zone.model_dump().values())) for zone in zones)
+        neighbours = pairwise(isinstance(zone, RodZone) for zone in zones)
+        found += [end for end, (left, right) in zip(ends, neighbours, strict=False) if left != right]
     return tuple(distinct(found, scene.length))
 
 

@@ -221,14 +221,15 @@ class Result:
 
     def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
         """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
-        right, grid, values = f"right/{self._known(name)}", self["s"], self[name]
+        right, grid = f"right/{self._known(name)}", self["s"]
         if right not in self._dims or name == "s":
-            return {name: _interpolate(values, axis, grid, s, "s", "m")}
+            return {name: _interpolate(self[name], axis, grid, s, "s", "m")}
         x, jumps = np.asarray(s, dtype=float), self["right/s"]
         which = np.abs(x[..., None] - jumps).argmin(axis=-1)
         exact = np.abs(x - jumps[which]) <= 1e-9 * (grid[-1] - grid[0])
-        places, behind = np.searchsorted(grid, jumps) + 1, np.nextafter(jumps, np.inf)
-        doubled, values = np.insert(grid, places, behind), np.insert(values, places, self[right], axis)
+        behind = np.nextafter(jumps, np.inf)
+        doubled, values = self.both_sides(name)
+        doubled[np.searchsorted(doubled, jumps, side="right") - 1] = behind
         found = {
             key: _interpolate(values, axis, doubled, np.where(exact, at[which], x), "s", "m")
             for key, at in (("left", jumps), ("right", behind))
@@ -236,6 +237,15 @@ class Result:
         if side is None and exact.any():
             return {name: found["left"], right: found["right"]}
         return {name: found[side or "left"]}
+
+    def both_sides(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Arc lengths (n,), m, and a field (nt, n, ...) there; a place where it jumps comes twice, left value first."""
+        s, values, right = self["s"].copy(), self[name], f"right/{self._known(name)}"
+        if right not in self._dims:
+            return s, values
+        jumps = self["right/s"]
+        places = np.searchsorted(s, jumps) + 1
+        return np.insert(s, places, jumps), np.insert(values, places, self[right], self.dims(name).index("s"))
 
     def to_xarray(
         self,

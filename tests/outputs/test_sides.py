@@ -66,6 +66,27 @@ def test_exactly_there_both_values_are_given(hung: hybrid.Result) -> None:
         hung.at(s=AT, side="above")
 
 
+def test_both_sides_in_one_array(hung: hybrid.Result) -> None:
+    s, tension = hung.both_sides("tension")
+    assert s.tolist() == sorted([*hung.s.tolist(), AT])
+    below = MASS * G * (LENGTH - AT)
+    assert tension[0, s == AT] == pytest.approx([below + CLUMP * G, below], rel=1e-9)
+    assert np.array_equal(tension[:, s != AT], hung.tension[:, hung.s != AT])
+    s, position = hung.both_sides("position")
+    assert np.array_equal(s, hung.s) and np.array_equal(position, hung.position)
+
+
+@pytest.mark.parametrize("kinds", ["rod rod", "catenary catenary", "rod catenary"])
+def test_only_a_joint_of_rod_and_catenary_is_a_jump(kinds: str) -> None:
+    scene = chain() | {"model": {"kind": "zones", "zones": [{kind: 5.05} for kind in kinds.split()]}}
+    scene["cable"] = {"sections": [{"length": 10.1, "mass": MASS, "axial_stiffness": 1e6, "bending_stiffness": 1.0}]}
+    found = hybrid.static(hybrid.validate_scene(scene))
+    if kinds == "rod catenary":
+        assert found["right/s"].tolist() == [5.05] and 5.05 in found.s
+    else:
+        assert np.array_equal(found.s, np.linspace(0.0, 10.1, 11)) and "right/s" not in found
+
+
 def test_a_csv_has_a_column_for_each_side(hung: hybrid.Result, tmp_path: Path) -> None:
     hybrid.export(hung, tmp_path / "chain.csv", at=[1.0, AT])
     lines = (line for line in (tmp_path / "chain.csv").read_text().splitlines() if not line.startswith("#"))
