@@ -156,9 +156,13 @@ def test_one_bar_over_all_passes_and_the_pass_is_named() -> None:
     assert stream.getvalue().endswith("\x1b[2K")
 
 
-def test_shells_complete_commands(capsys: pytest.CaptureFixture[str]) -> None:
+def test_shells_complete_commands(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    """As the script of --install-completion asks; --show-completion would need a shell among the parent processes."""
     from hybrid.cli.commands import main
 
+    request = {"_HYBRID_COMPLETE": "complete_bash", "COMP_WORDS": "hybrid re", "COMP_CWORD": "1"}
+    for name, value in request.items():
+        monkeypatch.setenv(name, value)
     with pytest.raises(SystemExit):
-        main(["--show-completion", "bash"])
-    assert "complete" in capsys.readouterr().out
+        main([])
+    assert capsys.readouterr().out.split() == ["report", "resume"]

@@ -61,7 +61,8 @@ def tether(g):
     cable = {"sections": [section(0.5, g.uniform(1.05, 3)), section(0.5, g.uniform(0.4, 0.95))]}
     if g.random() < 0.5:
         lift = displaced * 9.81 * length * g.uniform(0.05, 1)
-        float_ = {"kind": "float", "at": 0.5 * length, "buoyancy": lift, "mass": 2.0, "drag_area": 0.05}
+        foam = 0.3 * lift / 9.81  # kg: its density is 0.3 / 1.3 of that of the water, 240 kg/m^3
+        float_ = {"kind": "float", "at": 0.5 * length, "buoyancy": lift, "mass": foam, "drag_area": 0.05}
         cable = {"sections": [section(1.0, g.uniform(1.02, 3))], "attachments": [float_]}
         if g.random() < 0.5:
             thrust = (50 * g.uniform(-1, 1, 3)).tolist()
