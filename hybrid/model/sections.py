@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
-from itertools import accumulate, pairwise
+from collections.abc import Iterator, Sequence
+from itertools import accumulate
 
 import numpy as np
 
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, RodZone, Scene, Section, ZonesModel
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
 
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
-# Part of the length below which two places are one.
-NEAR = 1e-9
 
 
 def merged_sections(sections: Sequence[Section]) -> list[Section]:
@@ -123,35 +121,3 @@ def attached_weights(scene: Scene) -> list[float]:
 def section_changes(scene: Scene) -> tuple[float, ...]:
     """Arc lengths (m) inside the cable where one section ends and the next begins."""
     return tuple(accumulate(x.length for x in merged_sections(scene.cable.sections)[:-1]))
-
-
-def jump_points(scene: Scene) -> tuple[float, ...]:
-    """Arc lengths (m) inside the cable where quantities may have two values, one on each side.
-
-    Point loads, changes of section, ends of modules, joints of rod and catenary in zones that stay where they are.
-    """
-    found = [*section_changes(scene)]
-    for item in scene.cable.attachments:
-        found += list(item.range) if isinstance(item, Modules) else [item.at]
-    if isinstance(scene.model, ZonesModel):
-        zones = scene.model.zones
-        ends = accumulate(next(iter(zone.model_dump().values())) for zone in zones)
-        neighbours = pairwise(isinstance(zone, RodZone) for zone in zones)
-        found += [end for end, (left, right) in zip(ends, neighbours, strict=False) if left != right]
-    return tuple(distinct(found, scene.length))
-
-
-def distinct(places: Iterable[float], length: float) -> list[float]:
-    """Places (m) inside a cable of that length (m) in order, one of those that round-off alone tells apart."""
-    out: list[float] = []
-    for x in sorted(places):
-        if x - (out[-1] if out else 0.0) > NEAR * length and length - x > NEAR * length:
-            out.append(float(x))
-    return out
-
-
-def marked_points(scene: Scene) -> list[float]:
-    """Arc lengths (m) inside the cable that are always output points: those of `jump_points`, and of the history."""
-    jumps = jump_points(scene)
-    others = (x for x in scene.output.history or () if all(abs(x - at) > NEAR * scene.length for at in jumps))
-    return sorted([*jumps, *distinct(others, scene.length)])

@@ -132,7 +132,7 @@ class Observer:
         only: Sequence[str] | None = None,
         errors: bool = False,
         corrected: bool = False,
-        jumps: Sequence[float] = (),
+        jumps: Sequence[float] | Floats = (),
         changes: Sequence[float] = (),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
@@ -238,15 +238,3 @@ class Observer:
             out |= {f"work/{name}": batch.work[:, k].copy() for k, name in enumerate(POWERS)}
             out["work/scheme"] = energy - self.first_energy - batch.work.sum(axis=1)
         return out
-
-
-def output_points(points: int | Sequence[float], length: float, more: Sequence[float] = ()) -> Floats:
-    """Output grid (ns,), m: that many points from end to end, or the ones listed, and `more` points.
-
-    What lies within round-off of one of the latter is replaced by it.
-    """
-    usual = np.linspace(0.0, length, points) if isinstance(points, int) else np.array(points, float)
-    if not len(more):
-        return usual
-    near = np.abs(usual[:, None] - np.asarray(more)).min(axis=1) <= 1e-9 * length
-    return np.unique(np.concatenate([usual[~near], more]))

@@ -148,7 +148,7 @@ def resume(
         if remaining.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
             raise ResultError(f"{path} would be replaced\n    detail:   {why}\n    try:      another name with -o")
-        case = Case(remaining.scene, criterion, remaining.changes)
+        case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
         with _supervised(case, progress):
             _compute(case, target, path, remaining)
     return open_result(target)
@@ -183,7 +183,7 @@ def _compute(
         control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute)
         if remaining is not None and remaining.before:
             with refused(source or Path()):
-                control.restore(remaining.before, scene)
+                control.restore(remaining.before, scene, case.points.s.size)
             result, errors = control.proceed()
         else:
             surveys = remaining is None and requested_accuracy(scene) is not None

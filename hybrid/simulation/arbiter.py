@@ -14,9 +14,10 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import Floats
+from hybrid.model.output_points import output_points
 from hybrid.model.plan import output_times
-from hybrid.model.sections import borne_tension, marked_points
-from hybrid.outputs.probes import PROBES, output_points
+from hybrid.model.sections import borne_tension
+from hybrid.outputs.probes import PROBES
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.shooting import ShootingState, simulate, static
@@ -90,7 +91,7 @@ def _target(output: str | Path | None) -> Path | io.BytesIO:
 
 
 def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: tuple[Field, ...]) -> Recorder:
-    s = output_points(scene.output.points, scene.length, marked_points(scene))
+    s = output_points(scene).s
     size = {"s": s.size, "xyz": 3}
     fields = [
         Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame)
@@ -103,7 +104,7 @@ def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: t
 
 
 def _values(scene: Scene, state: ShootingState) -> dict[str, Any]:
-    s = output_points(scene.output.points, scene.length, marked_points(scene))
+    s = output_points(scene).s
 
     def at(x: Floats) -> Floats:
         flat = x.reshape(x.shape[0], -1)

@@ -15,10 +15,11 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
+from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import Resolution, mesh_is_free, wants_errors
-from hybrid.model.sections import jump_points, marked_points, section_changes
-from hybrid.outputs.probes import Observer, output_points
+from hybrid.model.sections import section_changes
+from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
@@ -52,9 +53,19 @@ ZONES_FIXED = (
 class Case:
     """One scene in motion, computed as often and as finely as it takes."""
 
-    def __init__(self, scene: Scene, criterion: UserCriterion | None, changes: Sequence[LoadChange] = ()) -> None:
-        """changes: scenes that hold from some time on; what they may differ in, `remaining_run` has checked."""
+    def __init__(
+        self,
+        scene: Scene,
+        criterion: UserCriterion | None,
+        changes: Sequence[LoadChange] = (),
+        points: OutputPoints | None = None,
+    ) -> None:
+        """changes: scenes that hold from some time on; what they may differ in, `remaining_run` has checked.
+
+        points: of the result that is continued; None: those of the scene.
+        """
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
+        self.points = points if points is not None else output_points(scene)
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self._results = 0  # that were begun
@@ -113,6 +124,8 @@ class Case:
             return False
         with open_result(source) as result:
             if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
+                return False
+            if not np.array_equal(result["s"], self.points.s):
                 return False
         try:
             with opened(source) as file:
@@ -238,7 +251,7 @@ class Case:
             correction = Correction(model, switching)
         run = Transient(scene, model, resolution, switching, correction, EventLog())
         if points is None:
-            points = output_points(self.scene.output.points, model.length, marked_points(self.scene))
+            points = self.points.s
         observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)
         return TimeLoop(run, observer, target, self._report, self.interrupted)
 
@@ -250,7 +263,7 @@ class Case:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
-            model.corrected, () if only else jump_points(self.scene), section_changes(self.scene),
+            model.corrected, () if only else self.points.jumps, section_changes(self.scene),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

@@ -210,18 +210,21 @@ class ErrorController:
             "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
-    def restore(self, tree: Mapping[str, Any], scene: Scene) -> None:
-        """Continue as `checkpoint` has said.  ResultError or ValueError: it is none of this scene."""
+    def restore(self, tree: Mapping[str, Any], scene: Scene, points: int) -> None:
+        """Continue as `checkpoint` has said; points: in the output grid.
+
+        ResultError or ValueError: it is none of this scene.
+        """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0}
         saved = matched(tree, template | dict.fromkeys(("next", "coarse", "estimate", "notes")), "error control")
-        outputs = len(output_times(scene)) + 1
+        shape = len(output_times(scene)) + 1, points
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._notes = list(restored_notes(saved["notes"]))
         self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None
         if saved["coarse"] is not None:
-            first, second, third = (x and restored_sample(x, scene, outputs) for x in saved["coarse"])
+            first, second, third = (x and restored_sample(x, scene, shape) for x in saved["coarse"])
             self.comparisons = first, second, third
         if saved["estimate"] is not None:
-            self.estimate = Estimate.restored(saved["estimate"], scene, outputs)
+            self.estimate = Estimate.restored(saved["estimate"], scene, shape)
         if self.next is None and self.estimate is None:
             raise ValueError("neither a result nor one that is to come")

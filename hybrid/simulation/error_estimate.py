@@ -15,8 +15,6 @@ import numpy as np
 
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, first_resolution
-from hybrid.model.sections import marked_points
-from hybrid.outputs.probes import output_points
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
@@ -172,12 +170,12 @@ class Estimate:
         return found | {"notes": self.notes, "run": self.run.checkpoint()}
 
     @classmethod
-    def restored(cls, tree: Any, scene: Scene, outputs: int) -> Estimate:
-        """An estimate from a checkpoint.  ResultError or ValueError: it is none of this scene."""
+    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int]) -> Estimate:
+        """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
-        self.run, self.notes = restored_sample(tree["run"], scene, outputs), restored_notes(tree["notes"])
+        self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
-        late, cells, model = (_restored_outputs(tree[name], scene, outputs) for name in ("late", "cells", "model"))
+        late, cells, model = (_restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model = late, cells, model
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
@@ -248,18 +246,21 @@ def _magnitude(error: np.ndarray, name: str) -> np.ndarray:
 # --- from a checkpoint --------------------------------------------------------------------------
 
 
-def restored_sample(tree: Any, scene: Scene, outputs: int) -> RunSample:
-    """A sample from a checkpoint; outputs: of the result.  ResultError or ValueError: it is none of this scene."""
+def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int]) -> RunSample:
+    """A sample from a checkpoint; shape: number of outputs of the result, and of its output points.
+
+    ResultError or ValueError: it is none of this scene.
+    """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     saved = matched(tree, blank | dict.fromkeys(("resolution", "values", "model_error", "notes")), "run")
     if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
         raise ValueError("a run without cells, steps or outputs")
-    count = _every(outputs, saved["every"]).size
+    shape = _every(shape[0], saved["every"]).size, shape[1]
     return RunSample(
         **saved | {
             "resolution": resolution_from(saved["resolution"], scene), "notes": restored_notes(saved["notes"]),
-            "values": _restored_outputs(saved["values"], scene, count),
-            "model_error": _restored_outputs(saved["model_error"], scene, count),
+            "values": _restored_outputs(saved["values"], shape),
+            "model_error": _restored_outputs(saved["model_error"], shape),
         }
     )  # fmt: skip
 
@@ -269,12 +270,11 @@ def restored_notes(tree: Any) -> Notes:
     return tuple((kind, text) for kind, text in matched(tree, [["", ""]] * len(tree), "notes"))
 
 
-def _restored_outputs(tree: Any, scene: Scene, count: int) -> dict[str, np.ndarray]:
-    """Outputs (count, ...) by name from a checkpoint.  ResultError: they are of another shape."""
-    ns, points = output_points(scene.output.points, scene.length, marked_points(scene)).size, {"position": (3,)}
-    template = {}
+def _restored_outputs(tree: Any, shape: tuple[int, int]) -> dict[str, np.ndarray]:
+    """Outputs by name from a checkpoint; shape: their number, and that of points.  ResultError: of another shape."""
+    (count, _), points, template = shape, {"position": (3,)}, {}
     for name, value in tree.items():
-        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else (count, ns)
+        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else shape
         scalar = name == "position" and np.ndim(value) == 2  # of an error, its size
         template[name] = np.zeros((*full, *(() if scalar else points.get(name, ()))))
     if not set(tree) <= {*COMPARED, *END_FORCES.values()}:

@@ -14,12 +14,13 @@ import numpy as np
 from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
+from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import parse_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import refused, resolution_from
+from hybrid.simulation.restore import refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
 from hybrid.store.named_arrays import Tree
@@ -47,7 +48,7 @@ class RemainingRun:
     """What is to be done: a scene, what changes later, and where to begin.
 
     before: what was found before the run, of what it is part of; {}: nothing, it begins with `resolution`.  anew: from
-    t = 0, not from the checkpoint; reached: s, where it begins.
+    t = 0, not from the checkpoint; reached: s, where it begins; points: of the result, None if it is computed anew.
     """
 
     scene: Scene
@@ -56,6 +57,7 @@ class RemainingRun:
     before: Tree
     anew: bool
     reached: float
+    points: OutputPoints | None
 
 
 def remaining_run(
@@ -65,7 +67,7 @@ def remaining_run(
 
     ResultError: nothing, or it cannot be told; SceneError: what is asked cannot be.
     """
-    scene, changes, status, before, point = _found(path)
+    scene, changes, status, before, point, points = _found(path)
     with refused(path):
         resolution = resolution_from(point.resolution, scene)
     if start is not None and not settings:
@@ -74,7 +76,7 @@ def remaining_run(
         if status == "complete" and not before:
             fix = "--until T goes on beyond its end, --set KEY=VALUE --from T changes a load"
             raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
-        return RemainingRun(scene, changes, resolution, before, False, point.t)
+        return RemainingRun(scene, changes, resolution, before, False, point.t, points)
     if until is not None:
         scene, changes = _longer(scene, changes, until, point.t)
     anew = False
@@ -89,7 +91,8 @@ def remaining_run(
         if end != scene.require_time().duration:
             scene, changes = _longer(scene, changes, end, point.t)
         changes, anew = (*changes, LoadChange(begin, changed)), begin < point.t
-    return RemainingRun(scene, changes, resolution, {}, anew, 0.0 if anew else point.t)
+    reached, kept = (0.0, None) if anew else (point.t, points)
+    return RemainingRun(scene, changes, resolution, {}, anew, reached, kept)
 
 
 def changes_text(changes: Sequence[LoadChange]) -> str:
@@ -97,19 +100,21 @@ def changes_text(changes: Sequence[LoadChange]) -> str:
     return json.dumps([{"t": x.t, "scene": scene_text(x.scene)} for x in changes]) if changes else ""
 
 
-def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkpoint]:
+def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkpoint, OutputPoints]:
     with opened(path) as file:
         before, point = read_before(file), read_checkpoint(file)
         with open_result(path) as result:
             scene = parse_scene(result.scene_text)
             status = result.status
+            with refused(path):
+                points = restored_points(result, scene.length)
             try:
                 told = json.loads(result.changes_text or "[]")
                 changes = tuple(LoadChange(float(x["t"]), parse_scene(x["scene"])) for x in told)
             except (ValueError, TypeError, KeyError) as error:
                 advice = f"    detail:   {error}\n    try:      run its scene again"
                 raise ResultError(f"{path} has changes that cannot be read\n{advice}") from None
-    return scene, changes, status, before, point
+    return scene, changes, status, before, point, points
 
 
 def _longer(

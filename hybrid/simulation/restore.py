@@ -24,6 +24,7 @@ from hybrid.model.build import MOST_PARTS, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
+from hybrid.model.output_points import OutputPoints
 from hybrid.model.plane import in_space, planar
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.schema import AdaptiveModel, Scene
@@ -31,6 +32,7 @@ from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.initial_zones import manager_for
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.reader import Result
 
 # Rooms that have a part in the numbers of a file.
 COMPUTES = ("adapt", "errors", "kernels", "model", "outputs", "scene", "simulation", "solve", "store")
@@ -94,6 +96,21 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST):
         raise ValueError("cells that no mesh has")
     return Resolution(**saved | {"grading": grading})
+
+
+def restored_points(result: Result, length: float) -> OutputPoints:
+    """The output points of a result, which whoever continues it keeps; one of 0.6 has no jumps.
+
+    ValueError: none of a cable of that length (m).
+    """
+    s = np.asarray(result["s"], float)
+    jumps = np.asarray(result["right/s"], float) if "right/s" in result else np.zeros(0)
+    ordered = s.ndim == 1 and s.size > 0 and bool((np.diff(s) > 0.0).all())
+    if not (ordered and s[0] >= 0.0 and s[-1] <= length * (1 + 1e-9)):
+        raise ValueError(f"s: output points that increase from 0 to {length:g} m at most were expected")
+    if jumps.ndim != 1 or not np.isin(jumps, s).all():
+        raise ValueError("right/s: places among the output points s were expected")
+    return OutputPoints(s, jumps)
 
 
 # --- the model ----------------------------------------------------------------------------------

@@ -15,9 +15,10 @@ from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import batch_of_one
 from hybrid.model.build import Model, build
+from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
-from hybrid.model.sections import jump_points, marked_points, section_changes
-from hybrid.outputs.probes import Observer, output_points
+from hybrid.model.sections import section_changes
+from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
@@ -80,12 +81,11 @@ class StaticCase:
         return model, found, switching
 
     def _observer(self, model: Model, only: Sequence[str] | None = None) -> Observer:
-        s = output_points(self.scene.output.points, model.length, marked_points(self.scene))
+        s, jumps = output_points(self.scene)
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
-            corrected=model.corrected, jumps=() if only else jump_points(self.scene),
-            changes=section_changes(self.scene),
+            corrected=model.corrected, jumps=() if only else jumps, changes=section_changes(self.scene),
         )  # fmt: skip
 
 

@@ -70,6 +70,25 @@ def test_beyond_the_end_of_an_accuracy_the_whole_is_judged(tmp_path):
         assert checkpoint.BEFORE not in file
 
 
+@pytest.mark.parametrize("errors", [False, True])
+def test_a_result_keeps_its_output_points(errors, tmp_path, monkeypatch):
+    """Results of 0.6 have no output point at a change of section, and one value there; so have their errors."""
+    section = {"mass": 1.0, "diameter": 0.02, "drag": {"normal": 1.0}}
+    cable = {"sections": [section | {"length": 0.45}, section | {"length": 0.55, "mass": 2.0}]}
+    scene = swinging(cable=cable, output={"every": 0.1, "points": 11, "errors": errors})
+    stopping = Stopping(monkeypatch)
+    with monkeypatch.context() as older:
+        points = case.OutputPoints(np.linspace(0.0, 1.0, 11), np.zeros(0))
+        older.setattr(case, "output_points", lambda scene: points)
+        hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+        stopped(tmp_path / "run.h5", monkeypatch, scene, stopping.heard - 50)
+    with hybrid.resume(tmp_path / "run.h5") as result:
+        assert result.s.size == 11 and "right/s" not in result and ("errors/total/tension" in result) == errors
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+    with hybrid.run(scene) as now:
+        assert now.s.size == 12 and now["right/s"].tolist() == [0.45]
+
+
 def test_a_load_that_ends_is_a_load_that_is_changed(tmp_path):
     """A force until 1 s, and the same force taken off by resuming at 1 s: one motion."""
     free = {"kind": "free", "force": {"value": [0.3, 0, 0], "until": 1.0}}

@@ -10,8 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from hybrid.model.build import build
-from hybrid.model.sections import marked_points
-from hybrid.outputs.probes import output_points
+from hybrid.model.output_points import output_points
 from hybrid.scene.ends import Pinned
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.motion_checks import shortest_period
@@ -145,7 +144,7 @@ def line_of(scene: Scene) -> Line:
         scene.environment.gravity, fluid.density, (bed.z + up, bed.stiffness, bed.damping) if bed else None,
         (EndMotion(ends[0].motion, ends[0].position), EndMotion(ends[1].motion, ends[1].position)),
         min(shortest_period(scene.ends, scene.environment), scene.require_time().duration),
-        up, np.asarray(output_points(scene.output.points, section.length, marked_points(scene))), scene,
+        up, output_points(scene).s, scene,
     )  # fmt: skip
 
 
