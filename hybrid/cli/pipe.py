@@ -1,4 +1,4 @@
-"""The output stream where it is a pipe, as in `hybrid schema | head`."""
+"""The output and error streams where they are pipes, as in `hybrid schema | head`."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from typing import Any
 
 
 class _Pipe(io.FileIO):
-    """The output stream where it is a pipe: what nobody reads any more, as behind `| head`, is dropped."""
+    """A stream that is a pipe: what nobody reads any more, as behind `| head`, is dropped."""
 
     dropped = False
 
@@ -24,14 +24,18 @@ class _Pipe(io.FileIO):
 
 
 def guard_output() -> None:
-    """Let a reader that has gone end no command and cause no error message."""
-    try:
-        piped = stat.S_ISFIFO(os.fstat(sys.stdout.fileno()).st_mode)
-    except (OSError, ValueError):  # a stream without a file, as in tests
-        return
-    if piped and isinstance(sys.stdout, io.TextIOWrapper):
-        old, raw = sys.stdout, io.BufferedWriter(_Pipe(sys.stdout.fileno(), "w", closefd=False))
-        sys.stdout = io.TextIOWrapper(raw, old.encoding, old.errors, line_buffering=old.line_buffering)
+    """Let a reader that has gone end no command, cause no error message and change no exit code."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        try:
+            piped = stat.S_ISFIFO(os.fstat(stream.fileno()).st_mode)
+        except (OSError, ValueError, AttributeError):  # a stream without a file, as in tests; none under pythonw
+            continue
+        if piped and isinstance(stream, io.TextIOWrapper):
+            raw = io.BufferedWriter(_Pipe(stream.fileno(), "w", closefd=False))
+            setattr(
+                sys, name, io.TextIOWrapper(raw, stream.encoding, stream.errors, line_buffering=stream.line_buffering)
+            )
 
 
 def reader_has_gone() -> bool:

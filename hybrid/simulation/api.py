@@ -138,7 +138,7 @@ def resume(
     Raises ResultError when there is nothing to continue or the file is another program's, and else as `run`.
     """
     path = Path(source).expanduser().resolve()
-    target = path if output is None else Path(output).expanduser().resolve()
+    target = _path(output) or path
     if not path.is_file():
         open_result(path)  # which says what is there instead
     if target != path:
@@ -247,7 +247,14 @@ def _beside(target: Path) -> Path:
 
 
 def _path(output: str | Path | None) -> Path | None:
-    return None if output is None else Path(output).expanduser().resolve()
+    """Where a result goes; ResultError for a device or a pipe, which would be replaced by a file, or block."""
+    if output is None:
+        return None
+    path = Path(output).expanduser().resolve()
+    if path.exists() and not (path.is_file() or path.is_dir()):
+        why = "is no regular file (a device, pipe or socket)"
+        raise ResultError(f"{path} {why}\n    try:      the name of a file, such as run.h5; in Python, None for memory")
+    return path
 
 
 def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:

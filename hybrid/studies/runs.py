@@ -15,7 +15,7 @@ from typing import Any, get_args
 
 import numpy as np
 
-from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.errors import Complaint, ComputationError, ResultError, SceneError
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.base import Kinds
 from hybrid.scene.read import scene_text, validate_scene
@@ -106,7 +106,11 @@ class RunStore:
         self.folder, self.total = folder, total
         self.done, self.computed, self._progress, self._warm = 0, 0, progress, set[str]()
         self.facts = facts_of_machine()  # now: the load is that before the first run
-        (folder / "runs").mkdir(parents=True, exist_ok=True)
+        try:
+            (folder / "runs").mkdir(parents=True, exist_ok=True)
+        except OSError as error:
+            text = f"{folder} is no folder for a study\n    detail:   {error}"
+            raise ResultError(f"{text}\n    try:      -o with a folder that can be made or written to") from None
 
     def report(self, what: str, part: float) -> None:
         if self._progress is not None:

@@ -67,7 +67,8 @@ def trade(
     scene's `accuracy`; repeat: of so many runs the median CPU time counts; peers: other programs as well, those that
     are installed; progress: called with a StudyProgress; command: for the heading of the page.
 
-    Raises SceneError when the scene or an argument is refused, ComputationError when the reference fails.
+    Raises SceneError when the scene or an argument is refused, ResultError when the folder cannot be written to,
+    ComputationError when the reference fails.
     KeyboardInterrupt leaves a table of the finished runs.
     """
     target, progress = _renamed(former, target, progress)

@@ -346,3 +346,17 @@ def test_a_closed_pipe_ends_a_command_quietly(call: Call, command: list[str]) ->
     finally:
         os.close(begin)
     assert (done.returncode, done.stderr) == (0, b"")
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="has no such pipes")
+def test_a_closed_pipe_of_errors_changes_no_exit_code(call: Call) -> None:
+    script = "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])"
+    soft = "cable.sections[0].axial_stiffness=1.0"  # stretched beyond what a section bears
+    command = [sys.executable, "-c", script, "static", "wire.yaml", "--set", soft]
+    end, begin = os.pipe()
+    os.close(end)
+    try:
+        done = subprocess.run(command, stdout=subprocess.DEVNULL, stderr=begin, check=False)
+    finally:
+        os.close(begin)
+    assert done.returncode == 2

@@ -115,6 +115,12 @@ def test_a_scene_without_time_is_refused(call: Call) -> None:
     assert said.code == 1 and "time" in said.err
 
 
+def test_a_file_in_the_place_of_the_folder_is_refused(call: Call) -> None:
+    said = call("trade", "sag.yaml", *SHORT, "-o", "sag.yaml")
+    assert said.code == 1 and "sag.yaml is no folder for a study" in said.err and "Traceback" not in said.err
+    assert Path("sag.yaml").read_text() == SAG
+
+
 def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.MonkeyPatch) -> None:
     import hybrid.studies.runs as rungs
     from hybrid.errors import ComputationError, Outcome

@@ -59,6 +59,16 @@ def test_a_bad_dict_is_refused_like_a_bad_file() -> None:
         hybrid.run(WIRE | {"model": "string"})
 
 
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="has no such pipes")
+def test_a_pipe_or_device_is_not_replaced(tmp_path: Path, file: Path) -> None:
+    hybrid.run(file, tmp_path / "run.h5")
+    os.mkfifo(tmp_path / "pipe")
+    for call in (hybrid.run, hybrid.static, lambda _, to: hybrid.resume(tmp_path / "run.h5", to, until=0.2)):
+        with pytest.raises(hybrid.ResultError, match="no regular file"):
+            call(file, tmp_path / "pipe")
+    assert (tmp_path / "pipe").is_fifo()
+
+
 # --- snapshots -----------------------------------------------------------------------------------
 
 
