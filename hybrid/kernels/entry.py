@@ -1,45 +1,51 @@
-"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.newton)."""
+"""What Python asks of the solver: a step, a static solve, the block rows of a configuration (kernels.run)."""
 
 from __future__ import annotations
 
+import threading
+
 import numpy as np
 
+from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.block_elimination_plane import WIDE
 from hybrid.kernels.forces import PLANAR
-from hybrid.kernels.newton import (
-    ASSEMBLY,
-    CORRECTION,
-    EQUILIBRIUM,
-    OK,
-    STEP,
-    Limits,
-    Task,
-    solve_in_plane,
-    solve_in_space,
-)
+from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
+from hybrid.kernels.run import blank_job, in_plane, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
 
 NO_PUSH: Floats = np.zeros((0, 4))
+NO_STRAINS: Floats = np.zeros((0, 3))
 ONE_MARCH = Limits(1.0, 1.0, 1)
+
+
+class _OfThread(threading.local):
+    """The table of the thread that asks; it keeps what was bound last."""
+
+    def __init__(self) -> None:
+        self.table = Table(blank_job())
+
+
+_here = _OfThread()
 
 
 def _solve(
     task: Task, line: Line, sea: Sea, ends: Ends, old: State, new: State, was: Floats, now: Floats, work: Work
 ) -> tuple[int, int, float, int]:
-    """As kernels.newton._solve, by the kernel for the line's kind."""
-    if line.bits & PLANAR:
-        return solve_in_plane(line.plane, None, task, line, sea, ends, old, new, was, now, work)
-    return solve_in_space(None, 1, task, line, sea, ends, old, new, was, now, work)
+    """As kernels.newton.solve, by the kernel for the line's kind."""
+    table = _here.table
+    table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)
+    found: tuple[int, int, float, int] = (in_plane if line.bits & PLANAR else in_space)(table.numbers)
+    return found
 
 
 def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:
     """Largest bend and twist of an element, rad, and their nodes (kernels.resolution_checks)."""
     if line.bits & PLANAR:
-        return sharpest_in_plane(line, ends, state.e, state.T)
-    return sharpest_in_space(line, ends, state.e, state.T, state.a1)
+        return sharpest_in_plane(line, ends, state.e, state.T, state.a1, NO_STRAINS)
+    return sharpest_in_space(line, ends, state.e, state.T, state.a1, NO_STRAINS)
 
 
 def workspace(n_cells: int, keep: bool = False) -> Work:

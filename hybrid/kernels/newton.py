@@ -3,8 +3,7 @@
 Each iteration is one march along s and one substitution back (kernels.assembly), then an update of positions,
 tensions, frames and rates.  `plane` and `space`: for which kind of line (kernels.configuration).
 
-`_solve` is the one compiled entry to all that needs the march.  An entry for each would compile the march once more,
-and so does every function that stands between: they are inlined here.  kernels.entry has its faces for Python.
+`solve` is inlined in the one entry to all that needs the march (kernels.run): a second one would compile it once more.
 """
 
 from __future__ import annotations
@@ -16,15 +15,15 @@ from hybrid.kernels.assembly import march
 from hybrid.kernels.assembly_plane import march_planar
 from hybrid.kernels.block_elimination import substitute
 from hybrid.kernels.block_elimination_plane import substitute_planar
-from hybrid.kernels.compile import inner, kernel, named
+from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 
-OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, TURNED_TOO_FAR = 0, 1, 2, 3, 5  # errors.Outcome, as kernels see it
-STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION = 0, 1, 2, 3
+OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
 
 
 class Limits(NamedTuple):
@@ -79,11 +78,12 @@ def round_off_tension(line, ca, scale):
     return min(ROUND_OFF_LENGTH * length * heavy * ca, MOST_NOISE * scale)
 
 
-def _solve(plane, space, task, line, sea, ends, old, new, was, now, work):
+@inner
+def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains):
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
     STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
-                    after (kernels.out_of_plane), empty where there is none
+                    after (kernels.out_of_plane), empty where there is none; strains: of the elements, empty: not wanted
     EQUILIBRIUM     solve from the prediction in work.u and `new`
     ASSEMBLY        one march, for its report and its block rows
     CORRECTION      one march and the solution of its equations, into work.x
@@ -150,12 +150,7 @@ def _solve(plane, space, task, line, sea, ends, old, new, was, now, work):
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
         if outcome == OK:
-            turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work)
+            turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
             if not turn < LARGEST_STEP_TURN:
                 outcome, where = TURNED_TOO_FAR, cell
     return outcome, it, left, where
-
-
-# One kernel for each kind of line: neither is compiled for a scene that does not have it.
-solve_in_plane = kernel(named(_solve, "solve_in_plane"))
-solve_in_space = kernel(named(_solve, "solve_in_space"))

@@ -6,9 +6,9 @@ import math
 
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.cell import chord
-from hybrid.kernels.compile import kernel
+from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
-from hybrid.kernels.plane import angle_between, chord2, end_chord, row_in_plane
+from hybrid.kernels.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.rotations import frame, log_rotation
 
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
@@ -16,8 +16,17 @@ from hybrid.kernels.rotations import frame, log_rotation
 CLAMP = 20.0
 
 
+@inner
+def strain_of(line, i, k, strains):
+    """Curvature (1/m), bending moment and torque (N m) of the element at node i, whose log strain is k (rad)."""
+    strains[i, 0] = math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[i]
+    x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
+    strains[i, 1] = math.sqrt(x * x + y * y)
+    strains[i, 2] = line.kb[i, 2] * (k[2] - line.k0[i, 2])
+
+
 @kernel
-def sharpest_in_plane(line, ends, e, T):
+def sharpest_in_plane(line, ends, e, T, a1, strains):
     """As `sharpest_in_space` for a cable in a plane: largest bend and its node; there is no twist."""
     bend, at = 0.0, -1
     n, plane = e.shape[0], line.plane
@@ -29,7 +38,11 @@ def sharpest_in_plane(line, ends, e, T):
             d, l, _ = chord2(row_in_plane(plane, e, i))
         if not line.element[i]:
             continue
-        x = abs(angle_between(before, d if i < n else end_chord(plane, ends.frame, 1)))
+        angle = angle_between(before, d if i < n else end_chord(plane, ends.frame, 1))
+        x = abs(angle)
+        if strains.shape[0] > 0:
+            k, k0 = stiffness_about_normal(plane, a1, max(i - 1, 0), before if i > 0 else d, line.kb, line.k0, i)
+            strains[i, 0], strains[i, 1] = x / line.hn[i], abs(k * (angle - k0))
         if i == 0 or i == n:
             c = min(i, n - 1)
             stiffness = max(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
@@ -43,7 +56,7 @@ def sharpest_in_plane(line, ends, e, T):
 
 
 @kernel
-def sharpest_in_space(line, ends, e, T, a1):
+def sharpest_in_space(line, ends, e, T, a1, strains):
     """How far the mesh is from resolving a rod: largest bend and twist of an element, rad, and their nodes (-1: none).
 
     The element at a clamp or guide stands for half a cell; it counts twice, and CLAMP times
@@ -72,6 +85,8 @@ def sharpest_in_space(line, ends, e, T, a1):
         k = log_rotation(relative_rotation(Ra, Rb))
         x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
         y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
+        if strains.shape[0] > 0:
+            strain_of(line, i, k, strains)
         if not x <= bend:
             bend, bend_at = x, i
         if not y <= twist:

@@ -5,7 +5,7 @@ All are NamedTuples of contiguous arrays with fixed types, so that one compiled 
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -171,6 +171,20 @@ def batch_of_one(t: float, ends: Ends, state: State, report: Floats, work: Float
     )  # fmt: skip
 
 
+def state_in(batch: Batch, k: int) -> State:
+    """The state at output k, in arrays of its own; algorithmic accelerations and friction are not known."""
+    state = blank_state(batch.T.shape[1])
+    for name in ("r", "v", "vd", "e", "T", "a1", "w"):
+        getattr(state, name)[:] = getattr(batch, name)[k]
+    return state
+
+
+def ends_in(batch: Batch, k: int) -> Ends:
+    """The conditions of the ends at output k, in arrays of their own."""
+    rows = (batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
+    return Ends(*(np.array(x[k]) for x in rows))
+
+
 class Work(NamedTuple):
     """Arrays that a solver works in; kernels.entry.workspace makes them."""
 
@@ -198,4 +212,42 @@ def no_sea(n_cells: int) -> Sea:
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
         np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+    )  # fmt: skip
+
+
+def blank_line(n_cells: int) -> Line:
+    """A line of `n_cells` cells without length, mass or load."""
+    node = dict.fromkeys(("force", "kb", "k0"), np.zeros((n_cells + 1, 3)))
+    cells = (
+        "h",
+        "ck",
+        "rotary",
+        "polar",
+        "drag_n",
+        "drag_t",
+        "added_n",
+        "added_t",
+        "tau",
+        "buoy",
+        "displaced",
+        "diameter",
+    )
+    cell = dict.fromkeys(cells, np.zeros(n_cells))
+    kinds = {"element": np.zeros(n_cells + 1, np.int8), "spin": np.zeros(n_cells, np.int8), "bits": 0}
+    values: dict[str, Any] = dict.fromkeys(Line._fields, np.zeros(n_cells + 1)) | node | cell | kinds
+    return Line(**values | {"plane": NO_PLANE})
+
+
+def no_ends() -> Ends:
+    """Both ends free, without loads."""
+    vectors = [np.zeros((2, 3)) for _ in range(4)]
+    return Ends(np.zeros(2, np.int8), vectors[0], np.zeros((2, 9)), *vectors[1:])
+
+
+def no_moves() -> Moves:
+    """Both ends at the origin, not moved, not loaded."""
+    z = np.zeros
+    return Moves(
+        z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
+        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((0, 6)),
     )  # fmt: skip

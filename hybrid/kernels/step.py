@@ -173,14 +173,14 @@ def begin_step(plane, space, line, sea, old, new, u, s):
 
 
 @inner
-def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work):
-    """Report of a step that Newton has solved.  Returns its largest turn of a chord, rad, and its cell."""
+def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains):
+    """Report of a step that Newton has solved, and strains of its elements.  Returns its largest turn of a chord, rad, and its cell."""
     u, report, dt = work.u, work.report, s.dt
     sharp = (0.0, -1, 0.0, -1)
     if space is not None:
-        sharp = sharpest_in_space(line, ends, new.e, new.T, new.a1)
+        sharp = sharpest_in_space(line, ends, new.e, new.T, new.a1, strains)
     if plane is not None:
-        sharp = sharpest_in_plane(line, ends, new.e, new.T)
+        sharp = sharpest_in_plane(line, ends, new.e, new.T, new.a1, strains)
     report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharp
     report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = acceleration_change(old, new)

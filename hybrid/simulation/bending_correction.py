@@ -85,9 +85,9 @@ class Correction:
             )
         return ""
 
-    def shift(self, state: State) -> Shift:
-        """The error at an output of `state`."""
-        return self.corrector.shift(self.ends, state)
+    def shift(self, state: State, part: float = 1.0) -> Shift:
+        """The error at an output of `state`, which lies the `part` of the last step after its begin."""
+        return self.corrector.at(part).shift(self.ends, state)
 
 
 class _TurnOfEnds:

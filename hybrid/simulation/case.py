@@ -87,7 +87,7 @@ class Case:
             if switching is not None and switching.manager.held:
                 recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
             loop.begin(equilibrium)
-            loop.to_the_end(outputs, self.changes)
+            loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
         return self._compared(loop.run, target, clock.process_time() - begin)
 
@@ -114,7 +114,7 @@ class Case:
                 wrote, this = (x.split()[0] for x in (point.program, program()))
                 text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
                 recorder.event(point.t, 0.0, model.length, OTHER_PROGRAM, f"{text}: the last digits may be others")
-            loop.to_the_end(output_times(self.scene), self.changes)
+            loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
         return self._compared(loop.run, target, clock.process_time() - begin)
 
@@ -139,6 +139,16 @@ class Case:
         self.progress.begin(REFINEMENT if self._results else RESULT, resolution)
         self._results += 1
         return clock.process_time()
+
+    @property
+    def _duration(self) -> float:
+        """When the run ends, s."""
+        return self.scene.require_time().duration
+
+    @property
+    def _exact(self) -> bool:
+        """Whether steps end at outputs."""
+        return False
 
     @property
     def _texts(self) -> dict[str, str]:
@@ -187,11 +197,8 @@ class Case:
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None, points=points)
-        times = output_times(self.scene)
-        if resolution.every > 1:
-            times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
         loop.begin(equilibrium)
-        loop.to_the_end(times, self.changes)
+        loop.to_the_end(self._duration, self._exact, self.changes)
         found = loop.recorder
         assert isinstance(found, MemoryRecorder)
         values = {name: found[name] for name in COMPARED if name in found}
@@ -249,7 +256,10 @@ class Case:
         """The loop of a run, as yet without a state; scene: the one that holds at present."""
         if correction is None and model.follows_error:
             correction = Correction(model, switching)
-        run = Transient(scene, model, resolution, switching, correction, EventLog())
+        times = output_times(self.scene)
+        if target is None and resolution.every > 1:
+            times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
+        run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times])
         if points is None:
             points = self.points.s
         observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)

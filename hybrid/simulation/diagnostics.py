@@ -12,12 +12,16 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels import books as b
+from hybrid.kernels.accept import LARGEST_TWIST
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
+from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.resolution_checks import lowest
-from hybrid.kernels.state import Ends, Floats, State
+from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.model.build import Model
 from hybrid.simulation.events import EventLog
+from hybrid.solve.run import CompiledRun
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
 
@@ -27,9 +31,6 @@ UNRESOLVED = 1.0
 OFF = 0.02
 # Depth in the seabed, as a part of the line's length, that no bed of real soil allows.
 SUNK = 0.01
-# Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
-# an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
-LARGEST_TWIST = 2.0
 # Energy that the scheme creates, as a part of what work, fall and start have put in: beyond the first it is
 # noted (a healthy run stays below 1 %), at the second the motion is the scheme's own and the run stops.
 GAIN_NOTED, GAIN_STOPS = 0.05, 1.0
@@ -43,9 +44,6 @@ PRESSED = 1e-3
 # What an oscillation is wrong by after one period, as a part of it, beyond which a step is said to be too long
 # (docs/theory.md, 8): 8 steps a period with rho_inf = 1, 14 with 0.5, 24 with 0.
 COARSE = 0.35
-# So many of the worst steps are needed: one alone is a blow or a load let go, unless it leaves out all of the motion or
-# there are hardly any others.
-SEVERAL = 3
 # Of the length, and of the largest tension: what Newton's tolerance changes them by is no motion.
 HARDLY_MOVED = 1e-7
 # An angle at a clamp (rad) that is more than what Newton leaves; a bend there that falls by more than this part to the
@@ -63,7 +61,7 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_rho", "_moved", "_steps", "_put_in", "_potential", "_alive",
+    "_put_in", "_potential", "_alive",
 )  # fmt: skip
 
 Stop = tuple[Outcome, int] | None
@@ -98,11 +96,7 @@ class Diagnostics:
         self._off = OFF * model.length
         self._gain, self._loss = GAIN_NOTED, LOSS_NOTED
         self._rested = self._left_out = False
-        self._placed: Floats | None = None  # m, of base nodes at the start
         self._jump = SNAP * model.tension_scale  # N
-        self._tension_range = (np.inf, 0.0)  # N, lowest and highest of the largest tensions
-        self._rho, self._moved, self._steps = 0.0, 0.0, 0  # -, m, -
-        self._left: list[tuple[float, float, float, float]] = []  # m; t and dt in s; s in m: of the worst steps
         self._put_in = self._potential = self._alive = 0.0  # J
 
     def begin(self) -> None:
@@ -111,23 +105,26 @@ class Diagnostics:
             if entry.event:
                 self.events.event(0.0, 0.0, self._model.length, entry.event, f"{entry.what}: {entry.why}")
 
-    def checkpoint(self) -> dict[str, Any]:
+    def checkpoint(self, run: CompiledRun) -> dict[str, Any]:
         """What has been noted so far, and what `finish` will judge by."""
-        worst = np.array(self._left).reshape(-1, 4)
+        clock, count = run.clock, run.count
         return {name: getattr(self, name) for name in REMEMBERED} | {
-            "pulls": list(self._tension_range), "worst": worst,
-            "placed": self._placed if self._placed is not None else NOWHERE,
+            "pulls": clock[[b.LEAST_PEAK, b.LARGEST_PEAK]].tolist(), "_rho": float(clock[b.RHO]),
+            "_moved": float(clock[b.MOVED]), "_steps": int(count[b.MEASURED]),
+            "worst": run.books.worst[: min(int(count[b.MEASURED]), b.WORST)].copy(), "placed": run.books.placed,
         }  # fmt: skip
 
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Go on as `checkpoint` has said; ValueError where that cannot be."""
+    def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
+        """Go on as `checkpoint` has written; ValueError where that cannot be."""
         vars(self).update({name: saved[name] for name in REMEMBERED})
-        places = self._model.line.s if self._model.layout is None else self._model.layout.base
-        placed, worst = saved["placed"], saved["worst"]
-        if placed.shape not in (NOWHERE.shape, (places.size, 3)) or worst.shape[1:] != (4,) or len(worst) > SEVERAL:
+        placed, worst, steps = saved["placed"], saved["worst"], saved["_steps"]
+        if placed.shape not in (NOWHERE.shape, (run.books.base.size, 3)) or worst.shape != (min(steps, b.WORST), 4):
             raise ValueError("places of another line")
-        self._placed = placed if placed.size else None
-        self._tension_range, self._left = tuple(saved["pulls"]), [tuple(x) for x in worst.tolist()]
+        run.books.worst[: len(worst)] = worst
+        run.clock[[b.LEAST_PEAK, b.LARGEST_PEAK]], run.clock[b.MOVED] = saved["pulls"], saved["_moved"]
+        run.count[b.MEASURED] = steps
+        run.place(placed if placed.size else run.state.r[run.books.base].copy())
+        self.watch(run)
 
     def follow(self, model: Model) -> None:
         """Watch the same line with other zones."""
@@ -174,7 +171,12 @@ class Diagnostics:
             return None
         node, twisted = int(sharp[1]), int(sharp[3])
         if bend > self._bend:
-            self.note(t, node, "unresolved bend", self._bend_text(node, bend, state))
+            self.note(
+                t,
+                node,
+                "unresolved bend",
+                self._bend_text(node, bend, state.T),
+            )
             self._bend = 1.5 * bend
         if twist > self._twist:
             text = f"a twist of {np.degrees(twist):.0f} deg to the next cell: add cells, or torque may be wrong"
@@ -182,10 +184,10 @@ class Diagnostics:
             self._twist = 1.5 * twist
         return (Outcome.TWISTED_TOO_FAR, twisted) if twist > LARGEST_TWIST else None
 
-    def _bend_text(self, node: int, bend: float, state: State) -> str:
+    def _bend_text(self, node: int, bend: float, T: Floats) -> str:
         line, s = self._model.line, float(self._model.line.s[node])
         cell = min(node, line.h.size - 1)
-        first, tension = float(line.h[cell]), float(state.T[cell])
+        first, tension = float(line.h[cell]), float(T[cell])
         stiffness = float(line.kb[node, :2].max() * line.hn[node])
         leaving = float(np.sqrt(stiffness / tension)) if tension > 0.0 else np.inf
         place = "the cable leaves its end" if node in (0, line.s.size - 1) else "the cable leaves its point load"
@@ -207,49 +209,50 @@ class Diagnostics:
             text = "rho_inf = 1 damps nothing: the tension of an inextensible cable grows a sawtooth; 0.9 keeps it away"
             self.events.event(0.0, 0.0, self._model.length, "undamped", text)
 
-    def step(self, t: float, dt: float, rho: float, before: State, state: State) -> None:
-        """Remember the steps that leave the most out of the motion, and how far the line has moved."""
-        first = slice(None) if self._model.layout is None else self._model.layout.first
-        if self._placed is None:
-            self._placed = before.r[first].copy()
-        self._moved = max(self._moved, float(np.abs(state.r[first] - self._placed).max()))
-        largest = float(state.T.max())
-        jump = largest - float(before.T.max())
-        if jump > self._jump and self._model.inextensible:
-            cell = int(np.argmax(state.T))
+    def watch(self, run: CompiledRun) -> None:
+        """Tell a run beyond which values there is something to look at."""
+        clock, warns = run.clock, self._model.slack == "warn"
+        clock[b.BEND_LIMIT], clock[b.TWIST_LIMIT], clock[b.SCALED_JUMP] = self._bend, self._twist, self._jump
+        clock[b.SLACK_LIMIT] = self._slack if warns else -np.inf
+
+    def look(self, run: CompiledRun, flags: int) -> Stop:
+        """Look at what a run has flagged in its last step (kernels.books)."""
+        t, state, stop = run.t, run.state, None
+        if flags & b.JUMPED:
+            jump = float(state.T.max() - run.before.T.max())
             text = (
                 f"tension jumps by {jump:.3g} N within a step: what does not stretch stops at once, and the height of "
                 f"such a peak depends on step and cells; give axial_stiffness"
             )
-            self.note(t, cell, "snap", text)
+            self.note(t, int(np.argmax(state.T)), "snap", text)
             self._jump = 3.0 * jump
-        self._tension_range = min(self._tension_range[0], largest), max(self._tension_range[1], largest)
-        change = np.abs(state.a - before.a)
-        self._rho = rho
-        self._steps += 1
-        left = dt * dt * float(change.max())
-        if len(self._left) < SEVERAL or left > self._left[-1][0]:
-            node = int(np.argmax(change.max(axis=1)))
-            self._left.append((left, t, dt, float(self._model.line.s[node])))
-            self._left = sorted(self._left, reverse=True)[:SEVERAL]
+        if flags & b.STRETCHED:
+            stop = self.stretch(state)
+        if stop is None and flags & b.BENT:
+            stop = self.shape(t, run.report[BEND : TWIST_NODE + 1].tolist(), state)
+        if flags & b.SLACKENED:
+            self.tension(t, state)
+        self.watch(run)
+        return stop
 
-    def finish(self) -> None:
+    def finish(self, run: CompiledRun) -> None:
         """After the last step: whether steps were too long for the motion.
 
         Of a x cos(w t) a step changes the acceleration by a w^3 dt; periods are too long by (beta - 1/6) (w dt)^2, with
         beta = 1/(1 + rho)^2 of generalized-alpha.
         """
-        low, high = self._tension_range
-        hardly = self._moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
-        if hardly or not self._left or not self._moved > 0.0:
+        low, high, moved = run.clock[[b.LEAST_PEAK, b.LARGEST_PEAK, b.MOVED]].tolist()
+        steps, rho, worst = int(run.count[b.MEASURED]), float(run.clock[b.RHO]), run.books.worst.tolist()
+        hardly = moved <= HARDLY_MOVED * self._model.length and not high - low > HARDLY_MOVED * high
+        if hardly or not steps or not moved > 0.0:
             return
-        once, several = self._left[0], self._left[-1]
-        left, t, dt, s = once if once[0] > self._moved or self._steps <= SEVERAL**2 else several
-        turn = (left / self._moved) ** (1.0 / 3.0)  # w dt
-        wrong = 2.0 * np.pi * (1.0 / (1.0 + self._rho) ** 2 - 1.0 / 6.0) * turn * turn
+        once, several = worst[0], worst[min(steps, b.WORST) - 1]
+        left, t, dt, s = once if once[0] > moved or steps <= b.WORST**2 else several
+        turn = (left / moved) ** (1.0 / 3.0)  # w dt
+        wrong = 2.0 * np.pi * (1.0 / (1.0 + rho) ** 2 - 1.0 / 6.0) * turn * turn
         if wrong > COARSE:
             text = (
-                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {self._moved:.2g} m: "
+                f"about {2.0 * np.pi / turn:.2g} steps to a period here, where the line moves by {moved:.2g} m: "
                 f"an oscillation is off by some {100 * min(wrong, 1.0):.0f} % after a period; "
                 f"a time.step of {dt * np.sqrt(0.1 * COARSE / wrong):.1g} s would do"
             )
@@ -272,52 +275,72 @@ class Diagnostics:
         over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
-    def mesh(self, t: float, state: State) -> None:
+    def outputs(self, batch: Batch, values: Mapping[str, Floats]) -> Stop:
+        """Look at outputs; values: their fields (nb, ...)."""
+        self.mesh(batch)
+        self.rest(batch, values)
+        return self.energy(batch, values)
+
+    def mesh(self, batch: Batch) -> None:
         """Folds that a catenary's cells do not resolve, and a line deep in the seabed."""
-        line, d = self._model.line, state.e / np.linalg.norm(state.e, axis=1)[:, None]
+        line, d = self._model.line, batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
-        turn = np.where(flexible, np.arccos(np.clip(np.einsum("ij,ij->i", d[:-1], d[1:]), -1.0, 1.0)), 0.0)
-        if turn.size and turn.max() > self._fold:
-            node = int(np.argmax(turn)) + 1
-            text = f"the catenary turns by {np.degrees(turn[node - 1]):.0f} deg from one cell to the next at s = "
-            fix = f"{line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
-            self.note(t, node, "unresolved bend", text + fix)
-            self._fold = 1.5 * float(turn[node - 1])
-        self._layers(t, state, d)
-        sagging = np.where(flexible, turn * line.hn[1:-1] / 8.0, 0.0)
-        if sagging.size and sagging.max() > self._off:
-            node = int(np.argmax(sagging)) + 1
-            text = f"at s = {line.s[node]:g} m the catenary sags by {sagging[node - 1]:.2g} m below its chords"
-            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
-            self._off = 3.0 * float(sagging[node - 1])
+        if flexible.any():
+            cosine = np.einsum("tij,tij->ti", d[:, :-1], d[:, 1:])
+            turn = np.where(flexible, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
+            for k in np.flatnonzero(turn.max(axis=1) > self._fold):
+                self._note_fold(float(batch.t[k]), turn[k])
+            sag = turn * line.hn[1:-1] / 8.0
+            for k in np.flatnonzero(sag.max(axis=1) > self._off):
+                self._note_sag(float(batch.t[k]), sag[k])
+        self._layers(batch, d)
         if line.bits & SEABED:
             sea = self._model.sea.values
-            depth = sea.offset - state.r @ sea.normal
-            node = int(np.argmax(depth))
-            if depth[node] > self._sunk:
-                text = f"the line lies {depth[node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
-                self.note(t, node, "deep in the seabed", f"{text}: is its stiffness in N/m per m of cable?")
-                self._sunk = 3.0 * float(depth[node])
+            depth = sea.offset - batch.r @ sea.normal
+            for k in np.flatnonzero(depth.max(axis=1) > self._sunk):
+                node = int(np.argmax(depth[k]))
+                if depth[k, node] > self._sunk:
+                    text = f"the line lies {depth[k, node]:.3g} m deep in the seabed at s = {line.s[node]:g} m"
+                    where = f"{text}: is its stiffness in N/m per m of cable?"
+                    self.note(float(batch.t[k]), node, "deep in the seabed", where)
+                    self._sunk = 3.0 * float(depth[k, node])
 
-    def _layers(self, t: float, state: State, d: Floats) -> None:
+    def _note_fold(self, t: float, turn: Floats) -> None:
+        node = int(np.argmax(turn)) + 1
+        if turn[node - 1] > self._fold:
+            text = f"the catenary turns by {np.degrees(turn[node - 1]):.0f} deg from one cell to the next at s = "
+            fix = f"{self._model.line.s[node]:g} m: its tension is wrong there; add cells, or make it a rod"
+            self.note(t, node, "unresolved bend", text + fix)
+            self._fold = 1.5 * float(turn[node - 1])
+
+    def _note_sag(self, t: float, sag: Floats) -> None:
+        node = int(np.argmax(sag)) + 1
+        if sag[node - 1] > self._off:
+            text = f"at s = {self._model.line.s[node]:g} m the catenary sags by {sag[node - 1]:.2g} m below its chords"
+            self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
+            self._off = 3.0 * float(sag[node - 1])
+
+    def _layers(self, batch: Batch, d: Floats) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
         line, last = self._model.line, self._model.line.h.size
-        if self._bend > UNRESOLVED:
+        if self._bend > UNRESOLVED or not line.element.any():
             return
-        tangents = self._model.ends.values.frame[:, 2::3]
-        ends = [(0, tangents[0], d[0]), (last, d[-1], tangents[1])]
+        tangents = batch.frame[:, :, 2::3]
+        ends = [(0, tangents[:, 0], d[:, 0]), (last, d[:, -1], tangents[:, 1])]
         inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]
-        for node, before, after in [*ends, *((i, d[i - 1], d[i]) for i in inner if 0 < i < last)]:
+        for node, before, after in [*ends, *((i, d[:, i - 1], d[:, i]) for i in inner if 0 < i < last)]:
             beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
             if not line.element[node] or not beside:
                 continue
             cell, stiffness = min(node, last - 1), float(line.kb[node, :2].max() * line.hn[node])
-            if state.T[cell] * line.h[cell] ** 2 <= stiffness:
-                continue
-            angle = float(np.linalg.norm(after - before)) - float(np.linalg.norm(line.k0[node, :2]))
-            smooth = max(float(np.linalg.norm(d[i] - d[i - 1])) / line.hn[i] for i in beside)
-            if angle > ASKEW and smooth < LAYER * angle / line.hn[node]:
-                self.note(t, node, "unresolved bend", self._bend_text(node, angle, state))
+            thin = batch.T[:, cell] * line.h[cell] ** 2 > stiffness
+            angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
+            smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
+            bad = np.flatnonzero(thin & (angle > ASKEW) & (smooth < LAYER * angle / line.hn[node]))
+            if bad.size:
+                k = int(bad[0])
+                text = self._bend_text(node, float(angle[k]), batch.T[k])
+                self.note(float(batch.t[k]), node, "unresolved bend", text)
                 self._bend = 1.5 * UNRESOLVED
                 return
 
@@ -330,50 +353,58 @@ class Diagnostics:
             self.note(t, cell, "slack", text)
             self._slack = min(10.0 * tension, 10.0 * self._slack)
 
-    def energy(self, t: float, values: Mapping[str, Any], work: Floats, state: State) -> Stop:
+    def energy(self, batch: Batch, values: Mapping[str, Floats]) -> Stop:
         """Energy that the time scheme creates or dissipates, held against all that was put in."""
-        gained, potential = float(values["work/scheme"]), float(values["energy/potential"])
-        alive = sum(float(values[x]) for x in values if x.startswith("energy/")) - potential
-        if t == 0.0:
-            self._potential, self._alive = potential, alive
-            return None
-        self._put_in = max(self._put_in, float(np.abs(work).sum()) + abs(potential - self._potential) + self._alive)
+        gained, potential = values["work/scheme"], values["energy/potential"]
+        alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
+        if batch.t[0] == 0.0:
+            self._potential, self._alive = float(potential[0]), float(alive[0])
+        put_in = np.abs(batch.work).sum(axis=1) + np.abs(potential - self._potential) + self._alive
+        put_in = np.maximum.accumulate(np.append(self._put_in, put_in))[1:]
+        self._put_in = float(put_in[-1])
         floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
-        fastest = int(np.argmax(np.abs(state.v).sum(axis=1)))
-        part = 100.0 * abs(gained) / (self._put_in or 1.0)
-        if gained > GAIN_STOPS * self._put_in + floor:
-            return Outcome.GAINS_ENERGY, fastest
-        if gained > self._gain * self._put_in + floor:
+        # all that can be worth a word; most batches have none
+        noted = (gained > self._gain * put_in + floor) | (-gained > self._loss * put_in + floor)
+        for k in np.flatnonzero(noted & (batch.t > 0.0)):
+            fastest = int(np.argmax(np.abs(batch.v[k]).sum(axis=1)))
+            if gained[k] > GAIN_STOPS * put_in[k] + floor:
+                return Outcome.GAINS_ENERGY, fastest
+            self._note_energy(float(batch.t[k]), float(gained[k]), float(put_in[k]), floor, fastest)
+        return None
+
+    def _note_energy(self, t: float, gained: float, put_in: float, floor: float, fastest: int) -> None:
+        part = 100.0 * abs(gained) / (put_in or 1.0)
+        if gained > self._gain * put_in + floor:
             text = f"the time scheme has created {gained:.3g} J, {part:.0f} % of the energy put in"
             self.note(t, fastest, "gains energy", f"{text}: {Outcome.GAINS_ENERGY.remedy}")
             self._gain *= 3.0
-        if -gained > self._loss * self._put_in + floor:
+        if -gained > self._loss * put_in + floor:
             text = f"the time scheme has dissipated {-gained:.3g} J, {part:.0f} % of the energy put in"
             self.note(
                 t, fastest, "numerical dissipation", f"{text}: motion is faster than the step; make time.step smaller"
             )
             self._loss *= 1.3
-        return None
 
-    def rest(self, t: float, ends: Ends, values: Mapping[str, Any], state: State) -> None:
+    def rest(self, batch: Batch, values: Mapping[str, Floats]) -> None:
         """A rod at rest, or nearly, on an equilibrium that it would buckle out of if anything touched it."""
-        line = self._model.line
+        model, line = self._model, self._model.line
         rod = line.spin == 1
         if self._rested or not rod.any():
             return
-        elastic = sum(float(values[f"energy/{x}"]) for x in ("stretch", "bending", "torsion"))
+        elastic = sum(values[f"energy/{x}"] for x in ("stretch", "bending", "torsion"))
         bending = float((line.kb[:, :2] * line.hn[:, None])[line.element == 1].min(initial=np.inf))
-        least = PRESSED * bending / self._model.length if np.isfinite(bending) else 0.0  # J
-        twisted = float(values["energy/torsion"]) > least
-        pressed = float(state.T[rod].min()) * self._model.length < -least or twisted
-        calm = float(values["energy/kinetic"]) <= AT_REST * elastic or not state.v.any()
-        if not twisted:  # what is let go has no velocity yet, but is no longer at rest
-            calm &= float(line.mass.sum()) * float(np.abs(state.vd).max()) <= LET_GO * -float(state.T[rod].min())
-        if (
-            pressed
-            and calm
-            and not is_stable(line, self._model.sea.values, ends, state, self._model.length, self._model.tension_scale)
-        ):
-            text = "the rod rests where it would buckle: only its perfect symmetry keeps it there; give it a small bow"
-            self.note(t, int(np.argmin(state.T)), "unstable", text)
-            self._rested = True
+        least = PRESSED * bending / model.length if np.isfinite(bending) else 0.0  # J
+        twisted, lowest_ = values["energy/torsion"] > least, batch.T[:, rod].min(axis=1)
+        pressed = (lowest_ * model.length < -least) | twisted
+        calm = (values["energy/kinetic"] <= AT_REST * elastic) | ~batch.v.any(axis=(1, 2))
+        # what is let go has no velocity yet, but is no longer at rest
+        calm &= twisted | (float(line.mass.sum()) * np.abs(batch.vd).max(axis=(1, 2)) <= LET_GO * -lowest_)
+        for k in np.flatnonzero(pressed & calm):
+            ends, state = ends_in(batch, int(k)), state_in(batch, int(k))
+            if not is_stable(line, model.sea.values, ends, state, model.length, model.tension_scale):
+                text = (
+                    "the rod rests where it would buckle: only its perfect symmetry keeps it there; give it a small bow"
+                )
+                self.note(float(batch.t[k]), int(np.argmin(state.T)), "unstable", text)
+                self._rested = True
+                return

@@ -14,27 +14,27 @@ from hybrid.errors import Outcome
 from hybrid.scene.read import scene_text
 from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient
-from hybrid.solve.stepper import Taken
+from hybrid.solve.run import Tried
 
 
-def explanation(run: Transient, taken: Taken, dt: float) -> str:
-    """Why a run cannot go on, beside its cause; taken: the last try, over dt (s)."""
+def explanation(run: Transient, tried: Tried, dt: float) -> str:
+    """Why a run cannot go on, beside its cause; tried: the last try, over dt (s)."""
     model = run.model
-    if taken.outcome == Outcome.SLACK:
-        tension = run.before.T[failed_node(run, taken)]
+    if tried.outcome == Outcome.SLACK:
+        tension = run.before.T[failed_node(run, tried)]
         detail = f"the step that starts at this time ends with a tension of {tension:.3g} N"
         if run.switching is not None:
             detail += "; model.force_catenary keeps it from becoming a rod"
-    elif taken.outcome == Outcome.GAINS_ENERGY:
+    elif tried.outcome == Outcome.GAINS_ENERGY:
         detail = "the fastest point is at this place"
-    elif taken.outcome == Outcome.TWISTED_TOO_FAR:
+    elif tried.outcome == Outcome.TWISTED_TOO_FAR:
         detail = f"{model.cells} cells"
-    elif taken.outcome == Outcome.OVERSTRETCHED:
+    elif tried.outcome == Outcome.OVERSTRETCHED:
         detail = stretch_text(model, run.state)
     elif dt == 0.0:
         detail = "no accelerations are consistent with the shape and the loads"
     else:
-        detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
+        detail = f"smallest step tried {dt:.3g} s; {tried.iterations} Newton iterations in the last try"
     ends = model.ends.at(run.t + dt)
     apart = float(np.linalg.norm(ends.position[1] - ends.position[0]))
     if ends.held.all() and model.inextensible and apart >= model.length:
@@ -43,14 +43,14 @@ def explanation(run: Transient, taken: Taken, dt: float) -> str:
     return detail
 
 
-def failed_node(run: Transient, taken: Taken) -> int:
+def failed_node(run: Transient, tried: Tried) -> int:
     """The node at which a failure showed first."""
-    return min(max(taken.where, 0), run.model.line.s.size - 1)
+    return min(max(tried.where, 0), run.model.line.s.size - 1)
 
 
-def snapshot(run: Transient, target: object, taken: Taken, dt: float) -> Path | None:
+def snapshot(run: Transient, target: object, tried: Tried, dt: float) -> Path | None:
     """Write the last good state with all that a repetition of the failed step needs; None when it cannot be written."""
-    content: dict[str, Any] = {"t": run.t, "dt": dt, "outcome": taken.outcome.name, "s": run.model.line.s}
+    content: dict[str, Any] = {"t": run.t, "dt": dt, "outcome": tried.outcome.name, "s": run.model.line.s}
     return write_snapshot(target, content | {"scene": scene_text(run.scene), **run.state._asdict()})
 
 

@@ -7,23 +7,26 @@ that nobody wants in a plane whatever comes goes on in space, with that push.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.report import PUSH_ENERGY, WRONG_PIVOTS
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.books import PUSH_GROWN, PUSH_START
+from hybrid.kernels.entry import NO_PUSH
+from hybrid.kernels.state import Floats, Line, State
 from hybrid.model.build import Model
 from hybrid.model.plane import in_space, leaves_plane, planar, untwist
 from hybrid.scene.schema import Scene
-from hybrid.solve.plane_stability import GROWN, Push
-from hybrid.solve.stepper import Stepper
+from hybrid.solve.plane_stability import on_nodes, scaled, seed
+from hybrid.solve.run import CompiledRun
 
 # Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
 # out of the plane, and nothing that anybody would see.
 HANDED_ON = 1e-6
 
+NO_NODES: Floats = np.zeros(0)
 Note = Callable[[int, str, str], None]
 
 
@@ -32,7 +35,8 @@ class PlaneMonitor:
 
     def __init__(self, scene: Scene) -> None:
         self.insists = scene.dimension == 2
-        self.push: Push | None = None
+        self.speed = 0.0  # m/s, of a push when it is given; 0: none is carried along
+        self._s: Floats = NO_NODES  # m, nodes that it is carried on
 
     def begin(self, model: Model, state: State, note: Note) -> Model:
         """The model that the motion begins with, in the plane if it is in one; what leaves the plane is noted."""
@@ -49,36 +53,45 @@ class PlaneMonitor:
         for x, origin in ((state.r, state.r[0].copy()), (state.e, np.zeros(3))):  # what Newton's tolerance has left
             x -= np.outer((x - origin) @ n, n)
         untwist(model.line, model.ends.values, model.cable.held_tangent, state)
-        self.push = Push(model.line, model.length, model.time_scale)
+        self.speed = model.length / model.time_scale
         return model
 
-    def attach(self, stepper: Stepper) -> None:
-        """Carry the push along with the steps of a (new) stepper."""
-        if self.push is not None:
-            self.push.on(stepper.line.s)
-        stepper.push = self.push
+    def attach(self, run: CompiledRun, line: Line) -> None:
+        """Carry the push along with a (new) line of a run, in proportion to s."""
+        if not self.speed:
+            run.carry((NO_PUSH, NO_PUSH))
+        elif not np.array_equal(line.s, self._s):
+            push = on_nodes(run.push, self._s, line.s) if self._s.size else seed(line.s, self.speed)
+            self._give(run, push, line.s)
 
-    def must_leave(self, stepper: Stepper, note: Note) -> bool:
-        """Whether, after an accepted step, the motion has to go on in space."""
-        if self.push is None:
-            return False
-        grown = self.push.judge(*stepper.told[PUSH_ENERGY : WRONG_PIVOTS + 1])
-        if grown < GROWN:
-            return False
+    def _give(self, run: CompiledRun, push: Floats, s: Floats) -> None:
+        started = float(run.clock[PUSH_START]) if self._s.size else 0.0
+        run.carry((push, np.zeros_like(push)))
+        self._s, run.clock[PUSH_START] = s, started
+
+    def renew(self, run: CompiledRun) -> None:
+        """Give the push anew: it has died."""
+        run.push[:] = seed(self._s, self.speed)
+        run.clock[PUSH_START] = 0.0
+
+    def must_leave(self, run: CompiledRun, note: Note) -> bool:
+        """Whether the motion has to go on in space, after a step in which the push had grown too large."""
+        grown = float(run.clock[PUSH_GROWN])
         fast = "faster than the step can follow" if np.isinf(grown) else f"by a factor of {grown:.0f}"
         text = f"a small push out of the plane has grown {fast}: the cable would leave the plane"
-        where = int(np.argmax(np.abs(self.push.last(1.0)[:, 0])))
+        where = int(np.argmax(np.abs(scaled(run.push, 1.0, self._s)[:, 0])))
         if self.insists:
             note(where, "out of plane", f"{text}; dimension: 2 keeps it there, `dimension: 3` does not")
-            stepper.push = self.push = None
+            self.speed = 0.0
+            run.carry((NO_PUSH, NO_PUSH))
             return False
         note(where, "out of plane", f"{text}; it goes on in space, pushed by {HANDED_ON:g} of its length")
         return True
 
-    def leave(self, model: Model, state: State) -> Model:
+    def leave(self, model: Model, run: CompiledRun, state: State) -> Model:
         """The model in space; the state gets the push."""
-        assert self.push is not None and model.plane is not None
-        n, x = model.plane[2], self.push.last(HANDED_ON * model.length)
+        assert self.speed and model.plane is not None
+        n, x = model.plane[2], scaled(run.push, HANDED_ON * model.length, self._s)
         held = np.flatnonzero(model.ends.values.held) * (model.line.s.size - 1)
         x[held] = 0.0
         for array, column in ((state.r, 0), (state.v, 1), (state.a, 2), (state.vd, 3)):
@@ -88,8 +101,23 @@ class PlaneMonitor:
         a = state.a1 - np.einsum("ij,ij->i", state.a1, d)[:, None] * d
         size = np.linalg.norm(a, axis=1)[:, None]
         state.a1[:] = np.where(size > 0.0, a / np.where(size > 0.0, size, 1.0), state.a1)
-        self.push = None
+        self.speed, self._s = 0.0, NO_NODES
         return replace(model, line=in_space(model.line), plane=None)
+
+    def checkpoint(self, run: CompiledRun) -> dict[str, Any] | None:
+        """The push, and its energy when it was given."""
+        if not self.speed:
+            return None
+        pair = np.array([run.push, run.push])
+        return {"pair": pair, "unit": self.speed, "energy": float(run.clock[PUSH_START]), "led": True}
+
+    def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
+        """Go on as `checkpoint` has written; ValueError where that cannot be."""
+        if not saved["unit"] > 0.0:
+            raise ValueError("a push of no size")
+        self.speed = saved["unit"]
+        run.push[:] = saved["pair"][int(saved["led"])]
+        run.clock[PUSH_START] = saved["energy"]
 
 
 def same_plane(a: Floats | None, b: Floats | None) -> bool:

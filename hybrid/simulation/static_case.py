@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError
 from hybrid.kernels.forces import SEABED
-from hybrid.kernels.report import SEABED_ENERGY
+from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import batch_of_one
 from hybrid.model.build import Model, build
@@ -50,7 +50,8 @@ class StaticCase:
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()
             diagnostics.equilibrium(found)
-            diagnostics.mesh(0.0, found.state)
+            report, work = np.zeros(REPORT_SIZE), np.zeros(len(POWERS))
+            diagnostics.mesh(batch_of_one(0.0, ends, found.state, report, work, model.sea.values))
             if switching is not None:
                 manager = switching.manager
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)

@@ -11,8 +11,8 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.report import BEND, TWIST_NODE
-from hybrid.kernels.state import batch_of_one
+from hybrid.kernels.books import AT_STOP, FLAGS, JUMPED, PAUSED, ROWS, STEPPED, STRETCHED
+from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.diagnostics import Diagnostics, Stop
@@ -20,11 +20,14 @@ from hybrid.simulation.failure import explanation, failed_node, snapshot
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
 from hybrid.simulation.transient import StepFailed, Transient
+from hybrid.solve.run import Tried
 from hybrid.solve.statics import Equilibrium
-from hybrid.solve.stepper import Taken
 from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import matched
 from hybrid.store.writer import Recorder
+
+# Rows of the log that wait for an output at most.
+LOGGED = 100
 
 
 class TimeLoop:
@@ -39,7 +42,8 @@ class TimeLoop:
         interrupted: Callable[[], bool],
     ) -> None:
         """target: of the result, beside which a failure leaves a snapshot; None: a run to compare with, which leaves
-        none and whose outputs are not watched.  report: called after every step, and when the run has come to its end.
+        none and whose outputs are not watched.  report: called about ten times a second, and when the run has come to
+        its end.
         """
         self.run, self.observer, self.target = run, observer, target
         self.recorder: Recorder | MemoryRecorder = MemoryRecorder()
@@ -47,6 +51,7 @@ class TimeLoop:
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
+        self._logged = 0.0  # s of processor time since then, at the last row of the log
 
     def begin(self, equilibrium: Equilibrium | None) -> None:
         """The first state, and the first output."""
@@ -57,25 +62,30 @@ class TimeLoop:
         try:
             run.begin(equilibrium)
         except StepFailed as failed:
-            self._fail(failed.taken, failed.dt)
+            self._fail(failed.tried, failed.dt)
         self.diagnostics.follow(run.model)
         self._stop_if(self.diagnostics.stretch(run.state))
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
         self.diagnostics.scheme(run.rho)
-        self._output()
+        self.diagnostics.watch(run.run)
+        for _ in run.advance(run.t):
+            self._write_down()
         self._checkpoint()
 
-    def to_the_end(self, outputs: Sequence[float], changes: Sequence[LoadChange] = ()) -> None:
-        """To the last output, with the changes of loads on the way that are still to come."""
-        run, due = self.run, set(outputs)
+    def to_the_end(self, duration: float, exact: bool, changes: Sequence[LoadChange] = ()) -> None:
+        """To the end at `duration` (s), with the changes of loads on the way that are still to come.
+
+        exact: whether steps end at outputs.
+        """
+        run = self.run
         try:
             for change in changes[run.changes :]:
-                self._until([*(x for x in outputs if x < change.t), change.t], due)
+                self._until(change.t, exact)
                 run.change_loads(change.scene)
                 self._checkpoint()
-            self._until(outputs, due)
+            self._until(duration, exact)
         except StepFailed as failed:
-            self._fail(failed.taken, failed.dt)
+            self._fail(failed.tried, failed.dt)
         finally:
             run.events.write_to(self.recorder)
         self._report(run, True)
@@ -83,88 +93,114 @@ class TimeLoop:
     def close(self) -> None:
         """The run is complete: a last checkpoint, what is to be said of all of it, and the file is closed."""
         self._checkpoint(at_once=True)
-        self.diagnostics.finish()
+        self.diagnostics.finish(self.run.run)
         self.run.events.write_to(self.recorder)
         self.recorder.close("complete", f"{self.run.steps} steps")
 
-    def _until(self, stops_at: Sequence[float], outputs: set[float]) -> None:
-        """Steps end at the stops, where ends are let go, and, if their length is controlled, where loads have grown."""
-        run, end = self.run, stops_at[-1]
+    def _until(self, end: float, exact: bool) -> None:
+        """Steps end where ends are let go, and, if their length is controlled, where loads have grown."""
+        run = self.run
         breaks = run.model.ends.breaks
-        stops = {*stops_at, *(t for t in breaks if t < end)}
-        if run.control is not None:
+        stops = {end, *(t for t in breaks if t < end)}
+        if run.controlled:
             stops |= {t for t in ramp_ends(run.scene) if t < end}
+        if exact:
+            stops |= {float(t) for t in run.run.books.outputs if t < end}
         for stop in sorted(t for t in stops if t > run.t):
-            for until in run.step_ends(stop):
-                self._advance(until)
-                self._report(run, False)
-                if self._interrupted():
-                    run.events.write_to(self.recorder)
-                    self.recorder.close("interrupted", f"stopped from outside at t = {run.t:.6g} s")
-                    raise KeyboardInterrupt
-            if stop in outputs:
-                self._output()
+            for code in run.advance(stop):
+                self._write_down()
+                if code == STEPPED:
+                    self.diagnostics.follow(run.model)
+                    self._look(int(run.run.count[FLAGS]))
+                elif code in (PAUSED, AT_STOP):
+                    self._pause()
             if stop in breaks:
                 run.restart()
-            if stop in outputs:
-                self._checkpoint()
+            self._checkpoint()
 
-    def _advance(self, until: float) -> None:
-        """Take the steps to `until`; each is logged and looked at."""
-        run, diagnostics = self.run, self.diagnostics
-        for step in run.advance(until):
-            self.recorder.log(step._asdict() | {"cpu": clock.process_time() - self._cpu})
-            diagnostics.follow(run.model)
-            if self.target is not None:
-                diagnostics.step(step.t, step.dt, run.rho, run.before, run.state)
-                self._stop_if(diagnostics.stretch(run.state))
-            self._stop_if(diagnostics.shape(step.t, run.stepper.told[BEND : TWIST_NODE + 1], run.state))
-            if run.model.slack == "warn":
-                diagnostics.tension(step.t, run.state)
+    def _pause(self) -> None:
+        """Between two calls of the compiled run: report, and hear of interrupts."""
+        run = self.run
+        self._report(run, False)
+        if run.between_steps:
+            self._checkpoint()
+        if self._interrupted():
             run.events.write_to(self.recorder)
+            self.recorder.close("interrupted", f"stopped from outside at t = {run.t:.6g} s")
+            raise KeyboardInterrupt
 
-    def _output(self) -> None:
-        """Record an output, and look at it."""
+    def _look(self, flags: int) -> None:
+        """Look at what a step has flagged; the stretch of a run to compare with is not its matter."""
+        if self.target is None:
+            flags &= ~(STRETCHED | JUMPED)
+        self._stop_if(self.diagnostics.look(self.run.run, flags))
+        self.run.events.write_to(self.recorder)
+
+    # --- what is written down -------------------------------------------------------------------
+
+    def _write_down(self) -> None:
+        """Log the steps and record the outputs since the last call."""
+        run = self.run
+        batch = run.run.samples(run.model.ends.values)
+        if batch is not None or run.run.count[ROWS] > LOGGED:
+            self._log()
+        if batch is not None:
+            self._record(batch)
+
+    def _log(self) -> None:
+        """Log the steps, their processor time spread evenly over them."""
+        rows = self.run.run.log()
+        now = clock.process_time() - self._cpu
+        cpu = np.linspace(self._logged, now, len(rows) + 1)[1:]
+        self._logged = now
+        if len(rows):
+            self.recorder.log_rows(np.column_stack([rows, cpu]))
+
+    def _record(self, batch: Batch) -> None:
+        """Record outputs, and look at them."""
         run, diagnostics = self.run, self.diagnostics
         model, switching = run.model, run.switching
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
-        observer, ends, work = self.observer, model.ends.at(run.t), np.array(run.work)
-        batch = batch_of_one(run.t, ends, run.state, run.stepper.work.report, work, model.sea.values)
-        ratios = None
+        observer, ratios = self.observer, None
         if switching is not None and observer.writes_criteria:
-            ratios = switching.manager.largest_ratios(observer.grid.s)[None]
-        shifts = [run.correction.shift(run.state)] if run.correction is not None else None
-        fields = observer.values_of(batch, ratios, shifts)
-        self.recorder.save_batch(batch.t, fields, observer.zone_rows)
+            ratios = np.repeat(switching.manager.largest_ratios(observer.grid.s)[None], batch.t.size, axis=0)
+        shifts = run.shifts(batch) if run.correction is not None else None
+        values = observer.values_of(batch, ratios, shifts)
+        self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
         if self.target is None:
             return
-        values = {name: x[0] for name, x in fields.items()}
         diagnostics.follow(model)
-        diagnostics.mesh(run.t, run.state)
-        diagnostics.rest(run.t, ends, values, run.state)
+        stop = diagnostics.outputs(batch, values)
         if switching is not None:
             manager = switching.manager
             diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)
-        stop = diagnostics.energy(run.t, values, work, run.state)
         run.events.write_to(self.recorder)
         self._stop_if(stop)
+
+    def _record_now(self) -> None:
+        """Record the state as it is, whatever outputs are due."""
+        run, model = self.run, self.run.model
+        books = run.run.books
+        ends = model.ends.at(run.t)
+        self._record(batch_of_one(run.t, ends, run.state, books.report[0], books.work[0], model.sea.at(run.t)))
 
     def _stop_if(self, stop: Stop) -> None:
         """Stop where going on would make no sense."""
         if stop is not None:
-            self._fail(Taken(stop[0], 0, 0.0, stop[1], 0.0), 0.0)
+            self._fail(Tried(stop[0], 0, 0.0, stop[1]), 0.0)
 
-    def _fail(self, taken: Taken, dt: float) -> NoReturn:
+    def _fail(self, tried: Tried, dt: float) -> NoReturn:
         """The run cannot go on: leave its last good state and an output, and say where and why."""
         run = self.run
-        s = float(run.model.line.s[failed_node(run, taken)])
-        detail = explanation(run, taken, dt)
-        left = snapshot(run, self.target, taken, dt) if self.target is not None else None
-        error = ComputationError(taken.outcome, run.t, s, detail, left)
+        s = float(run.model.line.s[failed_node(run, tried)])
+        detail = explanation(run, tried, dt)
+        left = snapshot(run, self.target, tried, dt) if self.target is not None else None
+        error = ComputationError(tried.outcome, run.t, s, detail, left)
+        self._log()
         if run.t > self.recorder.last:
-            self._output()
-        run.events.event(run.t, s, s, taken.outcome.name.lower(), str(error))
+            self._record_now()
+        run.events.event(run.t, s, s, tried.outcome.name.lower(), str(error))
         run.events.write_to(self.recorder)
         raise error from None
 
@@ -190,15 +226,15 @@ class TimeLoop:
     def checkpoint(self) -> dict[str, Any]:
         """What the rest of the run depends on, between two steps."""
         return self.run.checkpoint() | {
-            "watch": self.diagnostics.checkpoint(), "cpu": clock.process_time() - self._cpu,
+            "watch": self.diagnostics.checkpoint(self.run.run), "cpu": clock.process_time() - self._cpu,
             "first_energy": self.observer.first_energy or 0.0,
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
-        mine = {"watch": self.diagnostics.checkpoint(), "cpu": 0.0, "first_energy": 0.0}
+        mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
         self.run.restore({name: x for name, x in saved.items() if name not in mine})
         found = matched({name: saved[name] for name in mine}, mine, "state")
-        self._cpu = clock.process_time() - found["cpu"]
+        self._cpu, self._logged = clock.process_time() - found["cpu"], found["cpu"]
         self.observer.first_energy = found["first_energy"]
-        self.diagnostics.restore(found["watch"])
+        self.diagnostics.restore(found["watch"], self.run.run)

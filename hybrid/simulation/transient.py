@@ -1,66 +1,52 @@
 """A cable in motion: its state, the steps that advance it, and the work done on it.
 
-`begin` gives the first state, `advance` takes steps and yields each that is accepted.  Zones change and planes are left
-between two steps.  Nothing is written here, and nothing decides that a healthy step was the last: simulation.time_loop.
+`begin` gives the first state; `advance` lets the compiled run go on (solve.run) and yields where there is something to
+write down or to look at.  Zones change and planes are left between two steps.  Nothing is written here, and nothing
+decides that a healthy step was the last: simulation.time_loop.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
-from math import sqrt
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
-from hybrid.kernels.forces import SEABED
-from hybrid.kernels.report import CONTACT_WORK, FORCE_A, FRICTION_WORK, SEABED_ENERGY
-from hybrid.kernels.state import State, blank_state
+from hybrid.kernels import books as b
+from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
+from hybrid.kernels.sampling import SAME_TIME
+from hybrid.kernels.state import Batch, State, blank_state
+from hybrid.kernels.step_law import FIRST, WARY
 from hybrid.model.build import Model, build
-from hybrid.model.plan import step_ends
+from hybrid.model.plan import parts
 from hybrid.model.plane import in_space, planar
 from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.events import EventLog, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.solve.plane_stability import Push
+from hybrid.solve.bending_corrector import Shift
+from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
-from hybrid.solve.step_control import Controller
-from hybrid.solve.stepper import POWERS, Stepper, Taken
+from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
-HALVINGS = 10  # of a time step that fails: a factor of 1000 separates a hard moment from a hopeless one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
-CONTACT, FRICTION = POWERS.index("contact"), POWERS.index("friction")
-PLAIN = ("t", "dt", "steps", "iterations", "changes", "_stored", "_beyond", "_turned")  # plain values of a checkpoint
-
-
-class Step(NamedTuple):
-    """An accepted step, as the step log of a result has it."""
-
-    t: float  # s, at its end
-    dt: float
-    iterations: int  # repeats included
-    correction: float
-    residual: float
-    repeats: int
-    error: float
-    end_force_start: float
-    end_force_end: float
 
 
 class StepFailed(Exception):
     """No step leads on: how the last try ended, and its length, s (0: there is no consistent start)."""
 
-    def __init__(self, taken: Taken, dt: float) -> None:
-        super().__init__(taken.outcome.cause)
-        self.taken, self.dt = taken, dt
+    def __init__(self, tried: Tried, dt: float) -> None:
+        super().__init__(tried.outcome.cause)
+        self.tried, self.dt = tried, dt
 
 
 class Transient:
@@ -74,30 +60,75 @@ class Transient:
         switching: ZoneSwitching | None,
         correction: Correction | None,
         events: EventLog,
+        outputs: Sequence[float] = (),
     ) -> None:
-        """It has no state before `begin` or `restore`."""
+        """It has no state before `begin` or `restore`.  outputs: s, increasing, times of samples."""
+        assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self._beyond = switching, correction, -np.inf
-        self._turned = False  # whether an event has told of steps cut by the turn of an end
-        self.stepper = self._new_stepper(model.slack_floor if model.slack == "stop" else -np.inf)
-        self.control = (
-            None if resolution.local is None else Controller(resolution.local, resolution.step, resolution.shortest)
-        )
+        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes=False)
+        self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
-        self.t, self.steps, self.iterations = 0.0, 0, 0
         self.changes = 0  # of the scene, so far
-        self.dt = 0.0  # s, of the last step; 0 after a start
-        self.state = self.before = model.start  # now, and before the last step
-        self.power = [0.0] * CONTACT  # W, now
-        self.work = [0.0] * len(POWERS)  # J, since the start
-        self._stored = 0.0  # J, in the seabed
-        self._loaded = [any(abs(x - s) < 1e-9 * model.length for x in model.attached) for s in (0.0, model.length)]
+        self._turned = False  # whether an event has told of steps cut by the turn of an end
+        self._pending: Change | None = None
+        self._leaves, self._rescues = False, 0
+        near = 1e-9 * model.length
+        self.run.books.loaded[:] = [any(abs(x - s) < near for x in model.attached) for s in (0.0, model.length)]
+        self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
+        self.run.count[b.STIFF] = model.inextensible
+        self._set_model(model, model.start)
+
+    def _set_control(self, resolution: Resolution) -> None:
+        """How long steps may be."""
+        clock, count = self.run.clock, self.run.count
+        count[b.CONTROLLED], clock[b.MOST_TURN] = resolution.local is not None, resolution.turn
+        if resolution.local is not None:
+            clock[b.TOLERANCE], clock[b.LARGEST] = resolution.local, resolution.step
+            clock[b.SHORTEST] = resolution.shortest
+            clock[b.NEXT_DT] = max(resolution.step / FIRST, resolution.shortest)
+            clock[b.ERROR_RATIO] = 1.0
+
+    # --- what it knows --------------------------------------------------------------------------
 
     @property
     def rho(self) -> float:
         """Spectral radius of the time scheme."""
-        assert self.scene.time is not None
-        return self.scene.time.rho_inf
+        return float(self.run.clock[b.RHO])
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return self.run.t
+
+    @property
+    def state(self) -> State:
+        return self.run.state
+
+    @property
+    def before(self) -> State:
+        """The state before the last step; after a failure, the one that the last try led to."""
+        return self.run.before
+
+    @property
+    def steps(self) -> int:
+        """Accepted steps so far."""
+        return int(self.run.count[b.STEPS])
+
+    @property
+    def iterations(self) -> int:
+        """Newton iterations of the last step."""
+        return int(self.run.count[b.ITERATIONS])
+
+    @property
+    def controlled(self) -> bool:
+        """Whether the length of steps follows their error."""
+        return bool(self.run.count[b.CONTROLLED])
+
+    @property
+    def between_steps(self) -> bool:
+        """Whether the last step is done with, and the next not begun."""
+        return bool(self.run.count[b.PHASE] == b.BEGIN_STEP)
 
     # --- the start ------------------------------------------------------------------------------
 
@@ -105,28 +136,27 @@ class Transient:
         """From an equilibrium, or from the shape that the scene gives.  StepFailed: no accelerations are consistent."""
         model = self.model
         if equilibrium is None:
-            self.state = model.start.copy()
-            self._rotate_ends_in()
-            if not self.state.v.any():
-                self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), self.state)
+            state = model.start.copy()
+            self._rotate_ends_in(state)
+            if not state.v.any():
+                self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), state)
         else:
-            self.state = equilibrium.state.copy()
-        begun = self.plane_monitor.begin(model, self.state, self._note)
-        if begun is not model:
-            self._set_model(begun)
+            state = equilibrium.state.copy()
+        begun = self.plane_monitor.begin(model, state, self._note)
+        self._set_model(begun, state)
         self._find_accelerations()
         if self.switching is not None:
-            self.switching.begin(model.ends.values, self.state)
+            self.switching.begin(begun.ends.values, state)
         if self.correction is not None:
             with_friction = equilibrium is not None and equilibrium.with_friction
-            self.correction.begin(model.ends.at(0.0), self.state, equilibrium is not None, with_friction)
-        self.before = self.state.copy()
-        self.power = self._powers()
+            self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
+        first = slice(None) if model.layout is None else model.layout.first
+        self.run.begin(state.r[first].copy())
 
-    def _rotate_ends_in(self) -> None:
+    def _rotate_ends_in(self, state: State) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
         assert self.scene.time is not None
-        model, e = self.model, self.state.e
+        model, e = self.model, state.e
         d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
         which = [bool(model.line.element[0]), bool(model.line.element[-1])]
         duration = min(model.time_scale, 0.5 * self.scene.time.duration)
@@ -141,126 +171,134 @@ class Transient:
 
     def _find_accelerations(self) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
-        ends = self.model.ends
+        ends, run = self.model.ends, self.run
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
-        self._stored = 0.0
         taken = self.stepper.consistent_accelerations(
             self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state
         )
-        self.dt = 0.0
         if taken.outcome != Outcome.OK:
-            raise StepFailed(taken, 0.0)
-        self._stored = self.stepper.told[SEABED_ENERGY]
+            raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
+        run.move(ends.moves())
+        run.clock[b.LAST_DT] = 0.0
+        self._restart_books()
+
+    def _restart_books(self) -> None:
+        """The report of the state has been made anew: powers follow from it, and what the seabed stores."""
+        run = self.run
+        run.books.report[0] = self.stepper.work.report
+        run.clock[b.STORED] = self.stepper.told[SEABED_ENERGY]
+        run.books.velocity[:] = self.model.ends.velocity
+        run.clock[b.PREVIOUS] = run.clock[b.NOW]
+        run.count[b.PHASE], run.count[b.AFTER_START] = b.START, b.SAMPLE
 
     def restart(self) -> None:
         """A load has just stopped, or others act: accelerations jump."""
         self.model.ends.set_loads(self.t)
         self._find_accelerations()
-        if self.control is not None:
-            self.control.restart()
-        self.power = self._powers()
+        clock = self.run.clock
+        if self.controlled:
+            clock[b.NEXT_DT] = max(clock[b.NEXT_DT] / FIRST, clock[b.SHORTEST])
+            clock[b.ERROR_RATIO] = 1.0
 
     # --- steps ----------------------------------------------------------------------------------
 
-    def step_ends(self, stop: float) -> Iterator[float]:
-        """Where steps should end on the way to `stop`, s."""
-        if self.control is None:
-            yield from step_ends(self.t, stop, self.resolution.step)
-            return
-        while self.t < stop:
-            manager = self.switching.manager if self.switching is not None else None
-            blending = manager is not None and manager.ramping
-            self.control.most = LONGEST_IN_PACE * manager.pace if manager is not None and blending else np.inf
-            until = self.control.until(self.t, stop)
-            yield self.model.ends.until_turned(self.t, until, self.resolution.turn)
+    def advance(self, stop: float) -> Iterator[int]:
+        """To `stop` (s), where a step ends; yields codes of kernels.books: STEPPED where there is something to look at.
 
-    def advance(self, until: float) -> Iterator[Step]:
-        """To `until` (s): in one step if all is well, else in halves of halves; with a controller, one step towards it.
-
-        Yields every accepted step, and changes zones, or leaves the plane, when it is asked for the next.  StepFailed:
-        steps fail however small.
+        Between two yields steps are logged and outputs sampled in the books of `run`, which whoever asks empties.
+        StepFailed: steps fail however small.
         """
-        begin, control = self.t, self.control
-        dt = until - self.t
-        smallest = dt * 0.5**HALVINGS if control is None else control.smallest
-        repeats = wasted = rescues = 0
-        while self.t < until:
-            end = until if until - self.t <= dt * (1 + 1e-9) else self.t + dt
-            if control is None:
-                end = self._cut(end)
-            taken, switching = self._try(end), self.switching
-            rescue = switching.rescue(taken, end, end - self.t, self.before, rescues) if switching is not None else None
-            if rescue is not None:
-                self._switch(rescue)
-                rescues += 1
-                wasted += taken.iterations
-            elif taken.outcome == Outcome.OK and control is not None and not control.accepts(end - self.t, taken.error):
-                wasted += taken.iterations
-                repeats += 1
-                dt = control.next
-            elif taken.outcome == Outcome.OK:
-                step = self._accept(taken, end, repeats, wasted)
-                yield step
-                self._adapt(step.dt)
-                wasted = rescues = 0
-                if control is not None:
-                    break
-            elif 0.5 * dt < smallest and switching is not None and (change := switching.all_rod(taken)) is not None:
-                self._switch(change)
-                dt, wasted = until - self.t, wasted + taken.iterations
-            elif taken.outcome == Outcome.SLACK or 0.5 * dt < smallest:
-                # A slack catenary is no matter of the step: its answer would be grid noise at any dt.
-                raise StepFailed(taken, end - self.t)
+        run = self.run
+        clock, count = run.clock, run.count
+        clock[b.STOP] = stop
+        if not self.controlled:
+            clock[b.LEG_BEGIN], count[b.LEG_PART] = clock[b.NOW], 0
+            count[b.LEG_PARTS] = parts(stop - self.t, self.resolution.step) if stop > self.t else 1
+        while True:
+            self._choose_asks()
+            code = run.go()
+            if code == b.TRYING:
+                assert self.switching is not None
+                end = float(clock[b.TRY_END])
+                self.switching.prepare_step(end, end - self.t, self.state)
+            elif code == b.TRIED:
+                self._review_try()
+            elif code == b.STEPPED:
+                self._after_step()
+                if count[b.FLAGS]:
+                    yield code
+            elif code == b.SAMPLED:
+                yield code
+                self._adapt()
+            elif code == b.FAILED:
+                yield code
+                raise StepFailed(run.tried, float(clock[b.TRY_END] - clock[b.NOW]))
             else:
-                wasted += taken.iterations
-                repeats += 1
-                dt = 0.5 * dt if control is None else control.fails(end - self.t)
-        if repeats and self.model.line.bits & SEABED:
-            self._reset_after_impact(until - begin)
+                yield code
+                if code == b.AT_STOP:
+                    return
 
-    def _cut(self, end: float) -> float:
-        """The end (s) of a fixed step, earlier if an end of the cable turned too far in it: an event for the first."""
-        most, ends = self.resolution.turn, self.model.ends
-        earlier = ends.until_turned(self.t, end, most)
-        if earlier < end and not self._turned:
-            text = steps_cut_text(ends.turn_between(self.t, end), end - self.t, most)
-            self.events.event(self.t, 0.0, self.model.length, "steps cut", text)
-            self._turned = True
-        return earlier
+    def _choose_asks(self) -> None:
+        """When the compiled run has to ask: for zones, for what follows the model error, for a plane that is left."""
+        count, switching = self.run.count, self.switching
+        asks = b.ASK_STEPS if self.correction is not None or self._pending is not None or self._leaves else 0
+        if switching is not None:
+            asks |= b.ASK_TRIES | b.ASK_STEPS
+            if switching.prepares:
+                asks |= b.ASK_BEFORE
+            blending = switching.manager.ramping
+            self.run.clock[b.ALLOWED] = LONGEST_IN_PACE * switching.manager.pace if blending else np.inf
+        count[b.ASKS] = asks
 
-    def _try(self, end: float) -> Taken:
-        """A step to `end`, from `state` to `before`, which is not yet swapped with it."""
-        ends, dt = self.model.ends.at(end), end - self.t
-        if self.switching is not None:
-            self.switching.prepare_step(end, dt, self.state)
-        last = dt if self.control is None else self.dt
-        return self.stepper.step(self.model.sea.at(end), ends, self.state, self.before, dt, self.rho, last)
+    def _review_try(self) -> None:
+        """A try has ended: more rod, and the step again, where zones ask for it or the step failed."""
+        run, switching = self.run, self.switching
+        assert switching is not None
+        clock, count, tried = run.clock, run.count, run.tried
+        end, dt = float(clock[b.TRY_END]), float(clock[b.TRY_END] - clock[b.NOW])
+        change = switching.rescue(tried, end, dt, run.before, self._rescues)
+        if change is not None:
+            self._rescues += 1
+        elif tried.outcome != Outcome.OK and 0.5 * clock[b.TRIED_DT] < clock[b.SHORTEST]:
+            change = switching.all_rod(tried)
+            clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW] if change is not None else clock[b.TRIED_DT]
+        if change is not None:
+            count[b.WASTED] += tried.iterations
+            self._switch(change)
 
-    def _accept(self, taken: Taken, end: float, repeats: int, wasted: int) -> Step:
-        """The step that was tried is the new state; its work is booked."""
-        dt = end - self.t
-        self.state, self.before = self.before, self.state
+    def _after_step(self) -> None:
+        """A step is accepted: what zones put in is booked, the model error followed, and what is to change decided."""
+        run, model = self.run, self.model
+        flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
         if self.correction is not None:
             self._correct(self.correction, end, dt)
-        self.t, self.dt, self.steps, self.iterations = end, dt, self.steps + 1, taken.iterations
-        power = self._powers()
-        half = 0.5 * dt
-        for k, (a, b) in enumerate(zip(self.power, power, strict=True)):
-            self.work[k] += half * (a + b)
-        if self.model.line.bits & SEABED:  # the seabed's comes by way, not by power; what it stores is energy, not work
-            told = self.stepper.told
-            self.work[CONTACT] += told[CONTACT_WORK] + told[SEABED_ENERGY] - self._stored
-            self.work[FRICTION] += told[FRICTION_WORK]
-            self._stored = told[SEABED_ENERGY]
-        self.power = power
-        return Step(
-            end, dt, taken.iterations + wasted, taken.correction, taken.residual, repeats, taken.error,
-            self._end_force(0), self._end_force(1),
-        )  # fmt: skip
+        if flags & b.STEPS_CUT:
+            self._note_cut()
+        if flags & b.PUSH_DIED:
+            self.plane_monitor.renew(run)
+        if flags & b.LEAVES_PLANE:
+            self._leaves = self.plane_monitor.must_leave(run, self._note)
+        if self.switching is not None:
+            booked, self._pending = self.switching.book_step(end, dt, model.ends.values, run.before, run.state)
+            run.books.work[0, b.ZONES] += booked
+            self._rescues = 0
+        changes = self._pending is not None or self._leaves
+        run.count[b.INSIDE] = changes
+        outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
+        if not changes and (at == outputs.size or outputs[at] > end + dt):
+            run.count[b.PHASE] = b.END_STEP  # nothing to sample, nothing to change
+
+    def _note_cut(self) -> None:
+        """An end turns too far in a fixed step, which was cut: an event for the first."""
+        clock, most = self.run.clock, self.resolution.turn
+        if not self._turned and not self.controlled:
+            text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
+            self.events.event(float(clock[b.PREVIOUS]), 0.0, self.model.length, "steps cut", text)
+        self._turned, clock[b.MUTE_CUTS] = True, 1.0
 
     def _correct(self, correction: Correction, end: float, dt: float) -> None:
         """Follow the error of neglecting bending through the step just taken; an event where it cannot be estimated."""
-        before = dt if self.control is None else self.dt
+        before = float(self.run.clock[b.STEP_BEFORE])
         correction.step(self.stepper, self.model.ends.values, self.state, dt, before, self.rho)
         beyond = correction.beyond
         if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
@@ -268,46 +306,45 @@ class Transient:
             self.events.event(end, s, s, "model error not estimated", beyond)
             self._beyond = end + self.model.time_scale
 
-    def _adapt(self, dt: float) -> None:
-        """After an accepted step of dt: zones change where criteria ask for it, and the plane is left where it must."""
-        leaves = self.plane_monitor.must_leave(self.stepper, self._note)
-        if self.switching is not None:
-            booked, change = self.switching.book_step(self.t, dt, self.model.ends.values, self.before, self.state)
-            self.work[-1] += booked
-            if change is not None:
-                self._switch(change)
-        if leaves:
-            self._set_model(self.plane_monitor.leave(self.model, self.state))
-            self.before = self.state.copy()
-            self.stepper.evaluate_forces(self.model.sea.at(self.t), self.model.ends.at(self.t), self.state)
-            self.power = self._powers()
+    def shifts(self, batch: Batch) -> list[Shift]:
+        """The model error at outputs of the last step: between that before the step and that after it."""
+        assert self.correction is not None
+        clock, now = self.run.clock, self.run.state
+        dt = float(clock[b.NOW] - clock[b.PREVIOUS])
+        parts_ = [float((t - clock[b.PREVIOUS]) / dt) if dt > 0.0 else 1.0 for t in batch.t]
+        rows = zip(batch.e, batch.v, batch.T, batch.a1, batch.w, batch.r, strict=True)
+        return [
+            self.correction.shift(now._replace(e=e, v=v, T=T, a1=a1, w=w, r=r), part)
+            for part, (e, v, T, a1, w, r) in zip(parts_, rows, strict=True)
+        ]
 
-    def _reset_after_impact(self, dt: float) -> None:
-        """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity at once."""
-        state = self.state
-        hit = state.bed.any(axis=1) & (np.abs(state.a).max(axis=1) * dt > np.abs(state.v).max())
-        state.a[hit], state.vd[hit] = 0.0, 0.0
+    def _adapt(self) -> None:
+        """After the outputs of a step: zones change where criteria ask for it, and the plane is left where it must."""
+        change, self._pending = self._pending, None
+        self.run.count[b.INSIDE] = 0
+        if change is not None:
+            self._switch(change)
+        if self._leaves:
+            self._leaves = False
+            state = self.state.copy()
+            self._set_model(self.plane_monitor.leave(self.model, self.run, state), state)
+            self._evaluate_forces()
 
-    def _powers(self) -> list[float]:
-        ends = self.model.ends
-        return self.stepper.powers(ends.values, ends.velocity, self.state)
-
-    def _end_force(self, k: int) -> float:
-        """Magnitude, N, of the force that holds or loads an end; of an end body the tension beside it."""
-        ends = self.model.ends.values
-        if self._loaded[k]:
-            return abs(float(self.state.T[-k]))
-        x, y, z = self.stepper.told[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] if ends.held[k] else ends.force[k].tolist()
-        return sqrt(x * x + y * y + z * z)
+    def _evaluate_forces(self) -> None:
+        """The forces and the powers of a state that has changed between two steps."""
+        model = self.model
+        self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
+        self._restart_books()
 
     # --- another model --------------------------------------------------------------------------
 
     def _switch(self, change: Change) -> None:
         """Zones change: nothing moves, and what changes energy is booked."""
         assert self.switching is not None
+        run, trying = self.run, self.run.count[b.PHASE] == b.JUDGE
         ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
-        model, self.state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
-        self.work[-1] += booked
+        model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
+        run.books.work[0, b.ZONES] += booked
         base = self.switching.manager.layout.base
         for k, why in enumerate(change.reasons):
             energy = booked if k == 0 else 0.0  # of all that change now
@@ -315,35 +352,32 @@ class Transient:
                 self.t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
                 criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
             )  # fmt: skip
-        self.before = self.state.copy()
-        self._set_model(model)
+        self._set_model(model, state)
         if self.correction is not None:
             self.correction.switch(model)
-        self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
-        self._stored = self.stepper.told[SEABED_ENERGY]
-        self.power = self._powers()
+        self._evaluate_forces()
+        run.count[b.AFTER_START] = b.TRY if trying else b.SAMPLE
 
     def change_loads(self, scene: Scene) -> None:
         """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
-        old, monitor = self.model, self.plane_monitor
+        old, monitor, state = self.model, self.plane_monitor, self.state.copy()
         model = build(scene, self.resolution, old.mesh)
         if self.switching is not None:
             model = on_layout(model, self.switching.manager.layout)
-            self.switching.release_joints(self.state)
+            self.switching.release_joints(state)
         model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
         model.ends.go_on_from(old.ends, self.t)
         self.scene, self.changes = scene, self.changes + 1
-        leaves = monitor.push is not None and not same_plane(old.plane, model.plane)
+        leaves = bool(monitor.speed) and not same_plane(old.plane, model.plane)
         if old.plane is not None and not leaves:
             model = replace(model, line=planar(model.line, old.plane), plane=old.plane)
         elif leaves:
-            model = monitor.leave(replace(model, plane=old.plane), self.state)
+            model = monitor.leave(replace(model, plane=old.plane), self.run, state)
         else:
             model = replace(model, line=in_space(model.line), plane=None)
         if self.correction is not None:
             self.correction.switch(model)
-        self._set_model(model)
-        self.before = self.state.copy()
+        self._set_model(model, state)
         if self.switching is not None:
             self.switching.manager.moments = model.ends.moments
             self.switching.manager.loaded = bool(model.ends.moments.any())
@@ -353,17 +387,18 @@ class Transient:
         self.events.event(self.t, 0.0, model.length, "loads change", text)
         self.restart()
 
-    def _set_model(self, model: Model) -> None:
+    def _set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
         self.model = model
         if self.switching is not None:
             self.switching.model = model
-        self.stepper = self._new_stepper(self.stepper.floor)
-        self.plane_monitor.attach(self.stepper)
-
-    def _new_stepper(self, floor: float) -> Stepper:
-        model = self.model
-        return Stepper(model.line, model.length, model.tension_scale, floor, keep=self.correction is not None)
+        self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=self.correction is not None)
+        first = np.arange(model.line.s.size) if model.layout is None else model.layout.first
+        self.run.attach(
+            model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
+            self.stepper.limits, state, 1.0 + borne_strain(model), first,
+        )  # fmt: skip
+        self.plane_monitor.attach(self.run, model.line)
 
     def _note(self, node: int, kind: str, text: str) -> None:
         s = float(self.model.line.s[node])
@@ -373,44 +408,67 @@ class Transient:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the next steps depend on, between two steps: named arrays and plain values (simulation.restore)."""
-        model, push = self.model, self.plane_monitor.push
-        plain = {name: getattr(self, name) for name in PLAIN} | {
-            "floor": self.stepper.floor, "work": np.array(self.work), "power": np.array(self.power),
+        model, clock, count, books = self.model, self.run.clock, self.run.count, self.run.books
+        control = {
+            "next": float(clock[b.NEXT_DT]), "before": float(clock[b.ERROR_RATIO]), "wary": int(count[b.WARY])
         }  # fmt: skip
-        parts: dict[str, Any] = {
-            "ends": model.ends, "control": self.control, "zoning": self.switching, "correction": self.correction,
-        }  # fmt: skip
-        return plain | {name: x.checkpoint() if x is not None else None for name, x in parts.items()} | {
+        parts_: dict[str, Any] = {"ends": model.ends, "zoning": self.switching, "correction": self.correction}
+        return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
+            "t": self.t, "dt": float(clock[b.LAST_DT]), "steps": self.steps, "iterations": int(count[b.ITERATIONS]),
+            "changes": self.changes, "_turned": self._turned, "_stored": float(clock[b.STORED]), "_beyond": self._beyond,
+            "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
+            "report": books.report[0].copy(), "control": control if self.controlled else None,
             "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
-            "push": push.checkpoint(self.state) if push is not None else None,
+            "push": self.plane_monitor.checkpoint(self.run),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue as `checkpoint` has said, on a model that was made for it.
+        """Continue as `checkpoint` has written, on a model that was made for it.
 
         ValueError or ResultError: that cannot be.
         """
-        model, monitor = self.model, self.plane_monitor
+        model, monitor, run = self.model, self.plane_monitor, self.run
         if saved["push"] is not None and model.plane is not None:
-            monitor.push = Push(model.line, model.length, model.time_scale)
-        self._set_model(model)
-        self.state = blank_state(model.cells)
-        saved = {"_turned": False} | dict(saved)  # files of 0.6.0 do not have it
-        saved = matched(saved, self.checkpoint() | {"mesh": None, "plane": None}, "state")
-        vars(self).update({name: saved[name] for name in PLAIN})
-        self.work, self.power = saved["work"].tolist(), saved["power"].tolist()
-        self.state, self.stepper.floor = State(**saved["state"]), saved["floor"]
-        self.before = self.state.copy()
+            monitor.speed = model.length / model.time_scale
+        state = blank_state(model.cells)
+        self._set_model(model, state)
+        complete = "report" in saved  # not in a checkpoint of 0.6
+        template = self.checkpoint() | {"mesh": None, "plane": None, "report": np.full(REPORT_SIZE, np.inf)}
+        saved = matched({"report": run.report, "_turned": False, **saved}, template, "state")
+        clock, count, books = run.clock, run.count, run.books
+        clock[b.NOW] = clock[b.PREVIOUS] = saved["t"]
+        clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
+        count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
+        self.changes, self._beyond, self._turned = saved["changes"], saved["_beyond"], saved["_turned"]
+        clock[b.MUTE_CUTS] = float(self._turned)
+        books.work[0], books.power[0], books.report[0] = saved["work"], saved["power"], saved["report"]
+        for mine, its in ((state, saved["state"]), (run.before, saved["state"])):
+            for name, x in its.items():
+                getattr(mine, name)[:] = x
         model.sea.at(self.t)
         apart = model.ends.restore(saved["ends"], self.t)
         if apart > SAME_PLACE * model.length:
             moved = f"an end is {apart:.3g} m from where it was at t = {self.t:.6g} s: has its motion file changed?"
             raise ValueError(moved)
-        if self.control is not None:
-            self.control.restore(saved["control"])
-        if monitor.push is not None:
-            monitor.push.restore(saved["push"], self.state)
+        run.move(model.ends.moves())
+        books.velocity[:] = model.ends.velocity
+        if saved["control"] is not None:
+            self._restore_control(saved["control"])
+        if saved["push"] is not None:
+            monitor.restore(saved["push"], run)
         if self.switching is not None:
             self.switching.restore(saved["zoning"])
         if self.correction is not None:
             self.correction.restore(saved["correction"], model.ends.values)
+        count[b.OUTPUT] = np.searchsorted(books.outputs, self.t + SAME_TIME * saved["dt"], side="right")
+        if not complete:
+            self._evaluate_forces()
+        count[b.PHASE] = b.BEGIN_STEP
+
+    def _restore_control(self, saved: Mapping[str, Any]) -> None:
+        clock, largest = self.run.clock, self.resolution.step
+        clock[b.NEXT_DT], clock[b.ERROR_RATIO] = saved["next"], saved["before"]
+        self.run.count[b.WARY] = saved["wary"]
+        good = clock[b.SHORTEST] <= saved["next"] <= largest and saved["before"] > 0.0
+        if not (good and 0 <= saved["wary"] <= WARY):
+            raise ValueError("steps that no controller chooses")

@@ -22,7 +22,7 @@ from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
 from hybrid.model.plane import planar, untwist
-from hybrid.solve.stepper import Taken
+from hybrid.solve.run import Tried
 from hybrid.store.named_arrays import matched
 
 # A stretch that has become chords, or arcs, is let go to its true length over this many paces.
@@ -112,6 +112,11 @@ class ZoneSwitching:
         self.manager.reset()
         self.evaluate_criteria(0.0, 0.0, ends, state)
 
+    @property
+    def prepares(self) -> bool:
+        """Whether something has to be done before a step: lengths or bending on their way, moments at joints."""
+        return self.relaxing is not None or self.manager.ramping or self.joints is not None
+
     def prepare_step(self, end: float, dt: float, state: State) -> None:
         """Before a step of dt to `end`: lengths, bending and moments at joints as they will be then."""
         line = self.model.line
@@ -130,27 +135,27 @@ class ZoneSwitching:
         loudest = self.manager.evaluate_criteria(self.model.line, self.model.sea.values, ends, state, dt, t)
         return self.manager.cells_to_reject if loudest > REJECT_RATIO else NONE
 
-    def rescue(self, taken: Taken, end: float, dt: float, tried: State, rescues: int) -> Change | None:
+    def rescue(self, how: Tried, end: float, dt: float, tried: State, rescues: int) -> Change | None:
         """More rod for a step of dt to `end` that failed or took a catenary too far; None: as it is.
 
         tried: the state that the step led to; rescues: of this step, so far.
         """
         line, most = self.model.line, MOST_RESCUES
-        if taken.outcome == Outcome.OK:
+        if how.outcome == Outcome.OK:
             cells = self.evaluate_criteria(end, dt, self.model.ends.values, tried)
             why = "a step would have left it a catenary far beyond its criterion; the step is repeated"
-        elif taken.outcome == Outcome.SLACK:
+        elif how.outcome == Outcome.SLACK:
             cells = np.flatnonzero((line.spin == 0) & (self.model.slack_floor >= tried.T))
             why = "a step would have left it a catenary without tension; the step is repeated"
         else:
-            cells = self.manager.cells_near_threshold(min(max(taken.where, 0), self.model.cells - 1))
-            why = f"a step failed here ({taken.outcome.cause}); it is repeated"
+            cells = self.manager.cells_near_threshold(min(max(how.where, 0), self.model.cells - 1))
+            why = f"a step failed here ({how.outcome.cause}); it is repeated"
             most = 1  # after that, a smaller step
         return self._force_rod(cells, why) if rescues < most and cells.size else None
 
-    def all_rod(self, taken: Taken) -> Change | None:
+    def all_rod(self, how: Tried) -> Change | None:
         """The last resort of a step that fails however small: rod wherever the scene lets it be; None: it is."""
-        why = f"steps fail here, however small ({taken.outcome.cause}); repeated with rods everywhere"
+        why = f"steps fail here, however small ({how.outcome.cause}); repeated with rods everywhere"
         return self._force_rod(np.arange(self.model.cells), why)
 
     def _force_rod(self, cells: np.ndarray, why: str) -> Change | None:

@@ -5,6 +5,7 @@ One way only: nothing of it goes back into the line.  docs/theory.md, 14; the ke
 
 from __future__ import annotations
 
+from copy import copy
 from math import sqrt
 from typing import NamedTuple
 
@@ -79,6 +80,7 @@ class Corrector:
             np.zeros((4, n + 1, 4)),
             np.zeros(REPORT_SIZE),
         )
+        self._before = (self.x.copy(), self.moment.copy(), self.left.copy())  # before the last step, as is `_spare`
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step
 
@@ -112,6 +114,17 @@ class Corrector:
         self.x[:, 1:] = self.error[0]
         self.x[1:, 0] = np.interp(0.5 * (s[1:] + s[:-1]), 0.5 * (then[1:] + then[:-1]), old.x[1:, 0])
         return self
+
+    def at(self, part: float) -> Corrector:
+        """The error at a part of the last step: between that before it and that after it."""
+        if part >= 1.0:
+            return self
+        other = copy(self)
+        x, moment, left = self._before
+        other.error = part * self.error + (1.0 - part) * self._spare
+        other.x, other.moment = part * self.x + (1.0 - part) * x, part * self.moment + (1.0 - part) * moment
+        other.left = part * self.left + (1.0 - part) * left
+        return other
 
     def shift(self, ends: Ends, state: State) -> Shift:
         """What the error makes of an output of `state`."""
@@ -183,6 +196,8 @@ class Corrector:
     def follow(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, work: Work) -> None:
         """The error after `step`, with the factors of the matrix that stand in `work`."""
         self.sea = sea
+        for mine, its in zip(self._before, (self.x, self.moment, self.left), strict=True):
+            mine[:] = its
         self.finite, self.clipped, self.where = advance_error(
             line, sea, ends, self.bending, state, step, work.X, work.W, self.error, self._spare, self.most, self._arrays
         )

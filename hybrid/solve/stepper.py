@@ -11,14 +11,13 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels import entry
-from hybrid.kernels.entry import Limits, block_rows, out_of_balance, workspace
+from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import normal_forces, stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
 from hybrid.kernels.water import wave_kinematics
-from hybrid.solve.plane_stability import NOTHING, Push
 
 MOST_ITERATIONS = 20  # a healthy step takes 2 to 4; more than this and half a step is cheaper
 # Share of the line's length that a node may move in one Newton iteration of a step.
@@ -78,7 +77,6 @@ class Stepper:
         self.limits = Limits(REACH * length, tension_scale, MOST_ITERATIONS)
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
         self.work = workspace(line.h.size, keep)
-        self.push: Push | None = None  # out of the plane, of a planar motion that is watched
         self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:
@@ -86,9 +84,8 @@ class Stepper:
 
         before: s, the length of the step that led to `old`; 0 if it is a start, with consistent accelerations.
         """
-        was, now = self.push.pair(old, new) if self.push is not None else (NOTHING, NOTHING)
         outcome, iterations, left, where = entry.step(
-            self.line, sea, ends, old, new, dt, before, rho, self.limits, was, now, self.work
+            self.line, sea, ends, old, new, dt, before, rho, self.limits, NO_PUSH, NO_PUSH, self.work
         )
         self.told = told = self.work.report.tolist()
         if outcome == OK and not told[SLACKEST] > self.floor:
@@ -166,27 +163,3 @@ class Stepper:
             self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)
             state.bed[:] = sea.bed
         self.told = self.work.report.tolist()
-
-    def powers(self, ends: Ends, velocity: Floats, state: State) -> list[float]:
-        """Power (W) into the cable by each of POWERS but the seabed's, at the last configuration the march saw."""
-        f, n = self.told, self.line.h.size
-        out = [0.0, 0.0, 0.0, -f[12], -f[13], -f[14], -f[17], f[18]]
-        for k, node, cell in ((0, 0, 0), (1, n, n - 1)):
-            if ends.held[k]:
-                out[k] -= _dot(f[3 * k : 3 * k + 3], velocity[k])
-            elif ends.force[k].any():
-                out[2] += _dot(ends.force[k].tolist(), state.v[node])
-            if self.line.element[node]:
-                moment = _dot(f[6 + 3 * k : 9 + 3 * k], ends.spin[k])
-                out[k] += moment if k else -moment
-            elif self.line.spin[cell] and ends.moment[k].any():
-                e = state.e[cell]
-                e1 = state.v[cell + 1] - state.v[cell]
-                omega = np.cross(e, e1) / (e @ e) + state.w[cell] * e / np.sqrt(e @ e)
-                out[2] += float(ends.moment[k] @ omega)
-        return out
-
-
-def _dot(a: list[float], b: Floats) -> float:
-    x, y, z = b.tolist()
-    return float(a[0] * x + a[1] * y + a[2] * z)

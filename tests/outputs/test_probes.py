@@ -118,7 +118,8 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
         part = LEFT if corrected else 1.0
         compare(found, {field: x * (part if field.startswith("errors/") else 1.0) for field, x in expected.items()})
         checked.update(found.keys() & expected.keys())
-        past.setdefault(self, []).append((batch, ratios, shifts, found))
+        copied = Batch(*(np.array(x) for x in batch))  # the next steps overwrite it
+        past.setdefault(self, []).append((copied, ratios, shifts, found))
         return found
 
     monkeypatch.setattr(Observer, "values_of", watched)

@@ -7,9 +7,12 @@ import pytest
 from test_time_order import scene
 
 from hybrid.errors import Outcome
+from hybrid.kernels import books as b
+from hybrid.kernels.compile import kernel
+from hybrid.kernels.step_control import halve, passes
+from hybrid.kernels.step_law import FIRST, LEAST, MOST, REFUSED, step_end
 from hybrid.model.build import build
 from hybrid.solve.statics import solve_statics
-from hybrid.solve.step_control import LEAST, MOST, REFUSED, Controller
 from hybrid.solve.stepper import Stepper
 
 DURATION = 2.0  # s
@@ -75,6 +78,40 @@ def test_tension_is_clean_when_steps_change(model, rho):
         assert found[-1, 1] < 20.0 * equal[-1, 1]
         if name != "equal":
             assert plain[-1, 1] > 5.0 * found[-1, 1]
+
+
+@kernel
+def _passes(clock, count, dt, error):
+    return passes(clock, count, dt, error)
+
+
+@kernel
+def _halve(clock, count, dt):
+    halve(clock, count, dt)
+
+
+class Controller:
+    """The controller of the compiled run, one decision at a time."""
+
+    def __init__(self, tolerance, largest, smallest):
+        self.clock, self.count = np.zeros(b.CLOCK_SIZE), np.zeros(b.COUNT_SIZE, np.int64)
+        self.clock[b.TOLERANCE], self.clock[b.LARGEST], self.clock[b.SHORTEST] = tolerance, largest, smallest
+        self.clock[b.NEXT_DT], self.clock[b.ERROR_RATIO] = largest / FIRST, 1.0
+        self.count[b.CONTROLLED] = 1
+
+    @property
+    def next(self):
+        return self.clock[b.NEXT_DT]
+
+    def until(self, t, stop):
+        return step_end(t, stop, self.next)
+
+    def accepts(self, dt, error):
+        return _passes(self.clock, self.count, dt, error)
+
+    def fails(self, dt):
+        _halve(self.clock, self.count, dt)
+        return self.next
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.5, 0.8, 0.9])

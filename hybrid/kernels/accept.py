@@ -1,0 +1,206 @@
+"""What follows a try of a step in a compiled run: its judgement, its books, what there is to look at."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.books import (
+    BEGIN,
+    BEGIN_STEP,
+    BEND_LIMIT,
+    BENT,
+    CONTROLLED,
+    CORRECTION,
+    FLOOR,
+    ITERATIONS,
+    JUMPED,
+    LARGEST_PEAK,
+    LAST_DT,
+    LEAST_PEAK,
+    LEAVES_PLANE,
+    MEASURED,
+    MOVED,
+    NOW,
+    OUTCOME,
+    PARITY,
+    PHASE,
+    PREVIOUS,
+    PUSH_DIED,
+    PUSH_GROWN,
+    PUSH_START,
+    REPEATS,
+    ROWS,
+    SAMPLE,
+    SCALED_JUMP,
+    SHORTEST,
+    SLACK_LIMIT,
+    SLACKENED,
+    STEPS,
+    STIFF,
+    STRETCHED,
+    TRIED_DT,
+    TRIES,
+    TRY,
+    TWIST_LIMIT,
+    UNTIL,
+    WASTED,
+    WHERE,
+)
+from hybrid.kernels.compile import inner
+from hybrid.kernels.forces import SEABED
+from hybrid.kernels.newton import OK, SLACK
+from hybrid.kernels.powers import book_work, find_powers, pull
+from hybrid.kernels.report import (
+    BEND,
+    LOCAL_ERROR,
+    PUSH_ENERGY,
+    RESIDUAL,
+    SLACKEST,
+    SLACKEST_CELL,
+    TWIST,
+    WRONG_PIVOTS,
+)
+from hybrid.kernels.step_control import halve, passes
+
+# Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
+# an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
+LARGEST_TWIST = 2.0
+# Growth of the speed of a push out of the plane at which the plane no longer holds: a disturbance of a thousandth of the
+# length, which every real cable has, would by then be as large as the cable; swings that come and go stay below a tenth.
+GROWN = 1e3
+# A push that has died to this part is given anew, so that an instability that begins late is seen as early.
+DIED = 1e-3
+
+
+@inner
+def note_try(clock, count, report, outcome, iterations, left, where):
+    """Keep how a try ended; one that leaves a catenary cell at the floor of tension or below has failed."""
+    if outcome == OK and not report[SLACKEST] > clock[FLOOR]:
+        outcome, where = SLACK, int(report[SLACKEST_CELL])
+    count[OUTCOME], count[TRIES], count[WHERE] = outcome, iterations, where
+    clock[CORRECTION] = left
+
+
+@inner
+def judge(clock, count, report, dt):
+    """Whether the try over dt is the step (1), is to be repeated in another length (0), or has failed for good (-1)."""
+    if count[OUTCOME] == OK:
+        if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
+            return 1
+    elif count[OUTCOME] == SLACK or 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
+        # A slack catenary is no matter of the step: its answer would be grid noise at any length.
+        return -1
+    else:
+        halve(clock, count, dt)
+    count[WASTED] += count[TRIES]
+    count[REPEATS] += 1
+    count[PHASE] = TRY
+    return 0
+
+
+@inner
+def accept(line, ends, new, books, work, end, dt):
+    """The step that was tried is taken: clock, books and log."""
+    clock, count, report = books.clock, books.counts, work.report
+    count[PARITY] = 1 - count[PARITY]
+    clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], end, dt
+    count[STEPS] += 1
+    count[ITERATIONS] = count[TRIES]
+    for j in range(report.shape[0]):
+        books.report[1, j], books.report[0, j] = books.report[0, j], report[j]
+    for j in range(books.power.shape[1]):
+        books.power[1, j] = books.power[0, j]
+    find_powers(line, ends, books.velocity, new, report, books.power[0])
+    book_work(line, dt, report, books)
+    row = books.log[count[ROWS]]
+    row[0], row[1], row[2], row[3] = end, dt, count[TRIES] + count[WASTED], clock[CORRECTION]
+    row[4], row[5], row[6] = report[RESIDUAL], count[REPEATS], report[LOCAL_ERROR]
+    row[7], row[8] = pull(ends, new, report, books.loaded, 0), pull(ends, new, report, books.loaded, 1)
+    count[ROWS] += 1
+    count[WASTED], count[PHASE] = 0, SAMPLE
+
+
+@inner
+def remember_worst(line, old, new, books, t, dt):
+    """Of the steps that leave the most out of the motion, how much (m), when, over what, and where (s, m)."""
+    worst, most, node = books.worst, -1.0, 0
+    for i in range(old.a.shape[0]):
+        for k in range(3):
+            x = abs(new.a[i, k] - old.a[i, k])
+            if x > most:
+                most, node = x, i
+    left = dt * dt * most
+    known = min(books.counts[MEASURED], worst.shape[0])
+    books.counts[MEASURED] += 1
+    at = known
+    while at > 0 and left > worst[at - 1, 0]:
+        at -= 1
+    if at < worst.shape[0]:
+        for j in range(min(known, worst.shape[0] - 1), at, -1):
+            for k in range(4):
+                worst[j, k] = worst[j - 1, k]
+        worst[at, 0], worst[at, 1], worst[at, 2], worst[at, 3] = left, t, dt, line.s[node]
+
+
+@inner
+def watch(line, old, new, books, report, t, dt):
+    """What there is to look at after a step, as bits; and how far the line has moved, how its peak tension varies."""
+    clock, flags = books.clock, 0
+    peak, before, stretched = new.T[0], old.T[0], False
+    for c in range(new.T.shape[0]):
+        peak, before = max(peak, new.T[c]), max(before, old.T[c])
+        e, longest = new.e[c], books.borne[c] * line.h[c]
+        stretched |= e[0] * e[0] + e[1] * e[1] + e[2] * e[2] > longest * longest
+    clock[LEAST_PEAK], clock[LARGEST_PEAK] = min(clock[LEAST_PEAK], peak), max(clock[LARGEST_PEAK], peak)
+    for j in range(books.base.shape[0]):
+        for k in range(3):
+            clock[MOVED] = max(clock[MOVED], abs(new.r[books.base[j], k] - books.placed[j, k]))
+    remember_worst(line, old, new, books, t, dt)
+    if stretched and not books.counts[STIFF]:
+        flags |= STRETCHED
+    if books.counts[STIFF] and peak - before > clock[SCALED_JUMP]:
+        flags |= JUMPED
+    if report[BEND] > clock[BEND_LIMIT] or report[TWIST] > min(clock[TWIST_LIMIT], LARGEST_TWIST):
+        flags |= BENT
+    if not report[SLACKEST] > clock[SLACK_LIMIT]:
+        flags |= SLACKENED
+    return flags
+
+
+@inner
+def watch_push(clock, report):
+    """By how much a push out of the plane has grown, as bits."""
+    energy = report[PUSH_ENERGY]
+    if report[WRONG_PIVOTS] > 0.0 or not energy < math.inf:
+        clock[PUSH_GROWN] = math.inf
+        return LEAVES_PLANE
+    if not clock[PUSH_START] > 0.0:
+        clock[PUSH_START] = energy
+    clock[PUSH_GROWN] = math.sqrt(energy / clock[PUSH_START]) if clock[PUSH_START] > 0.0 else 0.0
+    if clock[PUSH_GROWN] < DIED:
+        return PUSH_DIED
+    return LEAVES_PLANE if clock[PUSH_GROWN] >= GROWN else 0
+
+
+@inner
+def end_step(line, state, clock, count):
+    """Go on with the next part of the step, or with the next step."""
+    if not (count[CONTROLLED] or clock[NOW] >= clock[UNTIL]):
+        count[PHASE] = TRY
+        return
+    if count[REPEATS] > 0 and line.bits & SEABED:
+        settle_impact(state, clock[UNTIL] - clock[BEGIN])
+    count[PHASE] = BEGIN_STEP
+
+
+@inner
+def settle_impact(state, dt):
+    """After shortened steps: an impact on the seabed leaves accelerations that would undo all velocity at once."""
+    fastest = 0.0
+    for i in range(state.v.shape[0]):
+        fastest = max(fastest, abs(state.v[i, 0]), abs(state.v[i, 1]), abs(state.v[i, 2]))
+    for i in range(state.v.shape[0]):
+        touches = state.bed[i, 0] != 0.0 or state.bed[i, 1] != 0.0 or state.bed[i, 2] != 0.0
+        if touches and max(abs(state.a[i, 0]), abs(state.a[i, 1]), abs(state.a[i, 2])) * dt > fastest:
+            for k in range(3):
+                state.a[i, k], state.vd[i, k] = 0.0, 0.0

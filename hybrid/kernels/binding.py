@@ -1,0 +1,129 @@
+"""Arguments of a kernel in memory: one table of addresses instead of a hundred and fifty arrays at every call.
+
+numba unpacks every array of every call anew, 0.6 us each, which is more than a step of a short line takes.  Here the
+addresses, shapes and numbers of a NamedTuple of arrays stand in one array of integers; the kernel builds its arguments
+from it.  What is bound is checked when it is bound, and kept alive until something else takes its place.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from numba import types
+from numba.core import cgutils
+from numba.extending import intrinsic
+from numpy.typing import NDArray
+
+
+def reader(example: Any) -> Any:
+    """A function for kernels, read(table) -> a NamedTuple of the same type as `example`."""
+    kind = numba.typeof(example)
+
+    @intrinsic
+    def read(typingctx: Any, table: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            table = context.make_array(signature.args[0])(context, builder, args[0])
+            return _built(context, builder, kind, table.data, 0)[0]
+
+        return kind(table), generate
+
+    return read
+
+
+def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
+    """The value of a type from the table's numbers at `at` on, and where the next begins."""
+
+    def number(k: int) -> Any:
+        return builder.load(cgutils.gep_inbounds(builder, table, k))
+
+    if isinstance(kind, types.NamedTuple):
+        values = []
+        for each in kind.types:
+            value, at = _built(context, builder, each, table, at)
+            values.append(value)
+        return context.make_tuple(builder, kind, values), at
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder)
+        item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+        shape = [number(at + 1 + k) for k in range(kind.ndim)]
+        strides = [context.get_constant(types.intp, item)]
+        for size in shape[:0:-1]:
+            strides.insert(0, builder.mul(strides[0], size))
+        data = builder.inttoptr(number(at), array.data.type)
+        context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+        return array._getvalue(), at + 1 + kind.ndim
+    value = number(at)
+    if isinstance(kind, types.Float):
+        value = builder.bitcast(value, context.get_data_type(types.float64))
+    elif isinstance(kind, types.Boolean):
+        value = builder.icmp_signed("!=", value, value.type(0))
+    return value, at + 1
+
+
+class Table:
+    """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
+
+    def __init__(self, example: Any) -> None:
+        """example: with the types that all values have."""
+        self._places: dict[str, tuple[int, Any]] = {}
+        self._bound: dict[str, Any] = {}
+        at = 0
+        for name, value in example._asdict().items():
+            pattern = _pattern(value)
+            self._places[name] = at, pattern
+            at += _size(pattern)
+        self.numbers: NDArray[np.int64] = np.zeros(at, np.int64)
+        self._floats = self.numbers.view(np.float64)
+        self.bind(**example._asdict())
+
+    def bind(self, **values: Any) -> None:
+        """Put values in their places; TypeError: an array that the kernel would not understand."""
+        for name, value in values.items():
+            if self._bound.get(name, self) is not value:
+                at, pattern = self._places[name]
+                self._put(at, pattern, value, name)
+                self._bound[name] = value
+
+    def _put(self, at: int, pattern: Any, value: Any, name: str) -> int:
+        if isinstance(pattern, tuple):
+            if len(value) != len(pattern):
+                raise TypeError(f"{name}: {len(value)} values, expected {len(pattern)}")
+            for k, each in enumerate(value):
+                at = self._put(at, pattern[k], each, name)
+            return at
+        if isinstance(pattern, _ArrayPattern):
+            if not (value.dtype == pattern.dtype and value.ndim == pattern.ndim and value.flags.c_contiguous):
+                given = f"{value.dtype} of shape {value.shape}"
+                raise TypeError(f"{name}: {given}, expected {pattern.dtype} of {pattern.ndim} dimensions, contiguous")
+            end = at + 1 + pattern.ndim
+            self.numbers[at] = value.ctypes.data
+            self.numbers[at + 1 : end] = value.shape
+            return end
+        if pattern is float:
+            self._floats[at] = value
+        else:
+            self.numbers[at] = value
+        return at + 1
+
+
+class _ArrayPattern:
+    """Type of an array and number of its dimensions."""
+
+    def __init__(self, array: NDArray[Any]) -> None:
+        self.dtype, self.ndim = array.dtype, array.ndim
+
+
+def _pattern(value: Any) -> Any:
+    if isinstance(value, np.ndarray):
+        return _ArrayPattern(value)
+    if isinstance(value, tuple):
+        return tuple(_pattern(x) for x in value)
+    return float if isinstance(value, float) else int
+
+
+def _size(pattern: Any) -> int:
+    if isinstance(pattern, tuple):
+        return sum(_size(x) for x in pattern)
+    return 1 + pattern.ndim if isinstance(pattern, _ArrayPattern) else 1

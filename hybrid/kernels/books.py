@@ -1,0 +1,128 @@
+"""What a run knows beside its state, as arrays that compiled steps read and write: clock, counts, books, samples.
+
+Numbers of `clock` (float64) and `count` (int64) have their names here; `FLAGS` are what Python has to look at.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.state import Floats
+
+# --- clock: times in s ----------------------------------------------------------------------------
+
+(
+    NOW, PREVIOUS,  # time of the state, and of the one before it
+    LAST_DT,  # length of the step that led there; 0 after a start
+    STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
+    STOP,  # where steps must end, and the call with them
+    LEG_BEGIN,  # where equal steps to `STOP` began
+    BEGIN, UNTIL,  # where the present step was begun, and where it should end
+    TRIED_DT,  # longest length of the present tries
+    TRY_END,  # where the present one ends
+    SHORTEST,  # below which a step is not tried
+    LARGEST,  # longest step that the controller may choose
+    ALLOWED,  # the same for the time being
+    TOLERANCE,  # m, error of position that a step may make
+    NEXT_DT,  # chosen by the controller
+    ERROR_RATIO,  # error over tolerance of the last accepted step
+    RHO,  # spectral radius at infinity
+    FLOOR,  # N, a catenary cell not above it refuses the step
+    STORED,  # J, in the seabed
+    SCALED_JUMP,  # N, jump of tension in a step that is worth a look
+    MOVED,  # m, largest displacement of a base node since the start
+    LEAST_PEAK, LARGEST_PEAK,  # N, lowest and highest of the largest tensions
+    BEND_LIMIT, TWIST_LIMIT,  # rad, of an element, from which on they are worth a look
+    SLACK_LIMIT,  # N, tension of a catenary cell, likewise
+    PUSH_START,  # J, kinetic energy of the push out of the plane when it was given; 0: unknown
+    PUSH_GROWN,  # by how much its speed has grown since
+    MOST_TURN,  # rad, through which an end may turn in a step
+    CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
+    MUTE_CUTS,  # 1 when an event has told of that
+    CORRECTION,  # of the last try: next correction of Newton's method, as predicted
+) = range(33)  # fmt: skip
+CLOCK_SIZE = 33
+
+# --- count -----------------------------------------------------------------------------------------
+
+(
+    CONTROLLED,  # 1 where the length of steps is controlled by their error
+    PARITY,  # which of the two states is now
+    PHASE, AFTER_START,  # what comes next (below), and what after START
+    STEPS, ITERATIONS,  # accepted steps; iterations of the last
+    OUTCOME, TRIES, WHERE,  # of the last try: its outcome, iterations, and the cell or node where it was worst
+    WASTED, REPEATS,  # iterations of tries given up since the last step, and tries repeated since `BEGIN`
+    LEG_PART, LEG_PARTS,  # equal steps taken, and all of them, from LEG_BEGIN to STOP
+    WARY,  # steps for which the length may not grow
+    ROWS,  # in the log
+    OUTPUT,  # next output that is due
+    SAMPLES,  # in the buffer
+    INSIDE,  # 1: outputs at the end of the step wait, because the line is about to change
+    ASKS,  # bits: Python is asked before every try, after it, after every step
+    FLAGS,  # what there is to look at after the last step
+    STIFF,  # 1 where no cell stretches
+    QUOTA,  # steps until the call returns
+    MEASURED,  # steps of which `worst` knows
+) = range(23)  # fmt: skip
+COUNT_SIZE = 23
+
+# Phases.
+START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
+ASK_BEFORE, ASK_TRIES, ASK_STEPS = 1, 2, 4
+# What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
+# looked at; its outputs to be looked at; a step that fails however small.
+AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
+# Bits of FLAGS.
+STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT = 1, 2, 4, 8, 16, 32, 64
+
+# --- powers and work --------------------------------------------------------------------------------
+
+RATES = 8  # by their rates: start, end, applied, drag, mass damping, stiffness damping, added mass, waves
+CONTACT, FRICTION, ZONES = 8, 9, 10  # by steps
+WORKS = 11
+# Columns of the step log.
+LOG = ("t", "dt", "iterations", "correction", "residual", "repeats", "error", "end_force_start", "end_force_end")
+# Steps of which the worst is remembered, with (left, t, dt, node).
+WORST = 3
+
+# --- extremes ----------------------------------------------------------------------------------------
+
+# Rows of `extremes`; tension belongs to cells, the rest to nodes.
+TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT = range(6)
+EXTREMES = 6
+
+
+class Books(NamedTuple):
+    """What a run knows beside its state."""
+
+    clock: Floats  # (CLOCK_SIZE,)
+    counts: NDArray[np.int64]  # (COUNT_SIZE,)
+    outputs: Floats  # s, times of all outputs
+    power: Floats  # (2, RATES) W, now and before the last step
+    work: Floats  # (2, WORKS) J, since the start of the run, likewise
+    report: Floats  # (2, REPORT_SIZE) likewise
+    velocity: Floats  # (2, 3) m/s, of held ends now
+    loaded: NDArray[np.int8]  # (2,) 1 where an end body makes the pull of the end the tension beside it
+    base: NDArray[np.int64]  # nodes whose displacement is watched
+    placed: Floats  # (base.size, 3) m, where they were at the start
+    borne: Floats  # (N,) length over unstretched length that each cell bears
+    worst: Floats  # (WORST, 4)
+    log: Floats  # (rows, len(LOG))
+    samples: Floats  # (rows, sample_size(N))
+    strains: Floats  # (N+1, 3) of elements: curvature (1/m), bending moment (N m), torque (N m); empty: not wanted
+    start: Floats  # (N+1, 3) m, positions from which displacements count
+    extremes: Floats  # (4, EXTREMES, N+1) lowest, highest, and their times (s); empty: not wanted
+
+
+# A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
+# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N).
+HEAD = 1 + 4 + 6 + 18 + 3 * 6 + REPORT_SIZE + WORKS
+
+
+def sample_size(cells: int) -> int:
+    """Numbers of a sample of a line of so many cells."""
+    return HEAD + 9 * (cells + 1) + 8 * cells

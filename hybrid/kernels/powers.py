@@ -1,0 +1,80 @@
+"""Powers into the cable after a step, the work they do, and the pull at its ends."""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.books import CONTACT, FRICTION, RATES, STORED, WORKS
+from hybrid.kernels.compile import inner
+from hybrid.kernels.forces import SEABED
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.report import (
+    ADDED_MASS_POWER,
+    CONTACT_WORK,
+    DRAG_POWER,
+    FORCE_A,
+    FRICTION_WORK,
+    MASS_DAMPING_POWER,
+    MOMENT_A,
+    SEABED_ENERGY,
+    STIFFNESS_DAMPING_POWER,
+    WAVE_POWER,
+)
+from hybrid.kernels.rotations import add, cross, dot, scale, sub
+
+START, APPLIED = 0, 2
+
+
+@inner
+def find_powers(line, ends, velocity, state, report, power):
+    """Power, W, into the cable by start, end, applied loads, drag, damping by mass and stiffness, added mass, waves.
+
+    velocity: (2, 3) m/s of the ends; report: of the state (kernels.report).
+    """
+    n = line.h.shape[0]
+    power[0], power[1], power[APPLIED] = 0.0, 0.0, 0.0
+    power[3], power[4], power[5] = -report[DRAG_POWER], -report[MASS_DAMPING_POWER], -report[STIFFNESS_DAMPING_POWER]
+    power[6], power[7] = -report[ADDED_MASS_POWER], report[WAVE_POWER]
+    for k in range(2):
+        node, cell = k * n, k * (n - 1)
+        at = FORCE_A + 3 * k
+        if ends.held[k]:
+            power[k] -= dot((report[at], report[at + 1], report[at + 2]), get3(velocity, k))
+        else:
+            power[APPLIED] += dot(get3(ends.force, k), get3(state.v, node))
+        at = MOMENT_A + 3 * k
+        if line.element[node]:
+            turning = dot((report[at], report[at + 1], report[at + 2]), get3(ends.spin, k))
+            power[k] += turning if k else -turning
+        elif line.spin[cell]:
+            e, e1 = get3(state.e, cell), sub(get3(state.v, cell + 1), get3(state.v, cell))
+            square = dot(e, e)
+            omega = add(scale(1.0 / square, cross(e, e1)), scale(state.w[cell] / math.sqrt(square), e))
+            power[APPLIED] += dot(get3(ends.moment, k), omega)
+
+
+@inner
+def book_work(line, dt, report, books):
+    """Work, J, of a step of dt: by the mean of its powers; that of the seabed comes by way, not by power."""
+    power, work, clock = books.power, books.work, books.clock
+    for k in range(WORKS):
+        work[1, k] = work[0, k]
+    half = 0.5 * dt
+    for k in range(RATES):
+        work[0, k] += half * (power[1, k] + power[0, k])
+    if line.bits & SEABED:
+        work[0, CONTACT] += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED]
+        work[0, FRICTION] += report[FRICTION_WORK]
+        clock[STORED] = report[SEABED_ENERGY]
+
+
+@inner
+def pull(ends, state, report, loaded, k):
+    """Magnitude, N, of the force that holds or loads an end; of an end body the tension beside it."""
+    if loaded[k]:
+        return abs(state.T[k * (state.T.shape[0] - 1)])
+    at = FORCE_A + 3 * k
+    f = get3(ends.force, k)
+    if ends.held[k]:
+        f = (report[at], report[at + 1], report[at + 2])
+    return math.sqrt(dot(f, f))

@@ -1,0 +1,230 @@
+"""The one compiled entry to all that needs the march: many steps in a call, a static solve, block rows.
+
+One kernel for each kind of line, so that neither is compiled for a scene that does not have it.  Both get a table of
+addresses (kernels.binding); kernels.entry and solve.stepper have their faces for Python.
+
+A run goes through phases, BEGIN_STEP - TRY - JUDGE - SAMPLE - END_STEP, and returns where Python has to decide; called
+again it goes on with the phase that follows, as if it had not returned.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.accept import accept, end_step, judge, note_try, watch, watch_push
+from hybrid.kernels.binding import reader
+from hybrid.kernels.books import (
+    AFTER_START,
+    ASK_BEFORE,
+    ASK_STEPS,
+    ASK_TRIES,
+    ASKS,
+    AT_STOP,
+    BEGIN_STEP,
+    CLOCK_SIZE,
+    CONTROLLED,
+    COUNT_SIZE,
+    CUT_ANGLE,
+    MUTE_CUTS,
+    STEPS_CUT,
+    END_STEP,
+    FAILED,
+    FLAGS,
+    JUDGE,
+    LAST_DT,
+    LOG,
+    NOW,
+    PARITY,
+    PAUSED,
+    PHASE,
+    QUOTA,
+    RATES,
+    RHO,
+    ROWS,
+    SAMPLE,
+    SAMPLED,
+    SOLVE,
+    START,
+    STEP_BEFORE,
+    STEPPED,
+    STOP,
+    TRIED,
+    TRY,
+    TRY_END,
+    TRYING,
+    WORKS,
+    WORST,
+    Books,
+    sample_size,
+)
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.end_motion import ends_at, sea_at
+from hybrid.kernels.extremes import note_extremes
+from hybrid.kernels.newton import RUN, STEP, OK, Limits, Task, solve
+from hybrid.kernels.powers import find_powers
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.sampling import sample_step
+from hybrid.kernels.state import (
+    Ends,
+    Floats,
+    Line,
+    Moves,
+    Sea,
+    State,
+    Work,
+    blank_line,
+    blank_state,
+    no_ends,
+    no_moves,
+    no_sea,
+)
+from hybrid.kernels.step_control import begin_step, end_of_try
+
+
+class Job(NamedTuple):
+    """Arguments of the entry."""
+
+    task: Task
+    line: Line
+    sea: Sea
+    ends: Ends
+    moves: Moves
+    old: State  # of a run: two states in turn, the one of even parity first
+    new: State
+    was: Floats  # (N+1, 4) a push out of the plane before a step; empty where there is none; likewise
+    now: Floats  # (N+1, 4) and after it
+    work: Work
+    books: Books
+
+
+def blank_books(cells: int = 1, rows: int = 1) -> Books:
+    """Books of a line of so many cells, with room for so many rows of log and samples, extremes unwanted."""
+    z, nodes = np.zeros, cells + 1
+    return Books(
+        clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
+        report=z((2, REPORT_SIZE)), velocity=z((2, 3)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
+        borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
+        samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), extremes=z((4, 0, nodes)),
+    )  # fmt: skip
+
+
+def blank_job() -> Job:
+    """A job of one cell with the types that every job has."""
+    state = blank_state(1)
+    limits, none = Limits(1.0, 1.0, 1), np.zeros((0, 4))
+    z = np.zeros
+    work = Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)))
+    task = Task(0, limits=limits)
+    return Job(
+        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, work, blank_books()
+    )  # fmt: skip
+
+
+read = reader(blank_job())
+
+
+@inner
+def conclude(line, sea, ends, old, new, books, work, pushed):
+    """After a try: -1, or what to return.  Where the step is accepted its books are kept, and it is looked at."""
+    clock, count = books.clock, books.counts
+    dt = clock[TRY_END] - clock[NOW]
+    verdict = judge(clock, count, work.report, dt)
+    if verdict < 0:
+        return FAILED
+    if verdict > 0:
+        accept(line, ends, new, books, work, clock[TRY_END], dt)
+        count[FLAGS] = watch(line, old, new, books, work.report, clock[NOW], dt)
+        if pushed:
+            count[FLAGS] |= watch_push(clock, work.report)
+        if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
+            count[FLAGS] |= STEPS_CUT
+        if books.extremes.shape[1] > 0:
+            note_extremes(line, sea, new, books, clock[NOW])
+        if count[FLAGS] != 0 or count[ASKS] & ASK_STEPS:
+            return STEPPED
+    return -1
+
+
+@inner
+def between_steps(plane, space, job, old, new):
+    """The phases before a try; `new` is the state now.  -1 when one is to be made, else what to return."""
+    clock, count = job.books.clock, job.books.counts
+    if count[PHASE] == START:
+        find_powers(job.line, job.ends, job.books.velocity, new, job.books.report[0], job.books.power[0])
+        count[PHASE] = count[AFTER_START]
+    if count[PHASE] == SAMPLE:
+        if not sample_step(plane, space, job.line, job.sea, job.ends, job.moves, old, new, job.books):
+            return PAUSED
+        count[PHASE] = END_STEP
+        if count[ASKS] & ASK_STEPS:
+            return SAMPLED
+    if count[PHASE] == END_STEP:
+        end_step(job.line, new, clock, count)
+    if count[PHASE] == BEGIN_STEP:
+        if not clock[NOW] < clock[STOP]:
+            return AT_STOP
+        if count[QUOTA] <= 0 or count[ROWS] == job.books.log.shape[0]:
+            return PAUSED
+        count[QUOTA] -= 1
+        begin_step(clock, count)
+        count[PHASE] = TRY
+    if count[PHASE] == TRY:
+        clock[TRY_END] = end_of_try(clock, job.moves)
+        count[PHASE] = SOLVE
+        if count[ASKS] & ASK_BEFORE:
+            return TRYING
+    return -1
+
+
+@inner
+def run(plane, space, job):
+    """Do the task of a job for one kind of line (kernels.configuration); returns as kernels.newton.solve.
+
+    RUN: steps until a code of kernels.books is returned, with the iterations, the correction and the place of the last
+    try.  The states and pushes of the job take turns: which is now, books.counts[PARITY] tells.
+    """
+    task, line, sea, ends, moves, old, new, was, now, work, books = job
+    clock, count = books.clock, books.counts
+    step, running = task, task.what == RUN
+    while True:
+        if running:
+            old, new, was, now = job.old, job.new, job.was, job.now
+            if count[PARITY]:
+                old, new, was, now = job.new, job.old, job.now, job.was
+            code = between_steps(plane, space, job, new, old)
+            if code >= 0:
+                return code, 0, 0.0, -1
+            if count[PHASE] == SOLVE:
+                end, dt = clock[TRY_END], clock[TRY_END] - clock[NOW]
+                ends_at(end, moves, sea, ends, books.velocity)
+                sea_at(end, sea)
+                clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else dt
+                step = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
+        outcome, it, left, where = OK, 0, 0.0, -1
+        if not running or count[PHASE] == SOLVE:
+            outcome, it, left, where = solve(
+                plane, space, step, line, sea, ends, old, new, was, now, work, books.strains
+            )
+        if not running:
+            return outcome, it, left, where
+        if count[PHASE] == SOLVE:
+            note_try(clock, count, work.report, outcome, it, left, where)
+            count[PHASE] = JUDGE
+            if count[ASKS] & ASK_TRIES:
+                return TRIED, it, left, where
+        code = conclude(line, sea, ends, old, new, books, work, was.shape[0] > 0)
+        if code >= 0:
+            return code, it, left, where
+
+
+@kernel
+def in_plane(table):
+    job = read(table)
+    return run(job.line.plane, None, job)
+
+
+@kernel
+def in_space(table):
+    return run(None, 1, read(table))

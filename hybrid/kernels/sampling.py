@@ -1,0 +1,143 @@
+"""The state at a time within a step, as a row of a run's samples.
+
+Steps end where the motion asks for it, outputs fall where the user asks for them.  Between the two states of a step
+positions are cubic in time by the velocities at both ends (Hermite), chords likewise with lengths that change evenly,
+tensions, accelerations and reactions are linear: second order, as the scheme (docs/theory.md, 2).
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.books import HEAD, INSIDE, LAST_DT, NOW, OUTPUT, PREVIOUS, RATES, SAMPLES, WORKS
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner
+from hybrid.kernels.configuration import carry_director
+from hybrid.kernels.end_motion import ends_at, sea_at
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.rotations import add, cross, dot, scale, spin_about, sub
+
+# Of the step: an output so near to its end is its end.
+SAME_TIME = 1e-9
+
+
+@inner
+def hermite(x, dt, a, va, b, vb):
+    """Value and rate at the part x of a step of dt, from a with rate va to b with rate vb."""
+    y = 1.0 - x
+    change = sub(b, a)
+    lean_a, lean_b = sub(scale(dt, va), change), sub(change, scale(dt, vb))
+    value = add(add(scale(y, a), scale(x, b)), scale(x * y, add(scale(y, lean_a), scale(x, lean_b))))
+    rate = add(change, add(scale(y * (1.0 - 3.0 * x), lean_a), scale(x * (2.0 - 3.0 * x), lean_b)))
+    return value, scale(1.0 / dt, rate)
+
+
+@inner
+def put3(row, at, i, value):
+    at += 3 * i
+    row[at], row[at + 1], row[at + 2] = value
+
+
+@inner
+def sample_nodes(old, new, x, dt, row):
+    """Positions, velocities and accelerations of the nodes."""
+    n = old.r.shape[0]
+    for i in range(n):
+        r, v, vd = get3(new.r, i), get3(new.v, i), get3(new.vd, i)
+        if x < 1.0:
+            vd = add(scale(1.0 - x, get3(old.vd, i)), scale(x, vd))
+            r, v = hermite(x, dt, get3(old.r, i), get3(old.v, i), r, v)
+        put3(row, HEAD, i, r)
+        put3(row, HEAD + 3 * n, i, v)
+        put3(row, HEAD + 6 * n, i, vd)
+
+
+@inner
+def chord_between(old, new, c, x, dt):
+    """Chord of cell c: its direction from the cubic, its length by parts."""
+    a, b = get3(old.e, c), get3(new.e, c)
+    va, vb = sub(get3(old.v, c + 1), get3(old.v, c)), sub(get3(new.v, c + 1), get3(new.v, c))
+    e, _ = hermite(x, dt, a, va, b, vb)
+    length = (1.0 - x) * math.sqrt(dot(a, a)) + x * math.sqrt(dot(b, b))
+    return scale(length / math.sqrt(dot(e, e)), e)
+
+
+@inner
+def director_between(plane, space, old, new, c, x, e):
+    """First director of cell c with the chord e: carried from both ends of the step, and turned by parts."""
+    a = carry_director(plane, space, get3(old.a1, c), get3(old.e, c), e)
+    if space is not None:
+        b = carry_director(plane, space, get3(new.a1, c), get3(new.e, c), e)
+        d, _, _ = chord(e)
+        a = spin_about(a, d, x * math.atan2(dot(cross(a, b), d), dot(a, b)))
+    return a
+
+
+@inner
+def sample_cells(plane, space, line, old, new, x, dt, row):
+    """Chords, tensions, directors and spins of the cells."""
+    n = old.T.shape[0]
+    at = HEAD + 9 * (n + 1)
+    for c in range(n):
+        e, T, a, w = get3(new.e, c), new.T[c], get3(new.a1, c), new.w[c]
+        if x < 1.0:
+            e = chord_between(old, new, c, x, dt)
+            T, w = (1.0 - x) * old.T[c] + x * T, (1.0 - x) * old.w[c] + x * w
+            if line.spin[c]:
+                a = director_between(plane, space, old, new, c, x, e)
+        put3(row, at, c, e)
+        row[at + 3 * n + c] = T
+        put3(row, at + 4 * n, c, a)
+        row[at + 7 * n + c] = w
+
+
+@inner
+def sample_head(ends, sea, books, x, dt, t, row):
+    """Time, sea, conditions of the ends (as they are now), report and work."""
+    row[0] = t
+    for j in range(4):
+        row[1 + j] = sea.now[j]
+    for k in range(2):
+        put3(row, 5, k, get3(ends.position, k))
+        for j in range(9):
+            row[11 + 9 * k + j] = ends.frame[k, j]
+        put3(row, 29, k, get3(ends.spin, k))
+        put3(row, 35, k, get3(ends.force, k))
+        put3(row, 41, k, get3(ends.moment, k))
+    for j in range(REPORT_SIZE):
+        row[47 + j] = books.report[0, j] if x >= 1.0 else (1.0 - x) * books.report[1, j] + x * books.report[0, j]
+    at = 47 + REPORT_SIZE
+    for j in range(WORKS):
+        row[at + j] = books.work[0, j]
+        if x < 1.0:
+            row[at + j] = (1.0 - x) * books.work[1, j] + x * books.work[0, j]
+            if j < RATES:  # the powers change evenly
+                row[at + j] -= 0.5 * x * (1.0 - x) * dt * (books.power[0, j] - books.power[1, j])
+
+
+@inner
+def sample_step(plane, space, line, sea, ends, moves, old, new, books):
+    """Sample the outputs that fall into the last step; False: the buffer is full before the last of them.
+
+    Ends and sea are afterwards those of the last output sampled.
+    """
+    clock, count, outputs = books.clock, books.counts, books.outputs
+    dt = clock[LAST_DT]
+    near = SAME_TIME * dt
+    last = clock[NOW] - near if count[INSIDE] else clock[NOW] + near
+    while count[OUTPUT] < outputs.shape[0] and outputs[count[OUTPUT]] <= last:
+        if count[SAMPLES] == books.samples.shape[0]:
+            return False
+        t, x = outputs[count[OUTPUT]], 1.0
+        if t < clock[NOW] - near:
+            x = (t - clock[PREVIOUS]) / dt
+        ends_at(t, moves, sea, ends, books.velocity)
+        sea_at(t, sea)
+        row = books.samples[count[SAMPLES]]
+        sample_head(ends, sea, books, x, dt, t, row)
+        sample_nodes(old, new, x, dt, row)
+        sample_cells(plane, space, line, old, new, x, dt, row)
+        count[SAMPLES] += 1
+        count[OUTPUT] += 1
+    return True

@@ -1,0 +1,185 @@
+"""A run in compiled steps: the books of a line, the table of the kernel, and a call that goes on with it.
+
+The loop over time is compiled (kernels.run).  Here are its arrays, and what they are called outside.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import Outcome
+from hybrid.kernels import books as b
+from hybrid.kernels.binding import Table
+from hybrid.kernels.books import sample_size
+from hybrid.kernels.entry import NO_PUSH
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.newton import RUN, Limits, Task
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space
+from hybrid.kernels.state import Batch, Ends, Floats, Line, Moves, Sea, State, Work
+
+# Steps and samples that a call may take before Python writes them down.
+ROWS = 256
+# Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
+CELL_STEPS = 200_000
+# Numbers that the buffer of samples may hold, 16 MB.
+MOST_SAMPLED = 2_000_000
+
+
+class Tried(NamedTuple):
+    """How a try ended: outcome, Newton iterations, predicted next correction (relative), and the cell or node where it
+    was worst."""
+
+    outcome: Outcome
+    iterations: int
+    correction: float
+    where: int
+
+
+class CompiledRun:
+    """Steps of one line, many in a call.  Its state is states[parity]; the other one is that before the last step."""
+
+    def __init__(self, rho: float, outputs: Floats, extremes: bool) -> None:
+        """rho: spectral radius of the scheme; outputs: s, times of samples; extremes: whether they are kept."""
+        self.table = Table(blank_job())
+        self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
+        self.clock, self.count = self.books.clock, self.books.counts
+        self.keeps_extremes = extremes
+        self.clock[b.RHO], self.clock[b.ALLOWED] = rho, np.inf
+        self.clock[b.LEAST_PEAK] = np.inf
+        self.states: tuple[State, State]
+        self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
+        self._kernel = in_space
+
+    # --- what is computed ---------------------------------------------------------------------------
+
+    def attach(
+        self, line: Line, sea: Sea, ends: Ends, moves: Moves, work: Work, limits: Limits, state: State, borne: Floats,
+        first: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Go on with a line (as at the start, after a change of zones, in space after a plane) from `state`.
+
+        borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh.
+        """
+        cells = line.h.size
+        rows = max(1, min(ROWS, MOST_SAMPLED // sample_size(cells)))
+        nodes, some = cells + 1, self.keeps_extremes
+        books = self.books._replace(
+            borne=borne, base=first.astype(np.int64),
+            strains=np.zeros((nodes, 3) if some else (0, 3)),
+        )  # fmt: skip
+        if books.samples.shape != (rows, sample_size(cells)):
+            books = books._replace(samples=np.zeros((rows, sample_size(cells))))
+        if len(books.start) != nodes:
+            extremes = no_extremes(nodes) if some else np.zeros((4, 0, nodes))
+            books = books._replace(extremes=extremes, start=state.r.copy())
+        self.books = books
+        self.states = (state, state.copy())
+        if self.count[b.PARITY]:
+            self.pushes, self.count[b.PARITY] = self.pushes[::-1], 0
+        self.clock[b.PREVIOUS] = self.clock[b.NOW]
+        self._kernel = in_plane if line.bits & PLANAR else in_space
+        self.quota = max(1, min(ROWS, CELL_STEPS // cells))
+        old, new = self.states
+        was, now = self.pushes
+        self.table.bind(
+            task=Task(RUN, limits=limits), line=line, sea=sea, ends=ends, moves=moves, old=old, new=new, was=was,
+            now=now, work=work, books=books,
+        )  # fmt: skip
+
+    def begin(self, placed: Floats) -> None:
+        """Count from this state: displacements from where base nodes are now (n, 3) m, and those of the extremes."""
+        self.books.start[:] = self.state.r
+        self.place(placed)
+
+    def place(self, placed: Floats) -> None:
+        """Where base nodes were at the start (n, 3) m."""
+        self.books = self.books._replace(placed=placed)
+        self.table.bind(books=self.books)
+
+    def carry(self, pushes: tuple[Floats, Floats]) -> None:
+        """Carry a push out of the plane along, (N+1, 4) now, and room for the next; empty: none."""
+        self.pushes = pushes[::-1] if self.count[b.PARITY] else pushes
+        self.table.bind(was=self.pushes[0], now=self.pushes[1])
+        self.clock[b.PUSH_START] = 0.0
+
+    def move(self, moves: Moves) -> None:
+        """From now on the ends move otherwise, or other loads act."""
+        self.table.bind(moves=moves)
+
+    def go(self) -> int:
+        """Go on until a code of kernels.books."""
+        self.count[b.QUOTA] = self.quota
+        code: int = self._kernel(self.table.numbers)[0]
+        return code
+
+    # --- what it knows ------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return float(self.clock[b.NOW])
+
+    @property
+    def state(self) -> State:
+        return self.states[self.count[b.PARITY]]
+
+    @property
+    def before(self) -> State:
+        """The state before the last step; while a try is judged, the one that it led to."""
+        return self.states[1 - self.count[b.PARITY]]
+
+    @property
+    def push(self) -> Floats:
+        """The push out of the plane (N+1, 4) now."""
+        return self.pushes[self.count[b.PARITY]]
+
+    @property
+    def report(self) -> Floats:
+        """(REPORT_SIZE,) of the state (kernels.report)."""
+        return np.asarray(self.books.report[0])
+
+    @property
+    def tried(self) -> Tried:
+        """How the last try ended."""
+        outcome, iterations, where = (int(self.count[k]) for k in (b.OUTCOME, b.TRIES, b.WHERE))
+        return Tried(Outcome(outcome), iterations, float(self.clock[b.CORRECTION]), where)
+
+    def log(self) -> Floats:
+        """Rows (n, len(LOG)) of steps since the last call of this; they are overwritten by the next steps."""
+        rows = int(self.count[b.ROWS])
+        self.count[b.ROWS] = 0
+        return self.books.log[:rows]
+
+    def samples(self, ends: Ends) -> Batch | None:
+        """The outputs since the last call of this, as views that the next steps overwrite; None: there are none.
+
+        ends: of the line, of which `held` is taken.
+        """
+        count, cells = int(self.count[b.SAMPLES]), self.state.T.size
+        self.count[b.SAMPLES] = 0
+        if not count:
+            return None
+        rows, at = self.books.samples[:count], 0
+
+        def take(*shape: int) -> Floats:
+            nonlocal at
+            begin, at = at, at + math.prod(shape)
+            return rows[:, begin:at].reshape(count, *shape)
+
+        t, sea, position, frame = take(), take(4), take(2, 3), take(2, 9)
+        spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
+        r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
+        e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
+        held = np.broadcast_to(ends.held, (count, 2))
+        return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea)
+
+
+def no_extremes(nodes: int) -> Floats:
+    """Extremes (4, EXTREMES, nodes) of nothing: lowest infinite, highest minus infinite, times unknown."""
+    out = np.full((4, b.EXTREMES, nodes), np.nan)
+    out[0], out[1] = np.inf, -np.inf
+    return out
