@@ -99,6 +99,19 @@ def judge(clock, count, report, dt):
 
 
 @inner
+def keep_imposed(ends, imposed):
+    """What the ends impose now, and what they did before the step."""
+    for k in range(2):
+        for j in range(21):
+            imposed[1, k, j] = imposed[0, k, j]
+        for j in range(9):
+            imposed[0, k, 3 + j] = ends.frame[k, j]
+        for j in range(3):
+            imposed[0, k, j], imposed[0, k, 12 + j] = ends.position[k, j], ends.spin[k, j]
+            imposed[0, k, 15 + j], imposed[0, k, 18 + j] = ends.force[k, j], ends.moment[k, j]
+
+
+@inner
 def accept(line, ends, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
@@ -110,6 +123,7 @@ def accept(line, ends, new, books, work, end, dt):
         books.report[1, j], books.report[0, j] = books.report[0, j], report[j]
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
+    keep_imposed(ends, books.imposed)
     find_powers(line, ends, books.velocity, new, report, books.power[0])
     book_work(line, dt, report, books)
     row = books.log[count[ROWS]]

@@ -20,7 +20,7 @@ from hybrid.kernels.state import Floats
     LAST_DT,  # length of the step that led there; 0 after a start
     STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
     STOP,  # where steps must end, and the call with them
-    LEG_BEGIN,  # where equal steps to `STOP` began
+    LEG_BEGIN, LEG_STEP,  # where equal steps to `STOP` began, and their length
     BEGIN, UNTIL,  # where the present step was begun, and where it should end
     TRIED_DT,  # longest length of the present tries
     TRY_END,  # where the present one ends
@@ -44,8 +44,8 @@ from hybrid.kernels.state import Floats
     CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
     MUTE_CUTS,  # 1 when an event has told of that
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
-) = range(33)  # fmt: skip
-CLOCK_SIZE = 33
+) = range(34)  # fmt: skip
+CLOCK_SIZE = 34
 
 # --- count -----------------------------------------------------------------------------------------
 
@@ -106,6 +106,7 @@ class Books(NamedTuple):
     work: Floats  # (2, WORKS) J, since the start of the run, likewise
     report: Floats  # (2, REPORT_SIZE) likewise
     velocity: Floats  # (2, 3) m/s, of held ends now
+    imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
     loaded: NDArray[np.int8]  # (2,) 1 where an end body makes the pull of the end the tension beside it
     base: NDArray[np.int64]  # nodes whose displacement is watched
     placed: Floats  # (base.size, 3) m, where they were at the start

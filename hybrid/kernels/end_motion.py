@@ -15,7 +15,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.compile import inner
 from hybrid.kernels.rotations import add, cross, hat, mat_mat, mat_vec, scale
 
 # Rotation vectors shorter than this (rad) take Taylor series: the next terms are below round-off.
@@ -289,9 +289,3 @@ def turn_between(a, b, moves):
         part = rise(b, moves.bring_in)[0] - rise(a, moves.bring_in)[0]
         most = max(most, way + moves.missing[k, 3] * part)
     return most
-
-
-@kernel
-def turn_on_the_way(a, b, moves):
-    """`turn_between`, for callers in Python."""
-    return turn_between(a, b, moves)

@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.accept import accept, end_step, judge, note_try, watch, watch_push
+from hybrid.kernels.accept import accept, end_step, judge, keep_imposed, note_try, watch, watch_push
 from hybrid.kernels.binding import reader
 from hybrid.kernels.books import (
     AFTER_START,
@@ -27,14 +27,13 @@ from hybrid.kernels.books import (
     CONTROLLED,
     COUNT_SIZE,
     CUT_ANGLE,
-    MUTE_CUTS,
-    STEPS_CUT,
     END_STEP,
     FAILED,
     FLAGS,
     JUDGE,
     LAST_DT,
     LOG,
+    MUTE_CUTS,
     NOW,
     PARITY,
     PAUSED,
@@ -49,6 +48,7 @@ from hybrid.kernels.books import (
     START,
     STEP_BEFORE,
     STEPPED,
+    STEPS_CUT,
     STOP,
     TRIED,
     TRY,
@@ -62,7 +62,7 @@ from hybrid.kernels.books import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.extremes import note_extremes
-from hybrid.kernels.newton import RUN, STEP, OK, Limits, Task, solve
+from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
 from hybrid.kernels.powers import find_powers
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
@@ -104,7 +104,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     z, nodes = np.zeros, cells + 1
     return Books(
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((2, REPORT_SIZE)), velocity=z((2, 3)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
+        report=z((2, REPORT_SIZE)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), extremes=z((4, 0, nodes)),
     )  # fmt: skip
@@ -153,9 +153,10 @@ def between_steps(plane, space, job, old, new):
     clock, count = job.books.clock, job.books.counts
     if count[PHASE] == START:
         find_powers(job.line, job.ends, job.books.velocity, new, job.books.report[0], job.books.power[0])
+        keep_imposed(job.ends, job.books.imposed)
         count[PHASE] = count[AFTER_START]
     if count[PHASE] == SAMPLE:
-        if not sample_step(plane, space, job.line, job.sea, job.ends, job.moves, old, new, job.books):
+        if not sample_step(plane, space, job.line, job.sea, old, new, job.books):
             return PAUSED
         count[PHASE] = END_STEP
         if count[ASKS] & ASK_STEPS:

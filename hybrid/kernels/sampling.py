@@ -9,14 +9,16 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import HEAD, INSIDE, LAST_DT, NOW, OUTPUT, PREVIOUS, RATES, SAMPLES, WORKS
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import carry_director
-from hybrid.kernels.end_motion import ends_at, sea_at
+from hybrid.kernels.element import relative_rotation
+from hybrid.kernels.end_motion import sea_at, turn_by_vector
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import REPORT_SIZE
-from hybrid.kernels.rotations import add, cross, dot, scale, spin_about, sub
+from hybrid.kernels.rotations import add, cross, dot, log_rotation, mat_mat, scale, spin_about, sub
 
 # Of the step: an output so near to its end is its end.
 SAME_TIME = 1e-9
@@ -93,18 +95,29 @@ def sample_cells(plane, space, line, old, new, x, dt, row):
 
 
 @inner
-def sample_head(ends, sea, books, x, dt, t, row):
-    """Time, sea, conditions of the ends (as they are now), report and work."""
+def sample_ends(imposed, x, row):
+    """What the ends impose: frames turned by parts from the one to the other, the rest by parts."""
+    for k in range(2):
+        for j in range(3):
+            for part in range(4):  # position, spin, force, moment
+                at = 0 if part == 0 else 9 + 3 * part
+                put = (5, 29, 35, 41)[part] + 3 * k + j
+                row[put] = (1.0 - x) * imposed[1, k, at + j] + x * imposed[0, k, at + j]
+        Ra, Rb = get9(imposed[1, :, 3:12], k), get9(imposed[0, :, 3:12], k)
+        if x < 1.0:
+            turn, _ = turn_by_vector(scale(x, log_rotation(relative_rotation(Ra, Rb))), (0.0, 0.0, 0.0))
+            Rb = mat_mat(Ra, turn)
+        for j in range(9):
+            row[11 + 9 * k + j] = Rb[j]
+
+
+@inner
+def sample_head(sea, books, x, dt, t, row):
+    """Time, growth of the sea, ends, report and work."""
     row[0] = t
     for j in range(4):
         row[1 + j] = sea.now[j]
-    for k in range(2):
-        put3(row, 5, k, get3(ends.position, k))
-        for j in range(9):
-            row[11 + 9 * k + j] = ends.frame[k, j]
-        put3(row, 29, k, get3(ends.spin, k))
-        put3(row, 35, k, get3(ends.force, k))
-        put3(row, 41, k, get3(ends.moment, k))
+    sample_ends(books.imposed, x, row)
     for j in range(REPORT_SIZE):
         row[47 + j] = books.report[0, j] if x >= 1.0 else (1.0 - x) * books.report[1, j] + x * books.report[0, j]
     at = 47 + REPORT_SIZE
@@ -117,11 +130,8 @@ def sample_head(ends, sea, books, x, dt, t, row):
 
 
 @inner
-def sample_step(plane, space, line, sea, ends, moves, old, new, books):
-    """Sample the outputs that fall into the last step; False: the buffer is full before the last of them.
-
-    Ends and sea are afterwards those of the last output sampled.
-    """
+def sample_step(plane, space, line, sea, old, new, books):
+    """Sample the outputs that fall into the last step; False: the buffer is full before the last of them."""
     clock, count, outputs = books.clock, books.counts, books.outputs
     dt = clock[LAST_DT]
     near = SAME_TIME * dt
@@ -132,10 +142,9 @@ def sample_step(plane, space, line, sea, ends, moves, old, new, books):
         t, x = outputs[count[OUTPUT]], 1.0
         if t < clock[NOW] - near:
             x = (t - clock[PREVIOUS]) / dt
-        ends_at(t, moves, sea, ends, books.velocity)
         sea_at(t, sea)
         row = books.samples[count[SAMPLES]]
-        sample_head(ends, sea, books, x, dt, t, row)
+        sample_head(sea, books, x, dt, t, row)
         sample_nodes(old, new, x, dt, row)
         sample_cells(plane, space, line, old, new, x, dt, row)
         count[SAMPLES] += 1

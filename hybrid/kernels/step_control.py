@@ -16,6 +16,7 @@ from hybrid.kernels.books import (
     LEG_BEGIN,
     LEG_PART,
     LEG_PARTS,
+    LEG_STEP,
     MOST_TURN,
     NEXT_DT,
     NOW,
@@ -45,7 +46,7 @@ def begin_step(clock, count):
         count[LEG_PART] += 1
         clock[UNTIL] = clock[STOP]
         if count[LEG_PART] < count[LEG_PARTS]:
-            clock[UNTIL] = clock[LEG_BEGIN] + (clock[STOP] - clock[LEG_BEGIN]) * count[LEG_PART] / count[LEG_PARTS]
+            clock[UNTIL] = clock[LEG_BEGIN] + count[LEG_PART] * clock[LEG_STEP]
     clock[TRIED_DT] = clock[UNTIL] - clock[NOW]
     if not count[CONTROLLED]:
         clock[SHORTEST] = clock[TRIED_DT] * 0.5**HALVINGS

@@ -7,8 +7,6 @@ jumps about, as it does over contact.  docs/theory.md, 2.
 
 from __future__ import annotations
 
-import math
-
 # Share of the tolerance aimed at: steps that come out a little worse than predicted still pass.
 SAFETY = 0.8
 # Exponents on tolerance/error and on the error before over the error now, for an error of order 3 (Gustafsson).
@@ -29,9 +27,11 @@ FIRST = 16.0
 
 
 def step_end(t: float, stop: float, length: float) -> float:
-    """Where a step from t should end, so that equal steps of at most `length` would end at `stop`; s."""
-    parts = math.ceil((stop - t) / length * (1.0 - 1e-9) - 1e-9)
-    return stop if parts <= 1 else t + (stop - t) / parts
+    """Where a step of at most `length` from t should end, so that the last two before `stop` are equal; s."""
+    parts = (stop - t) / length * (1.0 - 1e-9) - 1e-9
+    if parts <= 1.0:
+        return stop
+    return t + (length if parts > 2.0 else 0.5 * (stop - t))
 
 
 def refusal(dt: float, ratio: float, shortest: float) -> float:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from math import ceil, sqrt
+from math import sqrt
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.kernels.end_motion import turn_on_the_way
 from hybrid.kernels.state import Ends, Floats, Moves
 from hybrid.scene.motion import MotionTerms
 
@@ -174,19 +173,6 @@ class EndConditions:
         if t < self._growing_until or not self._grown:
             self._grow(t)
         return self.values
-
-    def turn_between(self, a: float, b: float) -> float:
-        """Upper bound (rad) of the angle that an end turns through between times a and b (s): full turns count."""
-        moves = self.moves()
-        if not (moves.prescribed[:, 1].any() or self._turns):
-            return 0.0
-        return float(turn_on_the_way(a, b, moves))
-
-    def until_turned(self, t: float, end: float, most: float) -> float:
-        """The end (s) of a step from t, or an earlier one until which no end of the cable turns by more than `most`."""
-        while (angle := self.turn_between(t, end)) > most:
-            end = t + (end - t) / ceil(angle / most)
-        return end
 
     def moves(self) -> Moves:
         """The same as arrays for kernels.end_motion: loads that act now, frames and motions as they are now."""

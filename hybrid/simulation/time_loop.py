@@ -114,6 +114,8 @@ class TimeLoop:
                     self._look(int(run.run.count[FLAGS]))
                 elif code in (PAUSED, AT_STOP):
                     self._pause()
+            if exact:
+                run.begin_leg()
             if stop in breaks:
                 run.restart()
             self._checkpoint()
@@ -125,6 +127,7 @@ class TimeLoop:
         if run.between_steps:
             self._checkpoint()
         if self._interrupted():
+            self._log()
             run.events.write_to(self.recorder)
             self.recorder.close("interrupted", f"stopped from outside at t = {run.t:.6g} s")
             raise KeyboardInterrupt
@@ -211,6 +214,7 @@ class TimeLoop:
         recorder = self.recorder
         self.run.events.write_to(recorder)
         if isinstance(recorder, Recorder) and (at_once or recorder.due):
+            self._log()
             recorder.flush(self._content if isinstance(self.target, Path) else None)
 
     def _content(self) -> dict[str, Any]:

@@ -38,6 +38,7 @@ from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
+WHOLE_STEPS = 1e-6  # of a step: a time so near to a number of steps is one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
 
@@ -181,6 +182,7 @@ class Transient:
         run.move(ends.moves())
         run.clock[b.LAST_DT] = 0.0
         self._restart_books()
+        self.begin_leg()
 
     def _restart_books(self) -> None:
         """The report of the state has been made anew: powers follow from it, and what the seabed stores."""
@@ -211,9 +213,10 @@ class Transient:
         run = self.run
         clock, count = run.clock, run.count
         clock[b.STOP] = stop
-        if not self.controlled:
-            clock[b.LEG_BEGIN], count[b.LEG_PART] = clock[b.NOW], 0
-            count[b.LEG_PARTS] = parts(stop - self.t, self.resolution.step) if stop > self.t else 1
+        if not self.controlled and stop > self.t:
+            step, whole = self.resolution.step, stop - float(clock[b.LEG_BEGIN])
+            count[b.LEG_PARTS] = n = parts(whole, step)
+            clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
         while True:
             self._choose_asks()
             code = run.go()
@@ -237,6 +240,10 @@ class Transient:
                 yield code
                 if code == b.AT_STOP:
                     return
+
+    def begin_leg(self) -> None:
+        """Count fixed steps from here."""
+        self.run.clock[b.LEG_BEGIN], self.run.count[b.LEG_PART] = self.t, 0
 
     def _choose_asks(self) -> None:
         """When the compiled run has to ask: for zones, for what follows the model error, for a plane that is left."""
@@ -415,7 +422,9 @@ class Transient:
         parts_: dict[str, Any] = {"ends": model.ends, "zoning": self.switching, "correction": self.correction}
         return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
             "t": self.t, "dt": float(clock[b.LAST_DT]), "steps": self.steps, "iterations": int(count[b.ITERATIONS]),
-            "changes": self.changes, "_turned": self._turned, "_stored": float(clock[b.STORED]), "_beyond": self._beyond,
+            "changes": self.changes, "_turned": self._turned, "_beyond": self._beyond,
+            "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
+            "_stored": float(clock[b.STORED]),
             "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
             "report": books.report[0].copy(), "control": control if self.controlled else None,
             "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
@@ -434,13 +443,14 @@ class Transient:
         self._set_model(model, state)
         complete = "report" in saved  # not in a checkpoint of 0.6
         template = self.checkpoint() | {"mesh": None, "plane": None, "report": np.full(REPORT_SIZE, np.inf)}
-        saved = matched({"report": run.report, "_turned": False, **saved}, template, "state")
+        saved = matched({"report": run.report, "_turned": False, "leg": [self.t, 0], **saved}, template, "state")
         clock, count, books = run.clock, run.count, run.books
         clock[b.NOW] = clock[b.PREVIOUS] = saved["t"]
         clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
         count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
         self.changes, self._beyond, self._turned = saved["changes"], saved["_beyond"], saved["_turned"]
         clock[b.MUTE_CUTS] = float(self._turned)
+        clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"]
         books.work[0], books.power[0], books.report[0] = saved["work"], saved["power"], saved["report"]
         for mine, its in ((state, saved["state"]), (run.before, saved["state"])):
             for name, x in its.items():
