@@ -21,7 +21,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.touchdown import Touchdown, contact_pressure, penetration, touchdown
+from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, sum_down, touchdown
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -318,7 +318,7 @@ class Observation:
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
         p = on_grid(self.grid.chords, self._depth)
-        return contact_pressure(self.sea, p, on_grid(self.grid.chords, -(self.sea.normal @ self._plain.v)))
+        return contact_pressure(self.sea, p, on_grid(self.grid.chords, -along(self.sea.normal, self._plain.v)))
 
     @property
     def contact_force(self) -> Floats:
@@ -330,7 +330,7 @@ class Observation:
         """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
         kinetic, bending, torsion, stretch = self._observed[2]
         r = self._plain.r
-        potential = -(self.line.force.ravel() @ r.reshape(-1, r.shape[-1]))
+        potential = -sum_down(self.line.force.reshape(-1, 1) * r.reshape(-1, r.shape[-1]))
         return {
             "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
             "contact": self.batch.report[:, SEABED_ENERGY],

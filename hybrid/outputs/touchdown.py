@@ -19,7 +19,17 @@ class Touchdown(NamedTuple):
 
 def penetration(sea: Sea, r: Floats) -> Floats:
     """How deep points (n, 3, nb) lie below where contact begins, m: half an onset above the seabed; negative above."""
-    return np.asarray(sea.offset + 0.5 * sea.onset - sea.normal @ r)
+    return np.asarray(sea.offset + 0.5 * sea.onset - along(sea.normal, r))
+
+
+def along(normal: Floats, x: Floats) -> Floats:
+    """Component of vectors (n, 3, nb) along a normal; by no library, whose sums depend on the number of outputs."""
+    return np.asarray(normal[0] * x[:, 0] + normal[1] * x[:, 1] + normal[2] * x[:, 2])
+
+
+def sum_down(x: Floats) -> Floats:
+    """Sums along the first axis in its order, the same bits for any number of outputs."""
+    return np.asarray(np.add.accumulate(x, axis=0)[-1])
 
 
 def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
@@ -41,7 +51,7 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
     # (2, nb, 3), because numpy puts what is indexed by arrays first
     near, far = r[cells, :, outputs], r[cells + 1, :, outputs]
     places = np.moveaxis(near + x[:, :, None] * (far - near), -1, 1)
-    grounded = line.h @ np.where(touching, x1 - x0, 0.0)
+    grounded = sum_down(line.h[:, None] * np.where(touching, x1 - x0, 0.0))
     lies = touching.any(axis=0)
     return Touchdown(np.where(lies, edges, np.nan), np.where(lies, places, np.nan), grounded)
 

@@ -118,7 +118,6 @@ class TimeLoop:
                 run.begin_leg()
             if stop in breaks:
                 run.restart()
-            self._checkpoint()
 
     def _pause(self) -> None:
         """Between two calls of the compiled run: report, and hear of interrupts."""

@@ -83,6 +83,7 @@ class CompiledRun:
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
         self._kernel = in_plane if line.bits & PLANAR else in_space
         self.quota = max(1, min(ROWS, CELL_STEPS // cells))
+        self.count[b.QUOTA] = self.quota
         old, new = self.states
         was, now = self.pushes
         self.table.bind(
@@ -112,8 +113,9 @@ class CompiledRun:
 
     def go(self) -> int:
         """Go on until a code of kernels.books."""
-        self.count[b.QUOTA] = self.quota
         code: int = self._kernel(self.table.numbers)[0]
+        if code in (b.PAUSED, b.AT_STOP):
+            self.count[b.QUOTA] = self.quota
         return code
 
     # --- what it knows ------------------------------------------------------------------------------

@@ -275,7 +275,9 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import resource
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
+        import hybrid.solve.run
         record._PAUSE = record._PART = 0.0
+        hybrid.solve.run.CELL_STEPS = 1
         resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
         main(["run", "-q", {str(tmp_path / "scene.yaml")!r}, "-o", {str(tmp_path / "run.h5")!r}])
     """
