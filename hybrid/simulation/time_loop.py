@@ -51,6 +51,7 @@ class TimeLoop:
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
+        self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
     def begin(self, equilibrium: Equilibrium | None) -> None:
@@ -68,8 +69,7 @@ class TimeLoop:
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
         self.diagnostics.scheme(run.rho)
         self.diagnostics.watch(run.run)
-        for _ in run.advance(run.t):
-            self._write_down()
+        self._settle()
         self._checkpoint()
 
     def to_the_end(self, duration: float, exact: bool, changes: Sequence[LoadChange] = ()) -> None:
@@ -82,6 +82,7 @@ class TimeLoop:
             for change in changes[run.changes :]:
                 self._until(change.t, exact)
                 run.change_loads(change.scene)
+                self._settle()
                 self._checkpoint()
             self._until(duration, exact)
         except StepFailed as failed:
@@ -118,6 +119,12 @@ class TimeLoop:
                 run.begin_leg()
             if stop in breaks:
                 run.restart()
+                self._settle()
+
+    def _settle(self) -> None:
+        """After a start: powers of the new state, and its output where one is due."""
+        for _ in self.run.advance(self.run.t):
+            self._write_down()
 
     def _pause(self) -> None:
         """Between two calls of the compiled run: report, and hear of interrupts."""
@@ -214,7 +221,10 @@ class TimeLoop:
         self.run.events.write_to(recorder)
         if isinstance(recorder, Recorder) and (at_once or recorder.due):
             self._log()
-            recorder.flush(self._content if isinstance(self.target, Path) else None)
+            here = self.run.steps, self.run.changes
+            new = isinstance(self.target, Path) and here != self._kept
+            recorder.flush(self._content if new else None)
+            self._kept = here if new else self._kept
 
     def _content(self) -> dict[str, Any]:
         switching = self.run.switching

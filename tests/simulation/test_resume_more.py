@@ -202,7 +202,7 @@ def test_a_checkpoint_that_was_cut_off_leaves_the_one_before(tmp_path, monkeypat
         slot = file[checkpoint.SLOTS[newest.number % 2]]
         slot[200:400] = 0
         older = checkpoint.read_checkpoint(file)
-        assert older.number == newest.number - 1 and older.t < newest.t
+        assert older.number == newest.number - 1 and older.state["t"] < newest.state["t"]
     hybrid.resume(path).close()
     assert differences(tmp_path / "whole.h5", path) == []
     path = stopped(tmp_path / "run.h5", monkeypatch)
