@@ -15,10 +15,22 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
+from hybrid.kernels.binding import Table
 from hybrid.kernels.criteria import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import advance, shares
-from hybrid.kernels.zone_criteria import LOAD, MOST, SMOOTH, STEP, TWISTED, end_turn, evaluate_criteria, twist_of_rods
+from hybrid.kernels.zone_criteria import (
+    LOAD,
+    MOST,
+    SMOOTH,
+    STEP,
+    TWISTED,
+    NodeKinds,
+    blank_criteria_job,
+    end_turn,
+    evaluate_criteria,
+    twist_of_rods,
+)
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material, tension_floor
 
@@ -121,6 +133,7 @@ class DomainManager:
         self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
         self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
         self.clamped = np.array(cable.held_tangent, float)[:, None]
+        self._table, self._tangents = Table(blank_criteria_job()), np.zeros((2, 3))
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
         self.moments, self.loaded = np.zeros((2, 3)), False  # N m, given at the ends
         self.twisted = all(cable.held_twist) and all(cable.held_tangent)
@@ -146,6 +159,10 @@ class DomainManager:
         bent = np.linalg.norm(cable.kappa[of, :2], axis=1)
         self.bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
         self.turn, self.twisting, self.share = np.zeros((3, s.size))
+        self._kinds = NodeKinds(
+            self.EI, self.w, self.bent, self.node, self.floor, self.base_of_cell.astype(np.int64), self.free, self.turn,
+            self.twisting,
+        )  # fmt: skip
         self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
         self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
         self._update_ramping()
@@ -196,12 +213,12 @@ class DomainManager:
         self.age, self.recent_age = self.age + dt, self.recent_age + dt
         ahead = min(LOOKAHEAD * self.pace / self.age, LONGEST_LOOKAHEAD) if self.age > 0.0 else 0.0
         self.torque = self._torque(line, ends, state) if self.twisted else 0.0
-        self.loudest = evaluate_criteria(
-            line, sea, ends.frame[:, 2::3] * self.clamped, state.r, state.e, state.T, state.a1, self.past, ahead,
-            self.EI, self.w, self.bent, self.node, self.floor, self.tolerance / self.left, self.torque,
-            self.base_of_cell,
-            self.free, self.turn, self.twisting, self.ratios,
+        np.multiply(ends.frame[:, 2::3], self.clamped, out=self._tangents)
+        self._table.bind(
+            line=line, sea=sea, tangents=self._tangents, state=state, past=self.past, ahead=ahead,
+            tolerance=self.tolerance / self.left, torque=self.torque, kinds=self._kinds, ratios=self.ratios,
         )  # fmt: skip
+        self.loudest = evaluate_criteria(self._table.numbers)
         if self.loaded:
             self._evaluate_moments(state)
         if self.user is not None:

@@ -11,6 +11,7 @@ from hybrid.kernels.books import (
     BENT,
     CONTROLLED,
     CORRECTION,
+    EARLIER_DT,
     FLOOR,
     ITERATIONS,
     JUMPED,
@@ -112,15 +113,18 @@ def keep_imposed(ends, imposed):
 
 
 @inner
-def accept(line, ends, new, books, work, end, dt):
+def accept(line, ends, old, new, books, work, end, dt):
     """The step that was tried is taken: clock, books and log."""
     clock, count, report = books.clock, books.counts, work.report
+    clock[EARLIER_DT] = clock[LAST_DT] if clock[NOW] > clock[PREVIOUS] else 0.0
     count[PARITY] = 1 - count[PARITY]
     clock[PREVIOUS], clock[NOW], clock[LAST_DT] = clock[NOW], end, dt
     count[STEPS] += 1
     count[ITERATIONS] = count[TRIES]
     for j in range(report.shape[0]):
-        books.report[1, j], books.report[0, j] = books.report[0, j], report[j]
+        books.report[2, j], books.report[1, j], books.report[0, j] = books.report[1, j], books.report[0, j], report[j]
+    for c in range(old.T.shape[0]):
+        books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
     keep_imposed(ends, books.imposed)

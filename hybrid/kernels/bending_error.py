@@ -17,16 +17,20 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
+import numpy as np
+
+from hybrid.kernels.binding import reader
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.generalized_alpha import Scheme, scheme
-from hybrid.kernels.neglected_moments import chord_of, neglected_moments, tabulate_chords, turn_chords
+from hybrid.kernels.neglected_moments import Bending, chord_of, neglected_moments, tabulate_chords, turn_chords
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
+from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 
 
 class Step(NamedTuple):
@@ -238,13 +242,44 @@ def shortened(x, i, most):
     return size, most / size if size > most else 1.0
 
 
-@kernel
-def advance_error(line, sea, ends, bending, state, step, X, W, old, new, most, arrays):
-    """The error at the end of a step from that before it, `old`, to `new`: (4, N+1, 4) of r, v, a, vd.
+class ErrorJob(NamedTuple):
+    """Arguments of `advance_error`."""
 
-    X, W: of the march whose matrix was factored last; most: m, beyond which an error is no longer one: it is clipped.
+    line: Line
+    sea: Sea
+    ends: Ends
+    bending: Bending
+    state: State  # after the step
+    step: Step
+    X: Floats  # of the march whose matrix was factored last
+    W: Floats
+    old: Floats  # (4, N+1, 4) error of r, v, a, vd before the step
+    new: Floats  # and after it
+    most: float  # m, beyond which an error is no longer one: it is clipped
+    arrays: ErrorArrays
+
+
+def blank_error_job() -> ErrorJob:
+    """A job with the types that every one has."""
+    z, node = np.zeros, np.zeros((2, 3))
+    arrays = ErrorArrays(node, z((2, 5)), node, node, z((1, 5)), z((1, 5)), z((2, 5)), z((4, 2, 4)), z(REPORT_SIZE))
+    bending, step = Bending(z(2), z(2, np.int8), z(1)), Step(node, 0.0, 0.0, 0.0, 0.0)
+    error = z((4, 2, 4))
+    return ErrorJob(
+        blank_line(1), no_sea(1), no_ends(), bending, blank_state(1), step, z(1), z(1), error, error, 1.0, arrays
+    )  # fmt: skip
+
+
+read = reader(blank_error_job())
+
+
+@kernel
+def advance_error(table):
+    """The error at the end of a step from that before it; table: of an ErrorJob (kernels.binding).
+
     Returns whether it is finite, how many nodes were clipped, and the node that was furthest.
     """
+    line, sea, ends, bending, state, step, X, W, old, new, most, arrays = read(table)
     n, dt, torque, work = state.e.shape[0], step.dt, step.torque, arrays.work
     chords, x, dM, M = arrays.chords, arrays.x, arrays.dM, arrays.M
     tabulate_chords(state.e, chords)

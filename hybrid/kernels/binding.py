@@ -69,6 +69,7 @@ class Table:
         """example: with the types that all values have."""
         self._places: dict[str, tuple[int, Any]] = {}
         self._bound: dict[str, Any] = {}
+        self._before: dict[str, tuple[Any, NDArray[np.int64]]] = {}  # what was bound before, and its numbers
         at = 0
         for name, value in example._asdict().items():
             pattern = _pattern(value)
@@ -81,10 +82,21 @@ class Table:
     def bind(self, **values: Any) -> None:
         """Put values in their places; TypeError: an array that the kernel would not understand."""
         for name, value in values.items():
-            if self._bound.get(name, self) is not value:
-                at, pattern = self._places[name]
+            if self._bound.get(name, self) is value:
+                continue
+            at, pattern = self._places[name]
+            if not isinstance(pattern, tuple):
                 self._put(at, pattern, value, name)
-                self._bound[name] = value
+            else:  # two states take turns: what was bound before this one may well come back
+                before = self._before.get(name)
+                end = at + _size(pattern)
+                if name in self._bound:
+                    self._before[name] = self._bound[name], self.numbers[at:end].copy()
+                if before is not None and before[0] is value:
+                    self.numbers[at:end] = before[1]
+                else:
+                    self._put(at, pattern, value, name)
+            self._bound[name] = value
 
     def _put(self, at: int, pattern: Any, value: Any, name: str) -> int:
         if isinstance(pattern, tuple):
@@ -98,7 +110,7 @@ class Table:
                 given = f"{value.dtype} of shape {value.shape}"
                 raise TypeError(f"{name}: {given}, expected {pattern.dtype} of {pattern.ndim} dimensions, contiguous")
             end = at + 1 + pattern.ndim
-            self.numbers[at] = value.ctypes.data
+            self.numbers[at] = value.__array_interface__["data"][0]
             self.numbers[at + 1 : end] = value.shape
             return end
         if pattern is float:

@@ -18,6 +18,7 @@ from hybrid.kernels.state import Floats
 (
     NOW, PREVIOUS,  # time of the state, and of the one before it
     LAST_DT,  # length of the step that led there; 0 after a start
+    EARLIER_DT,  # length of the step before the last; 0: it is not known
     STEP_BEFORE,  # length of the step before that, as the weights of the scheme took it
     STOP,  # where steps must end, and the call with them
     LEG_BEGIN, LEG_STEP,  # where equal steps to `STOP` began, and their length
@@ -44,8 +45,8 @@ from hybrid.kernels.state import Floats
     CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
     MUTE_CUTS,  # 1 when an event has told of that
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
-) = range(34)  # fmt: skip
-CLOCK_SIZE = 34
+) = range(35)  # fmt: skip
+CLOCK_SIZE = 35
 
 # --- count -----------------------------------------------------------------------------------------
 
@@ -104,7 +105,8 @@ class Books(NamedTuple):
     outputs: Floats  # s, times of all outputs
     power: Floats  # (2, RATES) W, now and before the last step
     work: Floats  # (2, WORKS) J, since the start of the run, likewise
-    report: Floats  # (2, REPORT_SIZE) likewise
+    report: Floats  # (3, REPORT_SIZE) likewise, and before the step before
+    tension: Floats  # (2, N) N, before the last step, and before the step before
     velocity: Floats  # (2, 3) m/s, of held ends now
     imposed: Floats  # (2, 2, 21) now and before the last step, of each end: position, frame, spin, force, moment
     loaded: NDArray[np.int8]  # (2,) 1 where an end body makes the pull of the end the tension beside it

@@ -104,7 +104,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
     z, nodes = np.zeros, cells + 1
     return Books(
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
-        report=z((2, REPORT_SIZE)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
+        report=z((3, REPORT_SIZE)), tension=z((2, cells)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), extremes=z((4, 0, nodes)),
     )  # fmt: skip
@@ -134,7 +134,7 @@ def conclude(line, sea, ends, old, new, books, work, pushed):
     if verdict < 0:
         return FAILED
     if verdict > 0:
-        accept(line, ends, new, books, work, clock[TRY_END], dt)
+        accept(line, ends, old, new, books, work, clock[TRY_END], dt)
         count[FLAGS] = watch(line, old, new, books, work.report, clock[NOW], dt)
         if pushed:
             count[FLAGS] |= watch_push(clock, work.report)
@@ -172,6 +172,8 @@ def between_steps(plane, space, job, old, new):
         begin_step(clock, count)
         count[PHASE] = TRY
     if count[PHASE] == TRY:
+        if count[ROWS] == job.books.log.shape[0]:  # one step may be cut into many
+            return PAUSED
         clock[TRY_END] = end_of_try(clock, job.moves)
         count[PHASE] = SOLVE
         if count[ASKS] & ASK_BEFORE:

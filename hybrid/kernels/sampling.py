@@ -2,7 +2,8 @@
 
 Steps end where the motion asks for it, outputs fall where the user asks for them.  Between the two states of a step
 positions are cubic in time by the velocities at both ends (Hermite), chords likewise with lengths that change evenly,
-tensions, accelerations and reactions are linear: second order, as the scheme (docs/theory.md, 2).
+tensions and reactions lie on the parabola through the step before as well, accelerations and frames change evenly: of
+second order and more (docs/theory.md, 2).
 """
 
 from __future__ import annotations
@@ -10,14 +11,14 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.assembly import get9
-from hybrid.kernels.books import HEAD, INSIDE, LAST_DT, NOW, OUTPUT, PREVIOUS, RATES, SAMPLES, WORKS
+from hybrid.kernels.books import EARLIER_DT, HEAD, INSIDE, LAST_DT, NOW, OUTPUT, PREVIOUS, RATES, SAMPLES, WORKS
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import carry_director
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.end_motion import sea_at, turn_by_vector
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.report import ASSEMBLED, REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, log_rotation, mat_mat, scale, spin_about, sub
 
 # Of the step: an output so near to its end is its end.
@@ -33,6 +34,15 @@ def hermite(x, dt, a, va, b, vb):
     value = add(add(scale(y, a), scale(x, b)), scale(x * y, add(scale(y, lean_a), scale(x, lean_b))))
     rate = add(change, add(scale(y * (1.0 - 3.0 * x), lean_a), scale(x * (2.0 - 3.0 * x), lean_b)))
     return value, scale(1.0 / dt, rate)
+
+
+@inner
+def parabola(x, k, earlier, a, b):
+    """Value at the part x of a step from a to b; earlier: k steps before a; k = 0: not known, and it is a straight line."""
+    line = (1.0 - x) * a + x * b
+    if not k > 0.0:
+        return line
+    return line - x * (1.0 - x) * ((b - a) - (a - earlier) / k) / (1.0 + k)
 
 
 @inner
@@ -77,7 +87,7 @@ def director_between(plane, space, old, new, c, x, e):
 
 
 @inner
-def sample_cells(plane, space, line, old, new, x, dt, row):
+def sample_cells(plane, space, line, old, new, x, dt, k, tension, row):
     """Chords, tensions, directors and spins of the cells."""
     n = old.T.shape[0]
     at = HEAD + 9 * (n + 1)
@@ -85,7 +95,7 @@ def sample_cells(plane, space, line, old, new, x, dt, row):
         e, T, a, w = get3(new.e, c), new.T[c], get3(new.a1, c), new.w[c]
         if x < 1.0:
             e = chord_between(old, new, c, x, dt)
-            T, w = (1.0 - x) * old.T[c] + x * T, (1.0 - x) * old.w[c] + x * w
+            T, w = parabola(x, k, tension[1, c], old.T[c], T), (1.0 - x) * old.w[c] + x * w
             if line.spin[c]:
                 a = director_between(plane, space, old, new, c, x, e)
         put3(row, at, c, e)
@@ -112,14 +122,17 @@ def sample_ends(imposed, x, row):
 
 
 @inner
-def sample_head(sea, books, x, dt, t, row):
+def sample_head(sea, books, x, dt, k, t, row):
     """Time, growth of the sea, ends, report and work."""
     row[0] = t
     for j in range(4):
         row[1 + j] = sea.now[j]
     sample_ends(books.imposed, x, row)
+    report = books.report
     for j in range(REPORT_SIZE):
-        row[47 + j] = books.report[0, j] if x >= 1.0 else (1.0 - x) * books.report[1, j] + x * books.report[0, j]
+        row[47 + j] = report[0, j]
+        if x < 1.0:  # what the assembly reports follows from forces; the rest may jump
+            row[47 + j] = parabola(x, k if j < ASSEMBLED else 0.0, report[2, j], report[1, j], report[0, j])
     at = 47 + REPORT_SIZE
     for j in range(WORKS):
         row[at + j] = books.work[0, j]
@@ -143,10 +156,10 @@ def sample_step(plane, space, line, sea, old, new, books):
         if t < clock[NOW] - near:
             x = (t - clock[PREVIOUS]) / dt
         sea_at(t, sea)
-        row = books.samples[count[SAMPLES]]
-        sample_head(sea, books, x, dt, t, row)
+        row, k = books.samples[count[SAMPLES]], clock[EARLIER_DT] / dt if x < 1.0 else 0.0
+        sample_head(sea, books, x, dt, k, t, row)
         sample_nodes(old, new, x, dt, row)
-        sample_cells(plane, space, line, old, new, x, dt, row)
+        sample_cells(plane, space, line, old, new, x, dt, k, books.tension, row)
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True

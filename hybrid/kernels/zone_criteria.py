@@ -16,13 +16,19 @@ bending out would make are lengths, and count against the tolerance (m) of the s
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.binding import reader
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
+from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
+from hybrid.kernels.state import Floats, Line, Sea, State, blank_line, blank_state, no_sea
 
 # What a ratio is where there is no tension, or no number: large, and finite.
 MOST = 1e6
@@ -114,20 +120,56 @@ def kink_at(line, turn, i):
     return max(turn[i] - smooth * line.hn[i], 0.0)
 
 
+class NodeKinds(NamedTuple):
+    """What the criteria know of the nodes of a line."""
+
+    EI: Floats  # (N+1,) N m2
+    w: Floats  # (N+1,) N/m, weight per length
+    bent: Floats  # (N+1,) 1/m, curvature without stress
+    node: NDArray[np.int8]  # (N+1,) SMOOTH, STEP or LOAD
+    floor: Floats  # (N+1,) N, tension floor
+    base_of_cell: NDArray[np.int64]  # (N,)
+    free: NDArray[np.int8]  # (n,) of base cells
+    turn: Floats  # (N+1,) rad, turns of nodes (written)
+    twisting: Floats  # (N+1,) N m, torques of nodes (written)
+
+
+class CriteriaJob(NamedTuple):
+    """Arguments of `evaluate_criteria`."""
+
+    line: Line
+    sea: Sea
+    tangents: Floats  # (2, 3) of clamped ends, zero where there is none
+    state: State
+    past: Floats  # (N,) N, tensions some time ago
+    ahead: float  # how far their change since then goes on
+    tolerance: float  # m
+    torque: float  # N m, of the whole line as far as its rods do not know it
+    kinds: NodeKinds
+    ratios: Floats  # (criteria, n) of base cells (raised)
+
+
+def blank_criteria_job() -> CriteriaJob:
+    """A job with the types that every one has."""
+    z = np.zeros
+    kinds = NodeKinds(z(2), z(2), z(2), z(2, np.int8), z(2), z(1, np.int64), z(1, np.int8), z(2), z(2))
+    return CriteriaJob(
+        blank_line(1), no_sea(1), z((2, 3)), blank_state(1), z(1), 0.0, 1.0, 0.0, kinds, z((len(CRITERIA), 1))
+    )  # fmt: skip
+
+
+read = reader(blank_criteria_job())
+
+
 @kernel
-def evaluate_criteria(
-    line, sea, tangents, r, e, T, a1, past, a, EI, w, bent, node, floor, tolerance, torque, base_of_cell, free,
-    turn, twisting, ratios
-):  # fmt: skip
+def evaluate_criteria(table):
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
-    Returns the largest ratio among base cells that are catenary and free to change.
-
-    tangents: (2, 3) of clamped ends, zero where there is none; past, a: tensions (N,) some time ago, and how far the
-    change since then goes on; EI, w, bent, node, floor: (N+1,) bending stiffness, weight per length, curvature without
-    stress, what sits there, tension floor; torque: of the whole line as far as its rods do not know it, N m;
-    free: (n,) of base cells; turn, twisting: (N+1,) turns, and torques, N m, of nodes (written).
+    table: of a CriteriaJob (kernels.binding).  Returns the largest ratio among base cells that are catenary and free.
     """
+    line, sea, tangents, state, past, a, tolerance, torque, kinds, ratios = read(table)
+    EI, w, bent, node, floor, base_of_cell, free, turn, twisting = kinds
+    r, e, T, a1 = state.r, state.e, state.T, state.a1
     n = e.shape[0]
     find_turns(line, tangents, e, a1, torque, turn, twisting)
     whole = 0.0

@@ -325,7 +325,7 @@ class Observation:
         """(nb,) N, along the normal."""
         return self.batch.report[:, CONTACT_FORCE]
 
-    @property
+    @cached_property
     def energies(self) -> dict[str, Floats]:
         """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
         kinetic, bending, torsion, stretch = self._observed[2]

@@ -62,7 +62,7 @@ class Correction:
     def restore(self, saved: Mapping[str, Any], ends: Ends) -> None:
         """Go on as `checkpoint` has said."""
         self.ends, self.corrector.sea = ends, self.model.sea.values
-        self.corrector.error, self.corrector.slid = saved["error"], saved["slid"]
+        self.corrector.error[:], self.corrector.slid[:] = saved["error"], saved["slid"]
         if isinstance(self._twisted, _TurnOfEnds):
             self._twisted.twist = saved["twist"]
 

@@ -16,6 +16,7 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
+from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.sampling import SAME_TIME
 from hybrid.kernels.state import Batch, State, blank_state
@@ -38,6 +39,7 @@ from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
+READY = STEEPEST  # times as long may it be before: a change must not shorten it by more than the scheme's weights carry
 WHOLE_STEPS = 1e-6  # of a step: a time so near to a number of steps is one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
@@ -254,7 +256,7 @@ class Transient:
             if switching.prepares:
                 asks |= b.ASK_BEFORE
             blending = switching.manager.ramping
-            self.run.clock[b.ALLOWED] = LONGEST_IN_PACE * switching.manager.pace if blending else np.inf
+            self.run.clock[b.ALLOWED] = LONGEST_IN_PACE * switching.manager.pace * (1.0 if blending else READY)
         count[b.ASKS] = asks
 
     def _review_try(self) -> None:
@@ -426,7 +428,8 @@ class Transient:
             "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
             "_stored": float(clock[b.STORED]),
             "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
-            "report": books.report[0].copy(), "control": control if self.controlled else None,
+            "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
+            "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if self.controlled else None,
             "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
             "push": self.plane_monitor.checkpoint(self.run),
         }  # fmt: skip
@@ -442,16 +445,18 @@ class Transient:
         state = blank_state(model.cells)
         self._set_model(model, state)
         complete = "report" in saved  # not in a checkpoint of 0.6
-        template = self.checkpoint() | {"mesh": None, "plane": None, "report": np.full(REPORT_SIZE, np.inf)}
-        saved = matched({"report": run.report, "_turned": False, "leg": [self.t, 0], **saved}, template, "state")
+        template = self.checkpoint() | {"mesh": None, "plane": None, "report": np.full((2, REPORT_SIZE), np.inf)}
+        older = {"report": run.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
+        saved = matched(older | dict(saved), template, "state")
         clock, count, books = run.clock, run.count, run.books
-        clock[b.NOW] = clock[b.PREVIOUS] = saved["t"]
+        clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
         clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
         count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
         self.changes, self._beyond, self._turned = saved["changes"], saved["_beyond"], saved["_turned"]
         clock[b.MUTE_CUTS] = float(self._turned)
-        clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"]
-        books.work[0], books.power[0], books.report[0] = saved["work"], saved["power"], saved["report"]
+        clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
+        books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
+        books.tension[0] = saved["tension"]
         for mine, its in ((state, saved["state"]), (run.before, saved["state"])):
             for name, x in its.items():
                 getattr(mine, name)[:] = x

@@ -12,7 +12,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels import entry
-from hybrid.kernels.bending_error import ErrorArrays, Step, advance_error
+from hybrid.kernels.bending_error import ErrorArrays, Step, advance_error, blank_error_job
+from hybrid.kernels.binding import Table
 from hybrid.kernels.energies import observe
 from hybrid.kernels.entry import workspace
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
@@ -83,6 +84,7 @@ class Corrector:
         self._before = (self.x.copy(), self.moment.copy(), self.left.copy())  # before the last step, as is `_spare`
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step
+        self._table = Table(blank_error_job())
 
     @property
     def position(self) -> Floats:
@@ -198,9 +200,11 @@ class Corrector:
         self.sea = sea
         for mine, its in zip(self._before, (self.x, self.moment, self.left), strict=True):
             mine[:] = its
-        self.finite, self.clipped, self.where = advance_error(
-            line, sea, ends, self.bending, state, step, work.X, work.W, self.error, self._spare, self.most, self._arrays
-        )
+        self._table.bind(
+            line=line, sea=sea, ends=ends, bending=self.bending, state=state, step=step, X=work.X, W=work.W,
+            old=self.error, new=self._spare, most=self.most, arrays=self._arrays,
+        )  # fmt: skip
+        self.finite, self.clipped, self.where = advance_error(self._table.numbers)
         if self.finite:
             self.error, self._spare = self._spare, self.error
         else:

@@ -73,6 +73,8 @@ class CompiledRun:
         )  # fmt: skip
         if books.samples.shape != (rows, sample_size(cells)):
             books = books._replace(samples=np.zeros((rows, sample_size(cells))))
+        if books.tension.shape[1] != cells:
+            books = books._replace(tension=np.zeros((2, cells)))
         if len(books.start) != nodes:
             extremes = no_extremes(nodes) if some else np.zeros((4, 0, nodes))
             books = books._replace(extremes=extremes, start=state.r.copy())
@@ -176,7 +178,7 @@ class CompiledRun:
         spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
         r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
-        held = np.broadcast_to(ends.held, (count, 2))
+        held = np.repeat(ends.held[None], count, axis=0)
         return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea)
 
 
