@@ -178,7 +178,7 @@ CONSTANTS = (
     ("model.build", "SLACK_FLOOR", -1e-6, "−10⁻⁶ of the scale"),
     ("simulation.diagnostics", "UNRESOLVED", 1.0, "1 rad per cell"),
     ("solve.stepper", "HEAVY", 1e36, "10³⁶ 1/s²"),
-    ("simulation.transient", "HALVINGS", 10, "| halvings of a step | 10 |"),
+    ("kernels.step_control", "HALVINGS", 10, "| halvings of a step | 10 |"),
     ("model.mesh", "DEFAULT_CELLS", 100, "| cells of a silent scene | 100 |"),
 )
 

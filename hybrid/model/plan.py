@@ -27,7 +27,7 @@ class Plan:
     base_cells: int | None  # where zones move: cells if all were catenary; `cells` are those if all were rod
     unknowns: int
     steps: int
-    step: float  # s, of most steps: the scene's, shortened to fit between outputs
+    step: float  # s, of most steps
     seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
 
     @property
@@ -81,24 +81,9 @@ def output_times(scene: Scene) -> list[float]:
     return [k * every for k in range(1, parts(time.duration, every))] + [time.duration]
 
 
-def step_ends(start: float, stop: float, step: float) -> Iterator[float]:
-    """End times of equal steps, none longer than `step`, from `start` to `stop`."""
-    n = parts(stop - start, step)
-    for k in range(1, n):
-        yield start + (stop - start) * k / n
-    yield stop
-
-
 def count_steps(scene: Scene) -> int:
-    """Steps of a run: each interval between two outputs is cut into equal ones (a load that stops may add one).
-
-    Where steps follow the motion: the least that there may be.
-    """
-    time, every = scene.require_time(), output_interval(scene)
-    step = first_resolution(scene).step
-    whole = parts(time.duration, every) - 1
-    last = time.duration - whole * every
-    return whole * parts(every, step) + parts(last, step)
+    """Steps of a run (a load that stops, or `output.exact`, may add some); where they follow the motion: the least."""
+    return parts(scene.require_time().duration, first_resolution(scene).step)
 
 
 def plan(scene: SceneLike) -> Plan:
@@ -111,8 +96,8 @@ def plan(scene: SceneLike) -> Plan:
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)
     steps, step = 0, 0.0
     if scene.time:
-        every = output_interval(scene)
-        steps, step = count_steps(scene), every / parts(every, first_resolution(scene).step)
+        steps = count_steps(scene)
+        step = min(first_resolution(scene).step, scene.time.duration / steps)
     names = {"catenary": "corrected"} if model.corrected else {}
     zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0

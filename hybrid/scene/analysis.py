@@ -329,7 +329,7 @@ class Time(Table):
     duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
     step: Positive | None = Field(
         default=None,
-        description="fixed time step dt, shortened so that a whole number fits between outputs; with a tolerance, the "
+        description="fixed time step dt, shortened so that a whole number fits into the duration; with a tolerance, the "
         "largest; absent: steps follow the motion [s]",
     )
     tolerance: Positive | None = Field(
@@ -379,6 +379,10 @@ class Output(Table):
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"
     )
 
+    exact: Truth = Field(
+        default=False,
+        description="steps end at outputs; else an output within a step is interpolated in time, to the order of the steps",
+    )
     criteria: Truth = Field(
         default=False,
         description="also write the criteria of zones that move, as fields over time and arc length",

@@ -148,7 +148,7 @@ class Case:
     @property
     def _exact(self) -> bool:
         """Whether steps end at outputs."""
-        return False
+        return self.scene.output.exact
 
     @property
     def _texts(self) -> dict[str, str]:

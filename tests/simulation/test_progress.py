@@ -8,6 +8,7 @@ from typing import Any
 import pytest
 
 import hybrid
+import hybrid.solve.run
 from hybrid.model.resolution import Resolution
 from hybrid.simulation import progress as module
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, Progress, ProgressReporter, StatusLine
@@ -42,7 +43,8 @@ def test_every_pass_is_named_and_one_bar_spans_them(heard: list[Progress]) -> No
     assert "run 2 of 5: error estimation" in next(p.text for p in heard if p.run == 2)
 
 
-def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress]) -> None:
+def test_a_run_without_an_error_figure_is_one_pass(heard: list[Progress], monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
     scene = hybrid.parse_scene(HANGING + "time: {duration: 1.0, step: 0.1}\n")
     hybrid.run(scene, progress=heard.append).close()
     assert {(p.run, p.runs, p.name) for p in heard} == {(1, 1, RESULT)}

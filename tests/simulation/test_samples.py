@@ -1,0 +1,76 @@
+"""Outputs within steps: they do not shape the motion, and are of the order of the scheme."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+import hybrid.solve.run
+
+ROD = {
+    "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
+    "torsional_stiffness": 4.0,
+}  # fmt: skip
+FIELDS = (
+    "position", "velocity", "tension", "curvature", "bending_moment", "torque", "reaction_end", "moment_start",
+    "energy/kinetic", "energy/potential", "work/end",
+)  # fmt: skip
+
+
+def swinging(model: str, step: float, every: float, **output: Any) -> hybrid.Scene:
+    """A sagging rod in space whose end is swayed and turned, or a catenary of the same."""
+    end = {"kind": "clamped", "position": [7, 0, 0], "tangent": [1, 0, 0.7], "normal": [0, 1, 0]}
+    end["motion"] = {
+        "sway": {"amplitude": 0.5, "period": 2.5}, "roll": {"amplitude": 40, "period": 3.0}, "ramp": 2.0
+    }  # fmt: skip
+    return hybrid.validate_scene(
+        {
+            "cable": {"sections": [ROD | {"damping": {"mass": 0.2, "stiffness": 0.02}}]},
+            "ends": {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.7]}, "end": end},
+            "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "dimension": 3,
+            "time": {"duration": 4.0, "step": step}, "output": {"every": every, "points": 21, **output},
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary"])
+def test_an_output_within_a_step_is_of_second_order(model: str) -> None:
+    """Outputs that fall anywhere in steps, against the same times as ends of steps 8 to 32 times as short."""
+    every = 4.0 / 37
+    fine = hybrid.run(swinging(model, 0.02 / 32, every, exact=True))
+    errors: dict[str, list[float]] = {}
+    for step in (0.02, 0.01, 0.005):
+        result = hybrid.run(swinging(model, step, every))
+        assert np.array_equal(result.times, fine.times)
+        for name in (x for x in FIELDS if x in fine.names):
+            size = np.abs(fine[name]).max()
+            errors.setdefault(name, []).append(float(np.abs(result[name] - fine[name]).max() / size))
+    for name, found in errors.items():
+        order = np.log2(np.array(found[:-1]) / found[1:])
+        print(f"{model}, {name}: {found[-1]:.1e}, order {order.round(2)}")
+        assert order[-1] > 1.7 or found[-1] < 1e-6, name
+
+
+def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The same bits at the same times, whatever other outputs there are, and however many steps a call takes."""
+    few = hybrid.run(swinging("rod", 0.03, 0.4))
+    many = hybrid.run(swinging("rod", 0.03, 0.1))
+    monkeypatch.setattr(hybrid.solve.run, "ROWS", 7)
+    monkeypatch.setattr(hybrid.solve.run, "MOST_SAMPLED", 1)
+    small = hybrid.run(swinging("rod", 0.03, 0.1))
+    assert np.array_equal(few["steps/dt"], many["steps/dt"])
+    for name in many.names:
+        if "t" in many.dims(name)[:1]:
+            assert np.array_equal(many[name], small[name]), name
+            assert np.array_equal(np.array(many[name])[::4], few[name]), name
+
+
+def test_exact_outputs_are_ends_of_steps() -> None:
+    """As releases before 0.7: every interval between outputs is cut into equal steps."""
+    result = hybrid.run(swinging("catenary", 0.2, 0.5, exact=True))
+    assert np.allclose(result["steps/dt"], 0.5 / 3, rtol=0, atol=1e-12)
+    inside = hybrid.run(swinging("catenary", 0.2, 0.5))
+    assert np.allclose(inside["steps/dt"], 0.2, rtol=0, atol=1e-12)
