@@ -329,8 +329,8 @@ class Time(Table):
     duration: Positive = Field(description="time at which the computation ends; it starts at 0 [s]")
     step: Positive | None = Field(
         default=None,
-        description="fixed time step dt, shortened so that a whole number fits into the duration; with a tolerance, the "
-        "largest; absent: steps follow the motion [s]",
+        description="fixed time step dt, shortened so that a whole number fits into the duration; with a tolerance, "
+        "the largest; absent: steps follow the motion [s]",
     )
     tolerance: Positive | None = Field(
         default=None,
@@ -381,7 +381,7 @@ class Output(Table):
 
     exact: Truth = Field(
         default=False,
-        description="steps end at outputs; else an output within a step is interpolated in time, to the order of the steps",
+        description="steps end at outputs; else an output within a step is interpolated in time, to second order",
     )
     criteria: Truth = Field(
         default=False,

@@ -20,7 +20,7 @@ from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
 
 # What each process compiles, by the kernel that stands for it: the last that it compiles.
-SOLVER = ("newton.solve_in_plane", "newton.solve_in_space")
+SOLVER = ("run.in_plane", "run.in_space")
 OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_rules._plan", "bending_error.advance_error"
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
