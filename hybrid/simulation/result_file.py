@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.model.build import Model
+from hybrid.model.output_points import NEAR
 from hybrid.model.sections import allowed_radius, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
@@ -111,15 +112,22 @@ def _neglected_clamps(scene: Scene, model: Model) -> Iterator[tuple[float, str]]
 
 
 def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
-    """What reports hold bends and torques against: the bend radius allowed, and of rods the bending stiffness."""
-    s = observer.grid.s
+    """What reports hold bends and torques against: the bend radius allowed, and of rods the bending stiffness.
+
+    At jumps that of the section on the left, and in right/* of the one on the right, as of what they are held against.
+    """
+    beside = 3.0 * NEAR * scene.length
+    jumps = observer.jumps
+    left = observer.grid.s - beside * np.isin(observer.grid.s, jumps)
+    places = [("s", "", left), ("right/s", "right/", jumps + beside)][: 1 + bool(jumps.size)]
     out: list[tuple[Field, np.ndarray]] = []
-    if any(x.min_bend_radius for x in scene.cable.sections):
-        field = Field("min_bend_radius", "m", "smallest bend radius allowed; NaN: none", (s.size,), ("s",), nan_ok=True)
-        out.append((field, allowed_radius(scene, s)))
-    if any(field.name == "torque" for field in observer.fields):
-        text = "bending stiffness, the smaller one where there are two"
-        out.append((Field("bending_stiffness", "N m^2", text, (s.size,), ("s",)), weakest_bending(scene, s)))
+    for dim, prefix, s in places:
+        if any(x.min_bend_radius for x in scene.cable.sections):
+            name, text = f"{prefix}min_bend_radius", "smallest bend radius allowed; NaN: none"
+            out.append((Field(name, "m", text, s.shape, (dim,), nan_ok=True), allowed_radius(scene, s)))
+        if any(field.name == "torque" for field in observer.fields):
+            name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
+            out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))
     return out
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
+from hybrid.view.along import along
 from hybrid.view.decimate import even
 from hybrid.view.figure import Band, Item, Line, Panel
 from hybrid.view.panels import cable, framed, profiles, sea
@@ -114,13 +115,17 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int) -> It
     page = page_of(result, [f"{factor:g} × real time"], panels=panels, **look)
     span = float(np.ptp(result.times)) / max(len(result.times) - 1, 1)
     places = int(np.clip(1 - np.floor(np.log10(span)), 0, 6))
-    scale, _ = prefix("N", float(np.abs(result.tension).max()))
+    curves = along(result, "tension")
+    scale, _ = prefix("N", float(np.abs(curves.values).max()))
+    left = np.where(np.diff(curves.s, append=np.inf) == 0.0, np.nextafter(curves.s, -np.inf), curves.s)
 
     def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
         shapes = {name: cable(result, view, i) for name, view in views.items()}
-        curve = result.tension[i] * scale
-        pieces = pieces_of(result, i)
-        tension: list[Item] = [Line(s, np.interp(s, result.s, curve), kind, colour_of(kind), 1.8) for kind, s in pieces]
+        tension: list[Item] = []
+        for kind, s in pieces_of(result, i):
+            last = np.nextafter(s[-1], -np.inf)  # the value on the left, where zones meet
+            where = np.array([s[0], *left[(left > s[0]) & (left < last)], last])
+            tension.append(Line(where, np.interp(where, left, curves.values[i] * scale), kind, colour_of(kind), 1.8))
         return f"t = {result.times[i]:.{places}f} s", shapes | {"tension": tension}
 
     return film(page, moving, frames, dpi)

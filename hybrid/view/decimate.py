@@ -39,9 +39,10 @@ class Kept(NamedTuple):
 
 
 def kept(result: Result, moments: Iterable[float | None] = ()) -> Kept:
-    """Frames and points to show, even over the run, with the outputs at the given moments (s) among them."""
+    """Frames and points to show, even over the run, with the outputs at the given moments (s) and jumps among them."""
     nt, ns = len(result.times), len(result.s)
-    points = even(ns, MOST_POINTS)
+    jumps = np.searchsorted(result.s, result["right/s"]) if "right/s" in result else np.zeros(0, int)
+    points = np.union1d(even(ns, MOST_POINTS), jumps[even(len(jumps), MOST_POINTS)])
     frames = even(nt, min(MOST_FRAMES, max(2, MOST_VALUES // len(points))))
     asked = [int(np.abs(result.times - t).argmin()) for t in moments if t is not None and nt]
     return Kept(np.unique([*frames, *asked]).astype(int), points, nt, ns)

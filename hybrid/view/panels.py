@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
+from hybrid.view.along import AXES, Along, along
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
 from hybrid.view.projections import (
@@ -47,7 +48,6 @@ from hybrid.view.style import (
     title_of,
 )
 
-AXES = ("x", "y", "z")
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
 RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact")
 _SIZES = ("curvature", "bending_moment", "shear")  # quantities that are not below zero
@@ -155,22 +155,22 @@ def sea(result: Result, view: View) -> list[Item]:
 def profiles(
     result: Result, names: str | Sequence[str], *, output: int = -1, times: Numbers = (), title: str = ""
 ) -> Panel:
-    """One or two quantities of the same unit along s at one output, and their range over all times.
+    """One or two quantities of the same unit along s at one output, and their range over all times; gaps at jumps.
 
     The zones of that output are shaded, and the estimated error is a band, if the file has one. Further names after
     the first are dashed, and left out where they would not be visible. times: when else to show the first, in grey.
     """
-    names, s = [names] if isinstance(names, str) else list(names), result.s
+    names = [names] if isinstance(names, str) else list(names)
     items: list[Item] = _zones_behind(result, output)
-    drawn = [(name, _scalar(result, name)) for k, name in enumerate(names) if k == 0 or name in result]
-    peak = float(np.abs(drawn[0][1]).max())
-    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v).max() > max(ZERO, 5e-3 * peak)]  # visible
-    peak = max(float(np.abs(v).max()) for _, v in drawn)
+    drawn = [(name, along(result, name)) for k, name in enumerate(names) if k == 0 or name in result]
+    peak = float(np.abs(drawn[0][1].values).max())
+    drawn = drawn[:1] + [(n, v) for n, v in drawn[1:] if np.abs(v.values).max() > max(ZERO, 5e-3 * peak)]  # visible
+    peak = max(float(np.abs(v.values).max()) for _, v in drawn)
     factor, unit = prefix("m" if names[0] in AXES else result.units[names[0]], peak)
     bottom: float | None = None
     top: float | None = None
-    for k, (name, values) in enumerate(drawn):
-        values = values * factor
+    for k, (name, found) in enumerate(drawn):
+        s, values = found.s, found.values * factor
         if len(values) > 1:
             low, high = values.min(axis=0), values.max(axis=0)
             items.append(Band(s, low, high, colour=GREY, opacity=0.28 - 0.12 * k))
@@ -181,11 +181,11 @@ def profiles(
                 items.append(Text(0.03, 0.91, spike, parts="xy"))
         for n, t in enumerate(times if k == 0 else ()):
             then = values[int(np.abs(result.times - t).argmin())]
-            items.append(Line(s, then, colour=earlier_grey(n, len(times)), width=0.7))
-        error = error_of(result, name)
+            items.append(Line(*found.curve(then), colour=earlier_grey(n, len(times)), width=0.7))
+        error = _error_along(result, name, found)
         if error is not None:
             items.append(_doubt(s, values[output], error[output] * factor, size=name in _SIZES))
-        items.append(Line(s, values[output], title_of(name), width=1.3, dash="dash" * bool(k)))
+        items.append(Line(*found.curve(values[output]), title_of(name), width=1.3, dash="dash" * bool(k)))
     short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
     up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
     title = title or (short if drawn[1:] else title_of(names[0])) + _at(result, output)
@@ -201,11 +201,12 @@ def ranges(result: Result, shown: Kept) -> list[Panel]:
 
 
 def _range(result: Result, name: str, shown: Kept) -> Panel:
-    values, s, several = result[name], result.s, len(result.times) > 1
+    found, several = along(result, name), len(result.times) > 1
+    s, values = found.s, found.values
     factor, unit = prefix(result.units[name], float(np.abs(values).max()))
     low, high = values.min(axis=0), values.max(axis=0)
     items: list[Item] = []
-    error = error_of(result, name)
+    error = _error_along(result, name, found)
     if error is not None:
         outer = (values - error).min(axis=0), (values + error).max(axis=0)
         below = np.maximum(outer[0], 0.0) if name in _SIZES else outer[0]
@@ -213,16 +214,18 @@ def _range(result: Result, name: str, shown: Kept) -> Panel:
     if several:
         items += [
             Band(s, low * factor, high * factor, colour=GREY, opacity=0.22),
-            Line(s, high * factor, "highest", "#B84F04"),
-            Line(s, values.mean(axis=0) * factor, "mean", GREY, dash="dash"),
-            Line(s, low * factor, "lowest", "#2C72B6"),
+            Line(*found.curve(high * factor), "highest", "#B84F04"),
+            Line(*found.curve(values.mean(axis=0) * factor), "mean", GREY, dash="dash"),
+            Line(*found.curve(low * factor), "lowest", "#2C72B6"),
         ]
     else:
         items += _zones_behind(result, 0)
-    frames = values[np.ix_(shown.frames, shown.points)] * factor
-    items.append(Line(s[shown.points], frames[0], "now" * several, width=1.6, frames=frames if several else None))
-    if name == "curvature" and "min_bend_radius" in result:
-        items.append(Line(s, factor / result["min_bend_radius"], "allowed", ALARM, 1.6, "dot"))
+    some = np.flatnonzero(np.isin(found.points, shown.points))
+    x, frames = found._replace(s=s[some]).curve(values[np.ix_(shown.frames, some)] * factor)
+    items.append(Line(x, frames[0], "now" * several, width=1.6, frames=frames if several else None))
+    allowed = found.of(result, "min_bend_radius") if name == "curvature" else None
+    if allowed is not None:
+        items.append(Line(*found.curve(factor / allowed), "allowed", ALARM, 1.6, "dot"))
     title = title_of(name).replace("|", "")
     label = title_of(name).replace("bending ", "").replace("contact ", "")
     y = Axis(label, unit, peak=float(np.abs(values).max()) * factor)
@@ -365,6 +368,11 @@ def error_of(result: Result, name: str) -> np.ndarray | None:
     return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
 
 
+def _error_along(result: Result, name: str, found: Along) -> np.ndarray | None:
+    error = error_of(result, name)
+    return None if error is None else error[:, found.points]
+
+
 def _doubt(x: np.ndarray, values: np.ndarray, error: np.ndarray, *, size: bool) -> Band:
     """The range in which the truth is estimated to lie; of a size, not below zero."""
     low = np.maximum(values - error, 0.0) if size else values - error
@@ -373,13 +381,6 @@ def _doubt(x: np.ndarray, values: np.ndarray, error: np.ndarray, *, size: bool) 
 
 def _place(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray:
     return np.column_stack([np.interp(where, s, position[:, k]) for k in range(3)])
-
-
-def _scalar(result: Result, name: str) -> np.ndarray:
-    if name in AXES:
-        return np.asarray(result.position[..., AXES.index(name)])
-    values = result[name]
-    return np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
 
 
 def _at(result: Result, output: int) -> str:

@@ -1,6 +1,7 @@
 """A result in numbers and plain sentences: warnings, tension, bends, slack, torque, seabed, errors, status.
 
-`facts_of(result)` reads every output and every grid point, whatever a page later draws of them.  A fact has a weight:
+`facts_of(result)` reads every output and every grid point, with both values where a quantity jumps, whatever a page
+later draws of them.  A fact has a weight:
 "alarm", a limit is broken or a warning was given; "note", worth knowing; "plain"; "absent", with the reason.
 """
 
@@ -14,6 +15,7 @@ import numpy as np
 from hybrid.errors import EVENTS_BY_WEIGHT, weight_of_event
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
+from hybrid.view.along import Along, along
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix
 
@@ -92,9 +94,9 @@ def _at(values: np.ndarray, k: int) -> tuple[int, int]:
     return divmod(k, values.shape[1])
 
 
-def rods(result: Result) -> np.ndarray:
-    """Where the cable is a rod (nt, ns); points on a joint belong to both sides."""
-    s, out = result.s, np.zeros((len(result.times), len(result.s)), bool)
+def rods(result: Result, s: np.ndarray) -> np.ndarray:
+    """Where the cable is a rod (nt, len(s)); points on a joint belong to both sides."""
+    out = np.zeros((len(result.times), len(s)), bool)
     near = 1e-9 * float(s[-1] - s[0])
     for row, zones in zip(out, result.zones, strict=True):
         for zone in zones:
@@ -137,10 +139,11 @@ def _warnings(result: Result) -> list[Fact]:
 
 
 def _tension(result: Result) -> Fact:
-    tension = result.tension
+    found = along(result, "tension")
+    tension = found.values
     i, k = _at(tension, int(tension.argmax()))
-    most, t, s = float(tension[i, k]), float(result.times[i]), float(result.s[k])
-    text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, k)}."
+    most, t, s = float(tension[i, k]), float(result.times[i]), float(found.s[k])
+    text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, found.points[k])}."
     values: dict[str, Any] = {"tension": most}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
@@ -164,20 +167,20 @@ def _bend(result: Result) -> Fact:
     title = "Smallest bend radius"
     if "curvature" not in result:
         return Fact("bend", title, "The curvature was not recorded.", "absent")
-    limit = _recorded(result, "min_bend_radius")
-    curvature = result["curvature"]
+    found = along(result, "curvature")
+    limit, curvature = found.of(result, "min_bend_radius"), found.values
     i, k = _at(curvature, int(curvature.argmax()))
-    most, t, s = float(curvature[i, k]), float(result.times[i]), float(result.s[k])
+    most, t, s = float(curvature[i, k]), float(result.times[i]), float(found.s[k])
     values: dict[str, Any] = {"radius": 1.0 / most if most > 0.0 else None, "allowed": None, "ratio": None}
     place_of: tuple[float | None, float | None]
     if most * float(np.ptp(result.s)) < STILL:
         text, place_of = "The cable stays straight, to round-off.", (None, None)
     else:
-        kind = _kind_at(result, int(i), s)
+        kind = _kind_at(result, int(i), found, int(k))
         stiff = "" if kind == "rod" else ", which does not resist bending"
         inside = f", in a {kind} zone{stiff}" if kind else ""
         text = f"{amount(1.0 / most, 'm')} {place(result, s)}{moment(result, t)}{inside}"
-        text += f"{_doubt_of_radius(result, i, k)}."
+        text += f"{_doubt_of_radius(result, i, found.points[k], most)}."
         place_of = (t, s)
     unknown = _bends_left_out(result)
     text += unknown
@@ -190,7 +193,7 @@ def _bend(result: Result) -> Fact:
     i, k = _at(ratio, int(np.nanargmax(ratio)))
     worst, allowed = float(ratio[i, k]), float(limit[k])
     values |= {"allowed": allowed, "ratio": worst, "radius_there": 1.0 / max(float(curvature[i, k]), ZERO)}
-    t, s = float(result.times[i]), float(result.s[k])
+    t, s = float(result.times[i]), float(found.s[k])
     if worst > 1.0:
         times = int((np.nan_to_num(ratio) > 1.0).any(axis=1).sum())
         part = f", at {times} of {len(result.times)} outputs" if len(result.times) > 1 else ""
@@ -213,30 +216,31 @@ def _bends_left_out(result: Result) -> str:
     return f" Not known at {where}, where the bend at a point load or clamp is left out: say force_rod there."
 
 
-def _recorded(result: Result, name: str) -> np.ndarray | None:
-    return result[name] if name in result else None  # noqa: SIM401  a Result is no dict
-
-
-def _kind_at(result: Result, i: int, s: float) -> str:
+def _kind_at(result: Result, i: int, found: Along, k: int) -> str:
+    """Kind of the zone at an output and place: at a joint that of its side, or the rod where it has but one value."""
+    s, side = found.s[k], found.side(k)
     kinds = [zone.kind for zone in result.zones[i] if zone.s_a <= s <= zone.s_b]
-    return "rod" if "rod" in kinds else kinds[0] if kinds else ""
+    if not side and "rod" in kinds:
+        return "rod"
+    return kinds[-1 if side > 0 else 0] if kinds else ""
 
 
-def _doubt_of_radius(result: Result, i: int, k: int) -> str:
+def _doubt_of_radius(result: Result, i: int, k: int, curvature: float) -> str:
     found = "errors/total/curvature"
     if found not in result:
         return ""
-    part = float(result[found][i, k]) / float(result["curvature"][i, k])
+    part = float(result[found][i, k]) / curvature
     return f" (± {short(100 * part, 2)} %)"
 
 
 def _slack(result: Result) -> Fact:
-    tension, title = result.tension, "Lowest tension"
+    found, title = along(result, "tension"), "Lowest tension"
+    tension = found.values
     i, k = _at(tension, int(tension.argmin()))
-    least, t, s = float(tension[i, k]), float(result.times[i]), float(result.s[k])
+    least, t, s = float(tension[i, k]), float(result.times[i]), float(found.s[k])
     zero = NOTHING * float(np.abs(tension).max())
     pressed = tension < -zero
-    weights = np.gradient(result.s) if len(result.s) > 1 else np.ones(1)
+    weights = np.gradient(found.s) if len(found.s) > 1 else np.ones(1)
     length, outputs = float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
     values = {"tension": least, "outputs": outputs, "length": length}
     there = f"{place(result, s)}{moment(result, t)}"
@@ -260,15 +264,16 @@ def _hockling(result: Result) -> Fact:
 
     if "torque" not in result:
         return none("No torque is computed: no part of the cable is a rod.")
-    where = rods(result)
+    found = along(result, "torque")
+    where = rods(result, found.s)
     if not where.any():
         return none("No torque is computed: no part of the cable was a rod.")
-    torque = np.where(where, result["torque"], 0.0)
+    torque = np.where(where, found.values, 0.0)
     if not np.abs(torque).max() > ZERO:
         return none("The rods of the cable carry no torque.")
-    if "bending_stiffness" not in result:
+    stiffness, tension = found.of(result, "bending_stiffness"), along(result, "tension").values
+    if stiffness is None:
         return none("Not judged: the file has no bending stiffness to hold the torque against.")
-    stiffness, tension = result["bending_stiffness"], result.tension
     needed = np.divide(torque**2, 4.0 * stiffness, out=np.zeros_like(torque), where=stiffness > 0.0)
     scale = NOTHING * float(np.abs(tension).max())
     if float(needed.max()) <= PART_OF_TENSION * float(np.abs(tension).max()):
@@ -278,7 +283,7 @@ def _hockling(result: Result) -> Fact:
         return Fact("hockling", title, f"{text} {HOCKLING}.", "plain", values)
     ratio = np.where(needed > scale, needed / np.maximum(tension, scale), 0.0)
     i, k = _at(ratio, int(ratio.argmax()))
-    t, s = float(result.times[i]), float(result.s[k])
+    t, s = float(result.times[i]), float(found.s[k])
     values = {
         "torque": float(torque[i, k]), "needed": float(needed[i, k]), "tension": float(tension[i, k]),
         "ratio": float(ratio[i, k]),

@@ -1,0 +1,49 @@
+"""Quantities along the cable with both values where they jump, and curves with a gap there."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.store.reader import Result
+
+AXES = ("x", "y", "z")
+
+
+class Along(NamedTuple):
+    """Arc lengths s (n,), m, and values (nt, n) there; a jump comes twice, the left value first.
+
+    points (n,): which output point each of them is.
+    """
+
+    s: np.ndarray
+    values: np.ndarray
+    points: np.ndarray
+
+    def curve(self, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """s and y (..., n) of a curve, with a gap in y at jumps."""
+        at = np.flatnonzero(np.diff(self.s) == 0.0) + 1
+        return np.insert(self.s, at, self.s[at]), np.insert(np.asarray(y, float), at, np.nan, axis=-1)
+
+    def of(self, result: Result, name: str) -> np.ndarray | None:
+        """What else the file has of every output point, (..., ns), here; None if it does not have it."""
+        if name not in result:
+            return None
+        found = result.both_sides(name)[1]
+        return found if found.shape[-1] == len(self.s) else found[..., self.points]
+
+    def side(self, k: int) -> int:
+        """Of the k-th place -1 or 1, on the left or on the right of a jump; else 0."""
+        s = self.s
+        return int(k > 0 and s[k - 1] == s[k]) - int(k + 1 < len(s) and s[k + 1] == s[k])
+
+
+def along(result: Result, name: str) -> Along:
+    """A quantity along the cable; of a vector its magnitude, and x, y, z of the position."""
+    if name in AXES:
+        s, values = result.s, np.asarray(result.position[..., AXES.index(name)])
+    else:
+        s, values = result.both_sides(name)
+        values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
+    return Along(s, values, np.searchsorted(result.s, s))
