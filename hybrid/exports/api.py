@@ -185,10 +185,11 @@ def _errors_of(part: Part) -> list[str]:
         error, which = error_name(part, name)
         if error and part.result.dims(error) == ("t", "s"):
             most, unit = part.array(error).max(axis=0), part.result.units[error]
-            lines += [
-                f"  {name} at s = {s:{_PLACE}} m: at most {x:.3g} {unit}, {which}"
-                for s, x in zip(part.s, most, strict=True)
-            ]
+            for s, x in zip(part.s, most, strict=True):
+                after = part.after(error, float(s))
+                sides = [("", x)] if after is None else [(" before", x), (" after", after.max())]
+                for side, size in sides:
+                    lines.append(f"  {name} at s = {s:{_PLACE}} m{side}: at most {size:.3g} {unit}, {which}")
     return ["errors:", *lines] if lines else ["errors: not estimated (output: {errors: true} in the scene asks for it)"]
 
 

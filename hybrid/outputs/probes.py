@@ -101,6 +101,8 @@ MODEL_ERRORS = {
     "end_force_start": ("N", "change of the force that holds the start", ()),
     "end_force_end": ("N", "change of the force that holds the end", ()),
 }
+# Those of them that may jump, and of which errors are known on both sides: of the right one under right_<name>.
+SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
 
 
 def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
@@ -144,7 +146,7 @@ class Observer:
         section ends and the next begins.
         """
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
-        self.jumps = np.array(jumps if only is None else (), float)
+        self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
         has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {
@@ -160,7 +162,8 @@ class Observer:
             Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in MAY_BE_NAN)
             for name, p in self._probes.items()
         ]
-        right = [f for f in fields if f.name in SIDED and self.jumps.size]
+        right = [f for f in fields if f.name in SIDED and (only is None or f"right/{f.name}" in only)]
+        right = right if self.jumps.size else []
         fields += [
             replace(f, name=f"right/{f.name}", shape=self.jumps.shape, dims=("right/s",),
                     description=f"{f.description}, just after the point") for f in right
@@ -185,6 +188,11 @@ class Observer:
                 )
                 for name, (unit, text, dims) in MODEL_ERRORS.items()
             ]
+            sided = {f"errors/model/{name}": f"errors/model/right_{name}" for name in SIDED_ERRORS if self.jumps.size}
+            fields += [
+                replace(f, name=sided[f.name], shape=self.jumps.shape, dims=("right/s",),
+                        description=f"{f.description}, just after the point") for f in fields if f.name in sided
+            ]  # fmt: skip
         self.fields = tuple(fields)
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
@@ -221,11 +229,14 @@ class Observer:
         view = corrected if self._corrected else plain
         found = {name: p.value(view) for name, p in self._probes.items()}
         if self._right:
-            after = view.on(self._after)
-            found |= {f"right/{name}": self._probes[name].value(after) for name in self._right}
+            right = view.on(self._after)
+            found |= {f"right/{name}": self._probes[name].value(right) for name in self._right}
         if self._errors:
             part = LEFT if self._corrected else 1.0
             found |= {f"errors/model/{name}": part * x for name, x in model_errors(plain, corrected).items()}
+            if self.jumps.size:
+                after = model_errors(plain.on(self._after), corrected.on(self._after))
+                found |= {f"errors/model/right_{name}": part * after[name] for name in SIDED_ERRORS}
         out = {name: np.array(np.moveaxis(x, -1, 0), order="C") for name, x in found.items()}
         if self._criteria:
             if ratios is None:

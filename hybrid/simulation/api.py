@@ -183,7 +183,7 @@ def _compute(
         control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute)
         if remaining is not None and remaining.before:
             with refused(source or Path()):
-                control.restore(remaining.before, scene, case.points.s.size)
+                control.restore(remaining.before, scene, case.points)
             result, errors = control.proceed()
         else:
             surveys = remaining is None and requested_accuracy(scene) is not None

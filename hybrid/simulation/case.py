@@ -273,7 +273,7 @@ class Case:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
-            model.corrected, () if only else self.points.jumps, section_changes(self.scene),
+            model.corrected, self.points.jumps, section_changes(self.scene),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

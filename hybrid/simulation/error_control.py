@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ComputationError
+from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
@@ -210,14 +211,14 @@ class ErrorController:
             "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
-    def restore(self, tree: Mapping[str, Any], scene: Scene, points: int) -> None:
-        """Continue as `checkpoint` has said; points: in the output grid.
+    def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints) -> None:
+        """Continue as `checkpoint` has said; points: of the result.
 
         ResultError or ValueError: it is none of this scene.
         """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0}
         saved = matched(tree, template | dict.fromkeys(("next", "coarse", "estimate", "notes")), "error control")
-        shape = len(output_times(scene)) + 1, points
+        shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._notes = list(restored_notes(saved["notes"]))
         self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None

@@ -15,6 +15,7 @@ import numpy as np
 
 from hybrid.model.build import Model
 from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
@@ -30,7 +31,8 @@ COARSER = 2.0
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
 # Outputs by which runs are compared; those that a run does not have are skipped.
-COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end")
+RIGHT = {f"right/{name}": f"right_{name}" for name in SIDED_ERRORS}  # and under which names their errors are reported
+COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end", *RIGHT)
 # Of reactions, the magnitude is reported, under these names.
 END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
 
@@ -156,7 +158,7 @@ class Estimate:
         """Magnitudes by cause.  Causes add up in magnitude: that they cancel is seldom true at all times."""
         out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": self.model, "total": {}}
         for name, by_mesh in self.by_mesh.items():
-            by_step, quantity = self.by_step.get(name), END_FORCES.get(name, name)
+            by_step, quantity = self.by_step.get(name), (END_FORCES | RIGHT).get(name, name)
             out["mesh"][quantity] = total = _magnitude(by_mesh, name)
             if by_step is not None:
                 out["time"][quantity] = _magnitude(by_step, name)
@@ -170,7 +172,7 @@ class Estimate:
         return found | {"notes": self.notes, "run": self.run.checkpoint()}
 
     @classmethod
-    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int]) -> Estimate:
+    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Estimate:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
@@ -246,8 +248,8 @@ def _magnitude(error: np.ndarray, name: str) -> np.ndarray:
 # --- from a checkpoint --------------------------------------------------------------------------
 
 
-def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int]) -> RunSample:
-    """A sample from a checkpoint; shape: number of outputs of the result, and of its output points.
+def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int]) -> RunSample:
+    """A sample from a checkpoint; shape: number of outputs of the result, of its output points, and of its jumps.
 
     ResultError or ValueError: it is none of this scene.
     """
@@ -255,7 +257,7 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int]) -> RunSampl
     saved = matched(tree, blank | dict.fromkeys(("resolution", "values", "model_error", "notes")), "run")
     if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
         raise ValueError("a run without cells, steps or outputs")
-    shape = _every(shape[0], saved["every"]).size, shape[1]
+    shape = (_every(shape[0], saved["every"]).size, *shape[1:])
     return RunSample(
         **saved | {
             "resolution": resolution_from(saved["resolution"], scene), "notes": restored_notes(saved["notes"]),
@@ -270,13 +272,15 @@ def restored_notes(tree: Any) -> Notes:
     return tuple((kind, text) for kind, text in matched(tree, [["", ""]] * len(tree), "notes"))
 
 
-def _restored_outputs(tree: Any, shape: tuple[int, int]) -> dict[str, np.ndarray]:
-    """Outputs by name from a checkpoint; shape: their number, and that of points.  ResultError: of another shape."""
-    (count, _), points, template = shape, {"position": (3,)}, {}
+def _restored_outputs(tree: Any, shape: tuple[int, int, int]) -> dict[str, np.ndarray]:
+    """Outputs by name from a checkpoint; shape: as of `restored_sample`.  ResultError: they are of another shape."""
+    (count, ns, jumps), points, template = shape, {"position": (3,)}, {}
+    right = {*RIGHT, *RIGHT.values()}
     for name, value in tree.items():
-        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else shape
+        along = (count, jumps if name in right else ns)
+        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else along
         scalar = name == "position" and np.ndim(value) == 2  # of an error, its size
         template[name] = np.zeros((*full, *(() if scalar else points.get(name, ()))))
-    if not set(tree) <= {*COMPARED, *END_FORCES.values()}:
+    if not set(tree) <= {*COMPARED, *END_FORCES.values(), *right}:
         raise ValueError(f"outputs that are not compared: {', '.join(tree)}")
     return dict(matched(tree, template, "outputs"))

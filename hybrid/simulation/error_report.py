@@ -17,6 +17,7 @@ from hybrid.store.reader import open_result
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
+    "right_tension": "N", "right_curvature": "1/m", "right_bending_moment": "N m",
     "end_force_start": "N", "end_force_end": "N",
 }  # fmt: skip
 CAUSES = {
@@ -57,8 +58,8 @@ def _error_fields(result: RunSample, errors: Errors) -> list[tuple[Field, np.nda
     return [
         (
             Field(
-                f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {name.replace('_', ' ')}, estimated",
-                values.shape[1:], ("s",) if values.ndim == 2 else (),
+                f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
+                values.shape[1:], ("right/s" if name.startswith("right_") else "s",) if values.ndim == 2 else (),
             ),
             values,
         )
@@ -66,3 +67,9 @@ def _error_fields(result: RunSample, errors: Errors) -> list[tuple[Field, np.nda
         if not (cause == "model" and result.model_error)
         for name, values in quantities.items()
     ]  # fmt: skip
+
+
+def _words(name: str) -> str:
+    """A quantity in words."""
+    after = " just after the point" if name.startswith("right_") else ""
+    return name.removeprefix("right_").replace("_", " ") + after

@@ -86,7 +86,7 @@ class StaticCase:
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
-            corrected=model.corrected, jumps=() if only else jumps, changes=section_changes(self.scene),
+            corrected=model.corrected, jumps=jumps, changes=section_changes(self.scene),
         )  # fmt: skip
 
 

@@ -22,3 +22,9 @@ OLD_EVENTS = {
     "not judged": "stability not judged",
     "loses energy": "numerical dissipation",
 }
+
+
+def right_of(name: str) -> str:
+    """Name of the array with the values on the right of jumps: right/tension, errors/total/right_tension."""
+    group, _, last = name.rpartition("/")
+    return f"{group}/right_{last}" if group else f"right/{name}"

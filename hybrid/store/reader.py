@@ -39,7 +39,7 @@ from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
-from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES
+from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import Attributes, Columns, Event, UnknownName, Zone, ZoneHistory, joined
 
 if TYPE_CHECKING:
@@ -208,7 +208,7 @@ class Result:
             raise ResultError(f"side = {side!r} is no side\n    expected: 'left' or 'right'")
         answer = {}
         listed = (n for n in self.names if self._dims[n][:1] == ("t",) and n != "t")
-        wanted = [n for n in listed if s is None or not n.startswith("right/")] if names is None else names
+        wanted = [n for n in listed if s is None or "right/s" not in self._dims[n]] if names is None else names
         for name in wanted:
             found = {name: self[name]}
             dims = self.dims(name)
@@ -221,7 +221,7 @@ class Result:
 
     def _at_places(self, name: str, axis: int, s: Any, side: str | None) -> dict[str, np.ndarray]:
         """A field at arc lengths s, m, from values on the same side of every jump; of two values both, as of `at`."""
-        right, grid = f"right/{self._known(name)}", self["s"]
+        right, grid = right_of(self._known(name)), self["s"]
         if right not in self._dims or name == "s":
             return {name: _interpolate(self[name], axis, grid, s, "s", "m")}
         x, jumps = np.asarray(s, dtype=float), self["right/s"]
@@ -240,7 +240,7 @@ class Result:
 
     def both_sides(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Arc lengths (n,), m, and a field (nt, n, ...) there; a place where it jumps comes twice, left value first."""
-        s, values, right = self["s"].copy(), self[name], f"right/{self._known(name)}"
+        s, values, right = self["s"].copy(), self[name], right_of(self._known(name))
         if right not in self._dims:
             return s, values
         jumps = self["right/s"]

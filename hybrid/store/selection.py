@@ -20,7 +20,7 @@ import h5py
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, ResultError
-from hybrid.store.names import ALIASES
+from hybrid.store.names import ALIASES, right_of
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -80,13 +80,13 @@ class Part:
 
     def after(self, name: str, s: float) -> np.ndarray | None:
         """A field just after the arc length s (m), (nt,), if it jumps there; None if it does not."""
-        if f"right/{name}" not in self.result:
+        if right_of(name) not in self.result:
             return None
         jumps = self.result["right/s"]
         k = int(np.abs(jumps - s).argmin())
         if abs(jumps[k] - s) > 1e-9 * float(np.ptp(self.result["s"])):
             return None
-        return np.asarray(self.result[f"right/{name}"][self.rows, k])
+        return np.asarray(self.result[right_of(name)][self.rows, k])
 
     def zone_kinds(self, s: np.ndarray) -> tuple[np.ndarray, list[str]]:
         """Kind of the zone at arc lengths s (m): numbers (nt, len(s)), and what they mean.

@@ -364,13 +364,16 @@ def _time(result: Result) -> Axis:
 
 def error_of(result: Result, name: str) -> np.ndarray | None:
     """Estimated error (nt, ns) of a quantity, by all causes; None where the file has none. Of x, y, z: of position."""
-    found = f"errors/total/{'position' if name in AXES else name}"
+    found = _error_name(name)
     return np.asarray(result[found]) if found in result and result.dims(found) == ("t", "s") else None
 
 
 def _error_along(result: Result, name: str, found: Along) -> np.ndarray | None:
-    error = error_of(result, name)
-    return None if error is None else error[:, found.points]
+    return found.of(result, _error_name(name)) if error_of(result, name) is not None else None
+
+
+def _error_name(name: str) -> str:
+    return f"errors/total/{'position' if name in AXES else name}"
 
 
 def _doubt(x: np.ndarray, values: np.ndarray, error: np.ndarray, *, size: bool) -> Band:

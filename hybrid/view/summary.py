@@ -143,7 +143,7 @@ def _tension(result: Result) -> Fact:
     tension = found.values
     i, k = _at(tension, int(tension.argmax()))
     most, t, s = float(tension[i, k]), float(result.times[i]), float(found.s[k])
-    text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, found.points[k])}."
+    text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, found, k)}."
     values: dict[str, Any] = {"tension": most}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
@@ -155,12 +155,12 @@ def _tension(result: Result) -> Fact:
     return Fact("tension", "Largest tension", text, values=values, t=t, s=s)
 
 
-def _doubt(result: Result, name: str, i: int, k: int) -> str:
-    """The estimated error at one output and point, where the file has it."""
-    found = f"errors/total/{name}"
-    if found not in result or result.dims(found) != ("t", "s"):
+def _doubt(result: Result, name: str, i: int, found: Along, k: int) -> str:
+    """The estimated error at one output and place, where the file has it."""
+    error = found.of(result, f"errors/total/{name}")
+    if error is None or error.ndim < 2:
         return ""
-    return f" (± {amount(float(result[found][i, k]), result.units[name], 2)})"
+    return f" (± {amount(float(error[i, k]), result.units[name], 2)})"
 
 
 def _bend(result: Result) -> Fact:
@@ -180,7 +180,7 @@ def _bend(result: Result) -> Fact:
         stiff = "" if kind == "rod" else ", which does not resist bending"
         inside = f", in a {kind} zone{stiff}" if kind else ""
         text = f"{amount(1.0 / most, 'm')} {place(result, s)}{moment(result, t)}{inside}"
-        text += f"{_doubt_of_radius(result, i, found.points[k], most)}."
+        text += f"{_doubt_of_radius(result, i, found, k)}."
         place_of = (t, s)
     unknown = _bends_left_out(result)
     text += unknown
@@ -225,11 +225,11 @@ def _kind_at(result: Result, i: int, found: Along, k: int) -> str:
     return kinds[-1 if side > 0 else 0] if kinds else ""
 
 
-def _doubt_of_radius(result: Result, i: int, k: int, curvature: float) -> str:
-    found = "errors/total/curvature"
-    if found not in result:
+def _doubt_of_radius(result: Result, i: int, found: Along, k: int) -> str:
+    error = found.of(result, "errors/total/curvature")
+    if error is None:
         return ""
-    part = float(result[found][i, k]) / curvature
+    part = float(error[i, k]) / float(found.values[i, k])
     return f" (± {short(100 * part, 2)} %)"
 
 

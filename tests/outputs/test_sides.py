@@ -117,6 +117,30 @@ def test_a_smooth_cable_has_neither() -> None:
     assert np.array_equal(found.s, np.linspace(0.0, LENGTH, 11)) and not [x for x in found.names if "right" in x]
 
 
+def test_errors_are_known_on_both_sides(tmp_path: Path) -> None:
+    """A corrected catenary with a clump: errors by mesh, step and neglected bending of both values."""
+    scene = chain(errors=True, every=0.1) | {"time": {"duration": 0.5, "step": 0.02}, "mesh": {"cells": 20}}
+    scene["cable"]["sections"][0]["bending_stiffness"] = 1.0
+    heave = {"heave": {"amplitude": 0.1, "period": 2.0}, "ramp": 0.5}
+    scene["ends"] = {
+        "start": scene["ends"]["start"] | {"motion": heave},
+        "end": {"kind": "pinned", "position": [7, 0, 0]},
+    }
+    scene["model"] = "corrected"
+    found = hybrid.run(hybrid.validate_scene(scene))
+    for cause in ("mesh", "time", "model", "total"):
+        left, right = found[f"errors/{cause}/tension"], found[f"errors/{cause}/right_tension"]
+        assert found.dims(f"errors/{cause}/right_tension") == ("t", "right/s") and right.shape == (6, 1)
+        s, both = found.both_sides(f"errors/{cause}/tension")
+        assert np.array_equal(both[:, s == AT], np.column_stack([left[:, found.s == AT], right]))
+        assert 0.0 < right.max() < 0.2 * found.tension.max(), cause
+    total = found.at(s=[AT, 5.0], names=["errors/total/tension"])
+    assert np.array_equal(total["errors/total/right_tension"][:, 0], found["errors/total/right_tension"][:, 0])
+    hybrid.export(found, tmp_path / "chain.csv", at=[AT])
+    text = (tmp_path / "chain.csv").read_text()
+    assert f"tension at s = {AT} m before: at most" in text and f"tension at s = {AT} m after: at most" in text
+
+
 def test_curvature_jumps_with_the_stiffness_and_the_moment_does_not() -> None:
     """A cantilever of two sections under its weight: M = EI kappa on both sides, the same M."""
     stiff, soft = 400.0, 100.0
