@@ -24,6 +24,7 @@ if TYPE_CHECKING:
     from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
     from hybrid.simulation.api import resume, run, static
+    from hybrid.simulation.stepping import Simulation
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
     from hybrid.studies.tradeoff import trade
@@ -40,6 +41,7 @@ _HOME = {
     "ResultError": ("hybrid.errors", "ResultError"),
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
+    "Simulation": ("hybrid.simulation.stepping", "Simulation"),
     "export": ("hybrid.exports.api", "export"),
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
@@ -66,6 +68,7 @@ __all__ = [
     "ResultError",
     "Scene",
     "SceneError",
+    "Simulation",
     "export",
     "import_moordyn",
     "load_scene",

@@ -170,6 +170,42 @@ def turn_by_vector(v, rate):
 
 
 @inner
+def part_of_path(t, k, moves):
+    """How far along its path from outside end k is at t, 0 to 1, and the time that the path takes (s)."""
+    begin, end = moves.paths[k, 0], moves.paths[k, 1]
+    if not t < end:
+        return 1.0, max(end - begin, 0.0)
+    return max((t - begin) / (end - begin), 0.0), end - begin
+
+
+@inner
+def driven_position(t, k, moves):
+    """Position (m) and velocity (m/s) of an end that is set from outside: on the cubic between two times (Hermite)."""
+    x, dt = part_of_path(t, k, moves)
+    p = moves.paths[k]
+    a, va, b, vb = (p[2], p[3], p[4]), (p[5], p[6], p[7]), (p[8], p[9], p[10]), (p[11], p[12], p[13])
+    if x == 1.0:
+        return b, vb
+    y, change = 1.0 - x, add(b, scale(-1.0, a))
+    lean_a, lean_b = add(scale(dt, va), scale(-1.0, change)), add(change, scale(-dt, vb))
+    value = add(add(scale(y, a), scale(x, b)), scale(x * y, add(scale(y, lean_a), scale(x, lean_b))))
+    rate = add(change, add(scale(y * (1.0 - 3.0 * x), lean_a), scale(x * (2.0 - 3.0 * x), lean_b)))
+    return value, scale(1.0 / dt, rate)
+
+
+@inner
+def driven_frame(t, k, moves):
+    """Frame (9) and angular velocity (1/s, inertial) of an end that is set from outside: turned evenly."""
+    x, dt = part_of_path(t, k, moves)
+    p = moves.paths[k]
+    frame, v = (p[14], p[15], p[16], p[17], p[18], p[19], p[20], p[21], p[22]), (p[23], p[24], p[25])
+    still = (0.0, 0.0, 0.0)
+    turn, _ = turn_by_vector(scale(x, v), still)
+    spin = mat_vec(frame, scale(1.0 / dt, v)) if dt > 0.0 else still
+    return mat_mat(frame, turn), spin
+
+
+@inner
 def frame_at(t, k, moves):
     """Frame (9) and angular velocity (1/s) of an end."""
     f = moves.frame[k]
@@ -207,7 +243,11 @@ def ends_at(t, moves, sea, ends, velocity):
         x, v = (moves.position[k, 0], moves.position[k, 1], moves.position[k, 2]), (0.0, 0.0, 0.0)
         if moves.prescribed[k, 0]:
             x, v = position_at(when, k, moves, sea)
+        if moves.driven[k, 0]:
+            x, v = driven_position(when, k, moves)
         frame, spin = frame_at(t, k, moves)
+        if moves.driven[k, 1]:
+            frame, spin = driven_frame(when, k, moves)
         for i in range(3):
             ends.position[k, i], velocity[k, i], ends.spin[k, i] = x[i], v[i], spin[i]
             ends.force[k, i] = ends.moment[k, i] = 0.0
@@ -286,6 +326,10 @@ def turn_between(a, b, moves):
                     w, p = moves.harmonics[j, 3], moves.harmonics[j, 4]
                     swings, largest = sine_on_the_way(w * a + p, w * b + p)
                     way += abs(moves.harmonics[j, 2]) * ((grown - r) * largest + grown * swings)
+        if moves.driven[k, 1]:
+            p = moves.paths[k]
+            part = part_of_path(b, k, moves)[0] - part_of_path(a, k, moves)[0]
+            way += part * distance((p[23], p[24], p[25]), (0.0, 0.0, 0.0))
         part = rise(b, moves.bring_in)[0] - rise(a, moves.bring_in)[0]
         most = max(most, way + moves.missing[k, 3] * part)
     return most

@@ -85,6 +85,9 @@ class Moves(NamedTuple):
     cubics: Floats  # (K, 6, 4) coefficients from a knot on, highest power first: m (3), rotation vector in rad (3)
     missing: Floats  # (2, 4) axis and angle (rad) by which a frame has still to turn at t = 0; angle 0: none
     bring_in: float  # s, over which it does
+    driven: NDArray[np.int8]  # (2, 2) 1 where the position, the frame, is set from outside, step by step
+    paths: Floats  # (2, 26) of driven ends: from t to t' (s), position and velocity at both (m, m/s), then
+    # the frame at t and the rotation vector to that at t', in the axes of the frame (rad)
     loads: Floats  # (L, 6) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once
 
 
@@ -249,5 +252,5 @@ def no_moves() -> Moves:
     z = np.zeros
     return Moves(
         z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
-        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((0, 6)),
+        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 6)),
     )  # fmt: skip

@@ -9,6 +9,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 import numpy as np
 
 from hybrid.kernels.state import Ends, Floats, Moves
+from hybrid.model.driven_end import PATH, DrivenEnd
 from hybrid.scene.motion import MotionTerms
 
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
@@ -80,17 +81,19 @@ class EndConditions:
         position: Floats,
         frame: Floats,
         loads: Sequence[EndLoad],
-        motions: Mapping[int, Motion],
+        motions: Mapping[int, Motion | DrivenEnd],
     ) -> None:
         zero = np.zeros((2, 3))
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
         self.breaks = sorted({x.until for x in loads if np.isfinite(x.until)})
-        self._loads, self.motions = tuple(loads), motions
+        self._loads, self.motions = tuple(loads), dict(motions)
         self._given = (frame.copy(), np.zeros((2, 3)))  # frames and their spins without motion
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
         self._moves: Moves | None = None  # made when first asked for
+        self._set: set[tuple[str, int]] = set()  # loads that are set from outside
+        self._paths = np.zeros((2, PATH))  # of ends that are set from outside
         self.set_loads(0.0)
         self.at(np.inf)
 
@@ -180,13 +183,39 @@ class EndConditions:
             self._moves = self._as_moves()
         return self._moves
 
+    def drive(self, k: int) -> DrivenEnd:
+        """From now on end k is set from outside; its motion, if it has one, is over."""
+        values = self.values
+        held, turns = bool(values.held[k]), bool(values.frame[k].any())
+        end = DrivenEnd(self._paths[k], values.position[k], values.frame[k].reshape(3, 3), held, turns)
+        self.motions, self._moves = {**self.motions, k: end}, None
+        return end
+
+    def load(self, what: Literal["force", "moment"], k: int, value: Floats) -> None:
+        """From now on this force (N) or moment (N m) acts on end k, for good, instead of what did."""
+        for row, x in enumerate(self._acting):
+            if (what, k) in self._set and (x.what, x.end) == (what, k):
+                x.value[:] = value
+                if self._moves is not None:
+                    self._moves.loads[row, 2:5] = value
+                self._grown = False
+                return
+        self._set.add((what, k))
+        others = [x for x in self._loads if (x.what, x.end) != (what, k)]
+        self._loads = (*others, EndLoad(what, k, np.array(value, float), np.inf, None))
+        self.set_loads(0.0)
+
     def _as_moves(self) -> Moves:
         prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)
         ramp, velocity, velocity_ramp, travel = np.zeros(2), np.zeros((2, 3)), np.zeros(2), np.zeros((2, 5))
         follows, missing, position = np.zeros(2, np.int8), np.zeros((2, 4)), self.values.position.copy()
+        driven = np.zeros((2, 2), np.int8)
         harmonics: list[tuple[float, ...]] = []
         knots, cubics = [np.zeros(0)], [np.zeros((0, 6, 4))]
         for k, motion in self.motions.items():
+            if isinstance(motion, DrivenEnd):
+                driven[k] = motion.held, motion.turns
+                continue
             terms = motion.terms()
             position[k] = motion.base
             prescribed[k] = terms.translates, terms.rotates
@@ -203,7 +232,7 @@ class EndConditions:
         return Moves(
             prescribed, position, self._given[0].copy(), ramp, np.array(harmonics).reshape(-1, 5), velocity,
             velocity_ramp, travel, follows, file, np.concatenate(knots), np.concatenate(cubics), missing,
-            float(self._bring_in), np.array(loads, float).reshape(-1, 6),
+            float(self._bring_in), driven, self._paths, np.array(loads, float).reshape(-1, 6),
         )  # fmt: skip
 
     def _grow(self, t: float) -> None:

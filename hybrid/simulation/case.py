@@ -75,21 +75,37 @@ class Case:
     def record(self, resolution: Resolution, target: Path | io.BytesIO, before: Tree | None = None) -> RunSample:
         """Compute the result into a file, or memory; what is to be compared of it.  before: what was found before."""
         begin = self._begin_result(resolution)
-        model, equilibrium, switching = self._start(resolution)
-        loop = self._loop(self.scene, model, resolution, switching, target)
-        outputs = output_times(self.scene)
-        kept = before or {} if isinstance(target, Path) else None
-        loop.recorder = recorder = result_recorder(
-            self.scene, model, loop.observer, target, self._texts, equilibrium, len(outputs), kept
+        loop, recorder, equilibrium = self.prepare(
+            resolution, target, before or {} if isinstance(target, Path) else None
         )
-        recorder.files = self._files
+        loop.recorder = recorder
         with recorder:
-            if switching is not None and switching.manager.held:
-                recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
             loop.begin(equilibrium)
             loop.to_the_end(self._duration, self._exact, self.changes)
             loop.close()
         return self._compared(loop.run, target, clock.process_time() - begin)
+
+    def prepare(
+        self, resolution: Resolution, target: Path | io.BytesIO, kept: Tree | None = None
+    ) -> tuple[TimeLoop, Recorder, Equilibrium | None]:
+        """The loop of a run, its result, and the equilibrium that it starts from; kept: as `before` of `Recorder`."""
+        model, equilibrium, switching = self._start(resolution)
+        loop = self._loop(self.scene, model, resolution, switching, target)
+        recorder = result_recorder(
+            self.scene, model, loop.observer, target, self._texts, equilibrium, len(output_times(self.scene)), kept
+        )
+        recorder.files = self._files
+        if switching is not None and switching.manager.held:
+            recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
+        return loop, recorder, equilibrium
+
+    def again(self, saved: Tree, loop: TimeLoop, target: Path | io.BytesIO) -> TimeLoop:
+        """The loop of a run as it was at a checkpoint of its own."""
+        resolution = loop.run.resolution
+        model, switching, correction = restored_parts([self.scene], resolution, saved, self.criterion)
+        other = self._loop(self.scene, model, resolution, switching, target, correction)
+        other.restore(saved)
+        return other
 
     def resume(self, source: Path, target: Path, before: Tree | None = None) -> RunSample:
         """The same from the checkpoint of a result, which may be the target; ResultError if it has none."""

@@ -15,7 +15,8 @@ from hybrid.kernels.books import AT_STOP, FLAGS, JUMPED, PAUSED, ROWS, STEPPED, 
 from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
-from hybrid.simulation.diagnostics import Diagnostics, Stop
+from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, Stop
 from hybrid.simulation.failure import explanation, failed_node, snapshot
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
@@ -46,7 +47,7 @@ class TimeLoop:
         its end.
         """
         self.run, self.observer, self.target = run, observer, target
-        self.recorder: Recorder | MemoryRecorder = MemoryRecorder()
+        self.recorder: Recorder | MemoryRecorder | DeferredRecorder = MemoryRecorder()
         self.diagnostics = Diagnostics(run.model, run.events)
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
@@ -63,7 +64,7 @@ class TimeLoop:
         try:
             run.begin(equilibrium)
         except StepFailed as failed:
-            self._fail(failed.tried, failed.dt)
+            self.fail(failed.tried, failed.dt)
         self.diagnostics.follow(run.model)
         self._stop_if(self.diagnostics.stretch(run.state))
         self._stop_if(self.diagnostics.still(run.model.ends.values, run.state))
@@ -80,13 +81,13 @@ class TimeLoop:
         run = self.run
         try:
             for change in changes[run.changes :]:
-                self._until(change.t, exact)
+                self.until(change.t, exact)
                 run.change_loads(change.scene)
                 self._settle()
                 self._checkpoint()
-            self._until(duration, exact)
+            self.until(duration, exact)
         except StepFailed as failed:
-            self._fail(failed.tried, failed.dt)
+            self.fail(failed.tried, failed.dt)
         finally:
             run.events.write_to(self.recorder)
         self._report(run, True)
@@ -98,7 +99,7 @@ class TimeLoop:
         self.run.events.write_to(self.recorder)
         self.recorder.close("complete", f"{self.run.steps} steps")
 
-    def _until(self, end: float, exact: bool) -> None:
+    def until(self, end: float, exact: bool) -> None:
         """Steps end where ends are let go, and, if their length is controlled, where loads have grown."""
         run = self.run
         breaks = run.model.ends.breaks
@@ -108,18 +109,23 @@ class TimeLoop:
         if exact:
             stops |= {float(t) for t in run.run.books.outputs if t < end}
         for stop in sorted(t for t in stops if t > run.t):
-            for code in run.advance(stop):
-                self._write_down()
-                if code == STEPPED:
-                    self.diagnostics.follow(run.model)
-                    self._look(int(run.run.count[FLAGS]))
-                elif code in (PAUSED, AT_STOP):
-                    self._pause()
+            self.go_to(stop)
             if exact:
                 run.begin_leg()
             if stop in breaks:
                 run.restart()
                 self._settle()
+
+    def go_to(self, stop: float) -> None:
+        """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""
+        run = self.run
+        for code in run.advance(stop):
+            self._write_down()
+            if code == STEPPED:
+                self.diagnostics.follow(run.model)
+                self._look(int(run.run.count[FLAGS]))
+            elif code in (PAUSED, AT_STOP):
+                self._pause()
 
     def _settle(self) -> None:
         """After a start: powers of the new state, and its output where one is due."""
@@ -197,9 +203,9 @@ class TimeLoop:
     def _stop_if(self, stop: Stop) -> None:
         """Stop where going on would make no sense."""
         if stop is not None:
-            self._fail(Tried(stop[0], 0, 0.0, stop[1]), 0.0)
+            self.fail(Tried(stop[0], 0, 0.0, stop[1]), 0.0)
 
-    def _fail(self, tried: Tried, dt: float) -> NoReturn:
+    def fail(self, tried: Tried, dt: float) -> NoReturn:
         """The run cannot go on: leave its last good state and an output, and say where and why."""
         run = self.run
         s = float(run.model.line.s[failed_node(run, tried)])
@@ -235,6 +241,15 @@ class TimeLoop:
             "resolution": resolution_tree(self.run.resolution),
             "state": self.checkpoint(),
         }
+
+    def remembered(self) -> dict[str, Any]:
+        """What has been noted so far, to be given to `remember`."""
+        return {name: getattr(self.diagnostics, name) for name in REMEMBERED}
+
+    def remember(self, noted: Mapping[str, Any]) -> None:
+        """Forget what has been noted since `remembered`."""
+        vars(self.diagnostics).update(noted)
+        self.diagnostics.watch(self.run.run)
 
     def checkpoint(self) -> dict[str, Any]:
         """What the rest of the run depends on, between two steps."""

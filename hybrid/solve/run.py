@@ -6,6 +6,7 @@ The loop over time is compiled (kernels.run).  Here are its arrays, and what the
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import NamedTuple
 
 import numpy as np
@@ -119,6 +120,21 @@ class CompiledRun:
         if code in (b.PAUSED, b.AT_STOP):
             self.count[b.QUOTA] = self.quota
         return code
+
+    def keep(self) -> tuple[Floats, ...]:
+        """Copies of all that steps change, for `bring_back`."""
+        return tuple(x.copy() for x in self._changing())
+
+    def bring_back(self, kept: tuple[Floats, ...]) -> None:
+        """Be as it was when `keep` was called, on the same line."""
+        for mine, its in zip(self._changing(), kept, strict=True):
+            mine[:] = its
+
+    def _changing(self) -> Iterator[Floats]:
+        skipped = ("outputs", "log", "samples", "borne", "base", "placed", "loaded", "start")
+        yield from (x for state in self.states for x in state)
+        yield from self.pushes
+        yield from (x for name, x in self.books._asdict().items() if name not in skipped)
 
     # --- what it knows ------------------------------------------------------------------------------
 

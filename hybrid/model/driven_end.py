@@ -1,0 +1,70 @@
+"""An end that is set from outside, step by step: where it is to be at the end of the next step, and the way there.
+
+The laws are those of kernels.end_motion.driven_position and driven_frame, which move the end within compiled steps.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+
+# Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector (rad).
+FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23
+PATH = 26
+
+
+class DrivenEnd:
+    """One end, as `EndConditions` asks its motions; `path` is its row of `Moves.paths`."""
+
+    def __init__(self, path: Floats, position: Floats, frame: Floats, held: bool, turns: bool) -> None:
+        """path: (PATH,) filled here; position: (3,) m; frame: (3, 3); held, turns: what is set of it."""
+        self.path, self.held, self.turns = path, held, turns
+        path[:] = 0.0
+        path[AT:SPEED] = path[THERE:SPEED_THERE] = position
+        path[FRAME:TURN] = np.ravel(frame)
+
+    def set(self, begin: float, end: float, position: Floats, velocity: Floats, turn: Floats) -> None:
+        """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad."""
+        here, speed, frame, _ = self.at(begin)
+        path = self.path
+        path[FROM], path[TO], path[AT:SPEED], path[SPEED:THERE] = begin, end, here, speed
+        path[THERE:SPEED_THERE], path[SPEED_THERE:FRAME] = position, velocity
+        path[FRAME:TURN], path[TURN:PATH] = np.ravel(frame), turn
+
+    def at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
+        """Position (3,) m, velocity (3,) m/s, frame (3, 3), angular velocity (3,) 1/s at t (s); inertial."""
+        p = self.path
+        dt = max(p[TO] - p[FROM], 0.0)
+        x = 1.0 if not t < p[TO] else max((t - p[FROM]) / dt, 0.0)
+        frame, turn = p[FRAME:TURN].reshape(3, 3), p[TURN:PATH]
+        spin = frame @ turn / dt if dt > 0.0 else np.zeros(3)
+        turned = frame @ rotation(x * turn)
+        if x == 1.0:
+            return p[THERE:SPEED_THERE].copy(), p[SPEED_THERE:FRAME].copy(), turned, spin
+        change = p[THERE:SPEED_THERE] - p[AT:SPEED]
+        a, b = dt * p[SPEED:THERE] - change, change - dt * p[SPEED_THERE:FRAME]
+        value = (1.0 - x) * p[AT:SPEED] + x * p[THERE:SPEED_THERE] + x * (1.0 - x) * ((1.0 - x) * a + x * b)
+        rate = change + (1.0 - x) * (1.0 - 3.0 * x) * a + x * (2.0 - 3.0 * x) * b
+        return value, rate / dt, turned, spin
+
+    def turn_from(self, frame: Floats) -> None:
+        """Stand in another frame (3, 3)."""
+        self.path[FRAME:TURN], self.path[TURN:PATH] = np.ravel(frame), 0.0
+
+
+def rotation(vector: Floats) -> Floats:
+    """Rotation matrix (3, 3) of a rotation vector, rad (Rodrigues)."""
+    angle = float(np.sqrt(vector @ vector))
+    x, y, z = vector
+    K = np.array([[0.0, -z, y], [z, 0.0, -x], [-y, x, 0.0]])
+    a, b = (np.sin(angle) / angle, (1.0 - np.cos(angle)) / angle**2) if angle > 1e-4 else (1.0 - angle**2 / 6.0, 0.5)
+    return np.asarray(np.eye(3) + a * K + b * (K @ K))
+
+
+def rotation_vector(matrix: Floats) -> Floats:
+    """Rotation vector, rad, below a half turn, of a rotation matrix (3, 3)."""
+    sine = 0.5 * np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+    size = float(np.sqrt(sine @ sine))
+    angle = float(np.arctan2(size, 0.5 * (np.trace(matrix) - 1.0)))
+    return sine * (angle / size) if size > 1e-12 else sine

@@ -1,0 +1,266 @@
+"""A cable that is stepped from outside: by a controller, a vessel, another program.
+
+`Simulation` is the loop of `hybrid.run` with its handle outside: the same steps, the same outputs, the same file.
+"""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.adapt.manager import UserCriterion
+from hybrid.errors import SceneError
+from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
+from hybrid.kernels.state import Floats
+from hybrid.model.driven_end import DrivenEnd, rotation_vector
+from hybrid.model.mesh import Zone
+from hybrid.model.resolution import first_resolution
+from hybrid.scene.motion_checks import check_motions
+from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.schema import Scene, missing_time
+from hybrid.simulation.case import Case
+from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.transient import StepFailed
+from hybrid.store.hdf5_file import check_target
+from hybrid.store.named_arrays import pack, unpack
+from hybrid.store.reader import Result, open_result
+
+ENDS = ("start", "end")
+# Of a step: a time so near to the present one is the present one.
+NOW = 1e-9
+
+
+class CableState(NamedTuple):
+    """Where the cable is; arrays of one's own."""
+
+    t: float  # s
+    s: Floats  # (N+1,) m, unstretched arc length of the nodes
+    position: Floats  # (N+1, 3) m, inertial
+    velocity: Floats  # (N+1, 3) m/s
+    tension: Floats  # (N,) N, of the cells between
+    zones: tuple[Zone, ...]
+
+
+class EndForces(NamedTuple):
+    """Forces (3,) N and moments (3,) N m of the cable on what holds its ends, inertial; zero where nothing holds it."""
+
+    start: Floats
+    end: Floats
+    moment_start: Floats
+    moment_end: Floats
+
+
+class Simulation:
+    """A cable in motion that is stepped from outside; a context manager.
+
+    scene: as of `hybrid.run`; its time table gives the step (without one, steps follow the motion) and the duration,
+    beyond which nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  criterion: as
+    of `hybrid.run`.  Constructing it finds the start that the scene asks for, a static equilibrium perhaps, and nothing
+    else: no run to estimate an error is made.  A scene that says no `dimension` is computed in space, since an end may
+    be set anywhere.
+
+    Raises SceneError, ResultError and ComputationError as `hybrid.run` does.
+    """
+
+    def __init__(
+        self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
+        criterion: UserCriterion | None = None,
+    ) -> None:  # fmt: skip
+        self.scene = _in_space(as_scene(scene))
+        if self.scene.time is None:
+            raise SceneError([missing_time(self.scene)])
+        check_motions(self.scene)
+        self._target: Path | io.BytesIO = io.BytesIO()
+        if output is not None:
+            self._target = Path(output).expanduser().resolve()
+            check_target(self._target, overwrite)
+        compile_beside(self.scene)
+        self._case = Case(self.scene, criterion)
+        self._loop, recorder, equilibrium = self._case.prepare(first_resolution(self.scene), self._target)
+        self._loop.recorder = self._recorder = DeferredRecorder(recorder)
+        self._driven: dict[int, DrivenEnd] = {}
+        self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
+        try:
+            self._loop.begin(equilibrium)
+        except BaseException as error:
+            self.__exit__(type(error), error, None)
+            raise
+
+    # --- stepping -------------------------------------------------------------------------------
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return self._loop.run.t
+
+    def step(self) -> float:
+        """One step of the scene's length, and the time after it (s).
+
+        ValueError: steps follow the motion (`advance` says where to), or the duration is over.
+        """
+        time = self.scene.require_time()
+        if time.controlled or time.step is None:
+            raise ValueError("steps follow the motion: use advance(until), or give time.step")
+        return self.advance(min(self.t + time.step, time.duration))
+
+    def advance(self, until: float) -> float:
+        """Steps to a time `until` (s), where one ends; returns it.  Ends that are set reach their place there.
+
+        ValueError: a time that has passed, or beyond the scene's duration.
+        """
+        now, duration = self.t, self.scene.require_time().duration
+        if not now < until <= duration * (1.0 + NOW):
+            raise ValueError(
+                f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration {duration:g} s"
+            )
+        for k, end in self._driven.items():
+            position, velocity, turn = self._next.pop(k, (end.at(now)[0], np.zeros(3), None))
+            end.set(now, until, position, velocity, np.zeros(3) if turn is None else turn)
+        self._recorder.commit_old()
+        try:
+            self._loop.until(min(until, duration), exact=False)
+        except StepFailed as failed:
+            self._loop.fail(failed.tried, failed.dt)
+        return self.t
+
+    # --- what is set and felt --------------------------------------------------------------------
+
+    def set_end(
+        self, end: str, position: Sequence[float] | Floats, velocity: Sequence[float] | Floats | None = None,
+        frame: Floats | None = None,
+    ) -> None:  # fmt: skip
+        """Where a held end is to be at the end of the next `step` or `advance`, which it reaches smoothly.
+
+        end: "start" or "end"; position: (3,) m, inertial; velocity: (3,) m/s there, None: at rest; frame: (3, 3),
+        columns a1, a2 and the tangent along increasing s, of an end that holds a direction.  An end that is not set
+        again stays where it is.  ValueError: the end is free, has a motion in the scene, or is moved by no finite way.
+        """
+        k = self._end(end)
+        conditions = self._loop.run.model.ends
+        if not conditions.values.held[k]:
+            raise ValueError(f"ends.{end} is not held: set_force acts on it")
+        if k not in self._driven:
+            if k in conditions.motions:
+                raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
+            self._driven[k] = conditions.drive(k)
+            self._loop.run.run.move(conditions.moves())
+        there, speed = _vector(position, "position"), _vector((0, 0, 0) if velocity is None else velocity, "velocity")
+        turn = None
+        if frame is not None:
+            now = self._driven[k].at(self.t)[2]
+            wanted = np.array(frame, float)
+            if wanted.shape != (3, 3) or not np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6):
+                raise ValueError("frame: expected a rotation matrix (3, 3)")
+            turn = rotation_vector(now.T @ wanted)
+        self._next[k] = there, speed, turn
+
+    def set_force(
+        self, end: str, force: Sequence[float] | Floats, moment: Sequence[float] | Floats | None = None
+    ) -> None:
+        """From the next step on this force (3,) N, and moment (3,) N m, act on an end that is free to move."""
+        k, conditions = self._end(end), self._loop.run.model.ends
+        if conditions.values.held[k]:
+            raise ValueError(f"ends.{end} is held: set_end moves it")
+        conditions.load("force", k, _vector(force, "force"))
+        if moment is not None:
+            conditions.load("moment", k, _vector(moment, "moment"))
+        self._loop.run.run.move(conditions.moves())
+
+    def forces(self) -> EndForces:
+        """Forces and moments of the cable on what holds its ends, now."""
+        report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
+        start, end = (report[k : k + 3] * held[j] for j, k in enumerate((FORCE_A, FORCE_B)))
+        return EndForces(
+            start, end, report[MOMENT_A : MOMENT_A + 3] * held[0], -report[MOMENT_B : MOMENT_B + 3] * held[1]
+        )
+
+    @property
+    def state(self) -> CableState:
+        """Where the cable is now."""
+        run = self._loop.run
+        x = run.state
+        return CableState(run.t, run.model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), run.model.zones)
+
+    # --- back and forth ---------------------------------------------------------------------------
+
+    def save(self) -> Any:
+        """The state as it is, in memory, to come back to: for the iterations of an implicit coupling.
+
+        What has been computed until now is final; what follows is recorded when the next `save` is made.
+        """
+        self._recorder.commit()
+        run, watch = self._loop.run, self._loop.remembered()
+        simple = run.switching is None and run.correction is None
+        state = run.run.keep() if simple else pack(self._loop.checkpoint())
+        paths = {k: end.path.copy() for k, end in self._driven.items()}
+        return _Saved(self._recorder.mark(), state, watch, paths)
+
+    def restore(self, saved: Any) -> None:
+        """Back to what `save` returned.  ValueError: a later `save` has made final what came after it."""
+        self._recorder.back_to(saved.mark)
+        if isinstance(saved.state, bytes):
+            self._loop = self._case.again(unpack(saved.state), self._loop, self._target)
+            self._loop.recorder, ends = self._recorder, self._loop.run.model.ends
+            self._driven = {k: ends.drive(k) for k in saved.paths}
+            self._loop.run.run.move(ends.moves())
+        else:
+            self._loop.run.run.bring_back(saved.state)
+        self._loop.remember(saved.watch)
+        for k, path in saved.paths.items():
+            self._driven[k].path[:] = path
+        self._next.clear()
+
+    # --- the end ----------------------------------------------------------------------------------
+
+    def result(self) -> Result:
+        """What has been recorded until now; the simulation is over."""
+        self.close()
+        return open_result(self._target)
+
+    def close(self) -> None:
+        """Write what is left and close the file; a second call does nothing."""
+        self._recorder.commit()
+        self._loop.diagnostics.finish(self._loop.run.run)
+        self._loop.run.events.write_to(self._recorder)
+        self._recorder.close("complete", f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s")
+
+    def __enter__(self) -> Simulation:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if kind is None:
+            self.close()
+        else:
+            self._recorder.commit()
+            self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
+
+    def _end(self, end: str) -> int:
+        if end not in ENDS:
+            raise ValueError(f"end: expected 'start' or 'end', found {end!r}")
+        return ENDS.index(end)
+
+
+class _Saved(NamedTuple):
+    """What `save` keeps."""
+
+    mark: int
+    state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
+    watch: Mapping[str, Any]
+    paths: Mapping[int, Floats]
+
+
+def _vector(x: Sequence[float] | Floats, name: str) -> Floats:
+    value = np.array(x, float)
+    if value.shape != (3,) or not np.isfinite(value).all():
+        raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
+    return value
+
+
+def _in_space(scene: Scene) -> Scene:
+    return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})
