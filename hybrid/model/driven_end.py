@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.kernels.state import Floats
 
-# Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector (rad).
+# Columns of a path: begin and end (s), position and velocity at both (m, m/s), frame at the begin, rotation vector.
 FROM, TO, AT, SPEED, THERE, SPEED_THERE, FRAME, TURN = 0, 1, 2, 5, 8, 11, 14, 23
 PATH = 26
 
@@ -26,9 +26,15 @@ class DrivenEnd:
 
     def set(self, begin: float, end: float, position: Floats, velocity: Floats, turn: Floats) -> None:
         """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad."""
-        here, speed, frame, _ = self.at(begin)
         path = self.path
-        path[FROM], path[TO], path[AT:SPEED], path[SPEED:THERE] = begin, end, here, speed
+        if begin < path[TO]:  # on its way
+            path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at(begin)
+        else:
+            path[AT:THERE] = path[THERE:FRAME]
+            frame = path[FRAME:TURN].reshape(3, 3)
+            if path[TURN:PATH].any():
+                frame = frame @ rotation(path[TURN:PATH])
+        path[FROM], path[TO] = begin, end
         path[THERE:SPEED_THERE], path[SPEED_THERE:FRAME] = position, velocity
         path[FRAME:TURN], path[TURN:PATH] = np.ravel(frame), turn
 

@@ -17,6 +17,7 @@ from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import SceneError
 from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state import Floats
+from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, rotation_vector
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import first_resolution
@@ -34,6 +35,7 @@ from hybrid.store.reader import Result, open_result
 ENDS = ("start", "end")
 # Of a step: a time so near to the present one is the present one.
 NOW = 1e-9
+STILL: Floats = np.zeros(3)
 
 
 class CableState(NamedTuple):
@@ -86,6 +88,7 @@ class Simulation:
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
+        self._loop.patient = self._plain
         try:
             self._loop.begin(equilibrium)
         except BaseException as error:
@@ -117,11 +120,12 @@ class Simulation:
         now, duration = self.t, self.scene.require_time().duration
         if not now < until <= duration * (1.0 + NOW):
             raise ValueError(
-                f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration {duration:g} s"
+                f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
             )
         for k, end in self._driven.items():
-            position, velocity, turn = self._next.pop(k, (end.at(now)[0], np.zeros(3), None))
-            end.set(now, until, position, velocity, np.zeros(3) if turn is None else turn)
+            wanted = self._next.pop(k, None)
+            position, velocity, turn = wanted or (end.at(now)[0], STILL, None)
+            end.set(now, until, position, velocity, STILL if turn is None else turn)
         self._recorder.commit_old()
         try:
             self._loop.until(min(until, duration), exact=False)
@@ -194,10 +198,11 @@ class Simulation:
 
         What has been computed until now is final; what follows is recorded when the next `save` is made.
         """
+        if not self._plain:
+            self._loop.write_down(everything=True)
         self._recorder.commit()
         run, watch = self._loop.run, self._loop.remembered()
-        simple = run.switching is None and run.correction is None
-        state = run.run.keep() if simple else pack(self._loop.checkpoint())
+        state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
         return _Saved(self._recorder.mark(), state, watch, paths)
 
@@ -205,16 +210,26 @@ class Simulation:
         """Back to what `save` returned.  ValueError: a later `save` has made final what came after it."""
         self._recorder.back_to(saved.mark)
         if isinstance(saved.state, bytes):
-            self._loop = self._case.again(unpack(saved.state), self._loop, self._target)
-            self._loop.recorder, ends = self._recorder, self._loop.run.model.ends
-            self._driven = {k: ends.drive(k) for k in saved.paths}
-            self._loop.run.run.move(ends.moves())
+            self._loop = self._case.again(
+                unpack(saved.state), self._loop, self._target, lambda model: self._drive_again(model, saved.paths)
+            )
+            self._loop.recorder = self._recorder
         else:
             self._loop.run.run.bring_back(saved.state)
+            for k, path in saved.paths.items():
+                self._driven[k].path[:] = path
         self._loop.remember(saved.watch)
-        for k, path in saved.paths.items():
-            self._driven[k].path[:] = path
         self._next.clear()
+
+    def _drive_again(self, model: Model, paths: Mapping[int, Floats]) -> None:
+        self._driven = {k: model.ends.drive(k) for k in paths}
+        for k, path in paths.items():
+            self._driven[k].path[:] = path
+
+    @property
+    def _plain(self) -> bool:
+        """Whether nothing but the compiled run changes in a step."""
+        return self._loop.run.switching is None and self._loop.run.correction is None
 
     # --- the end ----------------------------------------------------------------------------------
 
@@ -225,6 +240,7 @@ class Simulation:
 
     def close(self) -> None:
         """Write what is left and close the file; a second call does nothing."""
+        self._loop.write_down(everything=True)
         self._recorder.commit()
         self._loop.diagnostics.finish(self._loop.run.run)
         self._loop.run.events.write_to(self._recorder)
@@ -237,6 +253,7 @@ class Simulation:
         if kind is None:
             self.close()
         else:
+            self._loop.write_down(everything=True)
             self._recorder.commit()
             self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
 

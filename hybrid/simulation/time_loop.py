@@ -52,6 +52,7 @@ class TimeLoop:
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
+        self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
@@ -120,7 +121,8 @@ class TimeLoop:
         """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""
         run = self.run
         for code in run.advance(stop):
-            self._write_down()
+            if not self.patient or code == PAUSED:
+                self.write_down()
             if code == STEPPED:
                 self.diagnostics.follow(run.model)
                 self._look(int(run.run.count[FLAGS]))
@@ -130,7 +132,7 @@ class TimeLoop:
     def _settle(self) -> None:
         """After a start: powers of the new state, and its output where one is due."""
         for _ in self.run.advance(self.run.t):
-            self._write_down()
+            self.write_down()
 
     def _pause(self) -> None:
         """Between two calls of the compiled run: report, and hear of interrupts."""
@@ -153,11 +155,11 @@ class TimeLoop:
 
     # --- what is written down -------------------------------------------------------------------
 
-    def _write_down(self) -> None:
-        """Log the steps and record the outputs since the last call."""
+    def write_down(self, everything: bool = False) -> None:
+        """Record the outputs since the last call, and log the steps; everything: even if they are few."""
         run = self.run
         batch = run.run.samples(run.model.ends.values)
-        if batch is not None or run.run.count[ROWS] > LOGGED:
+        if everything or batch is not None or run.run.count[ROWS] > LOGGED:
             self._log()
         if batch is not None:
             self._record(batch)

@@ -123,11 +123,14 @@ class CompiledRun:
 
     def keep(self) -> tuple[Floats, ...]:
         """Copies of all that steps change, for `bring_back`."""
-        return tuple(x.copy() for x in self._changing())
+        rows = self.books.log[: self.count[b.ROWS]], self.books.samples[: self.count[b.SAMPLES]]
+        return tuple(x.copy() for x in (*rows, *self._changing()))
 
     def bring_back(self, kept: tuple[Floats, ...]) -> None:
         """Be as it was when `keep` was called, on the same line."""
-        for mine, its in zip(self._changing(), kept, strict=True):
+        log, samples, *others = kept
+        self.books.log[: len(log)], self.books.samples[: len(samples)] = log, samples
+        for mine, its in zip(self._changing(), others, strict=True):
             mine[:] = its
 
     def _changing(self) -> Iterator[Floats]:

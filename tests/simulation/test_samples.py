@@ -69,7 +69,7 @@ def test_outputs_and_buffers_do_not_shape_the_motion(monkeypatch: pytest.MonkeyP
 
 
 def test_exact_outputs_are_ends_of_steps() -> None:
-    """As releases before 0.7: every interval between outputs is cut into equal steps."""
+    """As 0.5.0 did: every interval between outputs is cut into equal steps."""
     result = hybrid.run(swinging("catenary", 0.2, 0.5, exact=True))
     assert np.allclose(result["steps/dt"], 0.5 / 3, rtol=0, atol=1e-12)
     inside = hybrid.run(swinging("catenary", 0.2, 0.5))

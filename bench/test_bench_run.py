@@ -1,0 +1,152 @@
+"""What a run costs as the user lives it: from the scene to the closed file, processor time of this process on one core.
+
+    pytest bench/test_bench_run.py -m bench -s
+
+Each figure is the median of five runs; ratios are taken within one run.  examples/touchdown.yaml, 100 cells, 1000 steps
+of 0.1 s.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from pathlib import Path
+from statistics import median
+from typing import Any
+
+import pytest
+
+import hybrid
+from hybrid.solve.run import CompiledRun
+
+pytestmark = pytest.mark.bench
+EXAMPLES = Path(__file__).parents[1] / "examples"
+RUNS = 5
+
+
+def touchdown(model: str, every: float = 0.2, *more: str) -> hybrid.Scene:
+    usual = [f"model={model}", "mesh={cells: 100}", f"output.every={every}", "output.errors=false"]
+    return hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*usual, *more])
+
+
+def cpu(call: Callable[[], Any]) -> float:
+    """Median processor time, s, after a first call that loads what is needed."""
+    call()
+    times = []
+    for _ in range(RUNS):
+        begin = time.process_time()
+        call()
+        times.append(time.process_time() - begin)
+    return median(times)
+
+
+@pytest.fixture
+def kernel_time(monkeypatch: pytest.MonkeyPatch) -> list[float]:
+    """Processor times, s, of all calls of the compiled run."""
+    go, times = CompiledRun.go, []
+
+    def timed(self: CompiledRun) -> int:
+        begin = time.process_time()
+        code = go(self)
+        times.append(time.process_time() - begin)
+        return code
+
+    monkeypatch.setattr(CompiledRun, "go", timed)
+    return times
+
+
+@pytest.mark.parametrize("every", [0.2, 0.05])
+@pytest.mark.parametrize("model", ["catenary", "rod"])
+def test_touchdown_from_the_scene_to_the_file(model: str, every: float, tmp_path: Path) -> None:
+    scene = touchdown(model, every)
+    plain = cpu(lambda: hybrid.run(scene, tmp_path / "run.h5").close())
+    print(f"{model}, {round(100 / every) + 1} outputs: {plain:.3f} s")
+
+
+def test_the_error_figure(tmp_path: Path) -> None:
+    for model in ("catenary", "rod"):
+        plain = cpu(lambda m=model: hybrid.run(touchdown(m), tmp_path / "run.h5").close())
+        errors = touchdown(model, 0.2, "output.errors=true")
+        more = cpu(lambda s=errors: hybrid.run(s, tmp_path / "run.h5").close())
+        print(f"{model}: {plain:.3f} s, with the error figure {more:.3f} s, {more / plain:.2f} times")
+
+
+@pytest.mark.parametrize("cells", [100, 1000])
+def test_part_inside_kernels(cells: int, tmp_path: Path, kernel_time: list[float]) -> None:
+    scene = touchdown("catenary", 0.2, f"mesh={{cells: {cells}}}")
+    hybrid.run(scene, tmp_path / "run.h5").close()
+    parts = []
+    for _ in range(RUNS):
+        kernel_time.clear()
+        begin = time.process_time()
+        hybrid.run(scene, tmp_path / "run.h5").close()
+        parts.append(sum(kernel_time) / (time.process_time() - begin))
+    print(f"{cells} cells: {100 * median(parts):.0f} % inside the compiled run")
+
+
+def test_cost_of_an_output(tmp_path: Path) -> None:
+    """By two numbers of outputs of the same steps."""
+    for model in ("catenary", "rod"):
+        few, many = (
+            cpu(lambda e=e, m=model: hybrid.run(touchdown(m, e), tmp_path / "r.h5").close()) for e in (1.0, 0.05)
+        )
+        print(f"{model}: {1e6 * (many - few) / 1900:.0f} us an output of 101 points, file included")
+
+
+def test_before_the_first_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Model, equilibrium, file and first output of `hybrid.run` in a warm process."""
+    from hybrid.simulation.time_loop import TimeLoop
+
+    monkeypatch.setattr(TimeLoop, "to_the_end", lambda self, *_: None)
+    for model in ("catenary", "rod"):
+        print(f"{model}: {1e3 * cpu(lambda m=model: hybrid.run(touchdown(m), tmp_path / 'r.h5').close()):.1f} ms")
+
+
+def test_stepping_from_outside() -> None:
+    """A step of `hybrid.Simulation`, its end set every time, less a step in one call."""
+    end = "ends.end={kind: pinned, position: [205, 0, 0]}"
+    scene = touchdown("catenary", 100.0, "time={duration: 200, step: 0.1}", end)
+
+    def steps(one_by_one: bool) -> float:
+        with hybrid.Simulation(scene) as simulation:
+            simulation.advance(1.0)
+            begin = time.process_time()
+            if one_by_one:
+                for _ in range(1000):
+                    simulation.set_end("end", (205.0, 0.0, 0.0), (0.0, 0.0, 0.0))
+                    simulation.step()
+            else:
+                simulation.advance(101.0)
+            return (time.process_time() - begin) / 1000
+
+    inside, outside = (median(steps(one) for _ in range(RUNS)) for one in (False, True))
+    print(f"{1e6 * inside:.1f} us a step in one call, {1e6 * (outside - inside):.1f} us more from outside")
+
+
+def test_switches_of_zones(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What watching, planning and switching take of a run whose zones move, and a switch."""
+    from hybrid.simulation.transient import Transient
+
+    spent: dict[str, list[float]] = {}
+
+    def timed(key: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def inside(*given: Any) -> Any:
+            begin = time.perf_counter()
+            out = call(*given)
+            spent.setdefault(key, []).append(time.perf_counter() - begin)
+            return out
+
+        return inside
+
+    for method in ("_review_try", "_after_step", "_switch"):
+        monkeypatch.setattr(Transient, method, timed(method, getattr(Transient, method)))
+    for name in ("touchdown", "s_tether", "laying"):
+        scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["output.errors=false"])
+        hybrid.run(scene, tmp_path / "r.h5").close()
+        spent.clear()
+        begin = time.perf_counter()
+        hybrid.run(scene, tmp_path / "r.h5").close()
+        total = time.perf_counter() - begin
+        watching = sum(map(sum, spent.values()))
+        switch = median(spent.get("_switch", [0.0]))
+        print(f"{name}: {100 * watching / total:.1f} % of {total:.2f} s; {1e3 * switch:.2f} ms a switch")

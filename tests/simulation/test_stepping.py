@@ -1,0 +1,190 @@
+"""hybrid.Simulation: stepped from outside it is the run, steps taken back leave nothing, ends go where they are set."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.compile import kernel
+from hybrid.kernels.end_motion import driven_frame, driven_position
+from hybrid.kernels.state import no_moves
+from hybrid.model.driven_end import PATH, DrivenEnd, rotation, rotation_vector
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+PINNED = "ends.end={kind: pinned, position: [205, 0, 0]}"
+
+
+def touchdown(*settings: str) -> hybrid.Scene:
+    usual = ["time={duration: 4, step: 0.05}", "output.every=0.13", "mesh={cells: 30}", "dimension=3"]
+    return hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*usual, *settings])
+
+
+def heave(t: float) -> tuple[list[float], list[float]]:
+    """Place and velocity of the fairlead in examples/touchdown.yaml."""
+    x, w = min(t / 16.0, 1.0), 2.0 * np.pi / 8.0
+    r, dr = x**3 * (10 + x * (6 * x - 15)), 30.0 * x * x * (1 - x) ** 2 / 16.0
+    sine, cosine = np.sin(w * t), np.cos(w * t)
+    return [205.0, 0.0, 2.0 * r * sine], [0.0, 0.0, 2.0 * (r * w * cosine + dr * sine)]
+
+
+def driven(simulation: hybrid.Simulation, steps: int) -> None:
+    for _ in range(steps):
+        t = simulation.t + 0.05
+        simulation.set_end("end", *heave(t))
+        simulation.step()
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary", "{kind: adaptive, tolerance: 2.0e-5}"])
+def test_stepped_from_outside_it_is_the_run(model: str) -> None:
+    run = hybrid.run(touchdown(f"model={model}"))
+    with hybrid.Simulation(touchdown(f"model={model}", PINNED)) as simulation:
+        driven(simulation, 80)
+        assert simulation.t == pytest.approx(4.0, abs=1e-9)
+        result = simulation.result()
+    assert np.array_equal(result.times, run.times)
+    assert np.abs(result.position - run.position).max() < 1e-7
+    assert np.abs(result.tension - run.tension).max() < 1e-6 * run.tension.max()
+    assert len(result["steps/t"]) == len(run["steps/t"])
+
+
+@pytest.mark.parametrize("model", ["rod", "{kind: adaptive, tolerance: 2.0e-5}"])
+def test_what_is_taken_back_leaves_nothing(model: str) -> None:
+    """Every fifth step is taken thrice, with the end elsewhere at first: bit for bit the run without that."""
+    with hybrid.Simulation(touchdown(f"model={model}", PINNED)) as plain:
+        driven(plain, 60)
+        expected = plain.result()
+    with hybrid.Simulation(touchdown(f"model={model}", PINNED)) as simulation:
+        for k in range(60):
+            if k % 5 == 0:
+                saved = simulation.save()
+                for _ in range(2):
+                    place, speed = heave(simulation.t + 0.05)
+                    simulation.set_end("end", [205.0, 0.01, place[2]], speed)
+                    simulation.step()
+                    simulation.restore(saved)
+            driven(simulation, 1)
+        result = simulation.result()
+    for name in expected.names:
+        if "t" in expected.dims(name)[:1]:
+            assert np.array_equal(result[name], expected[name]), name
+    assert np.array_equal(result["steps/dt"], expected["steps/dt"])
+    assert [(e.t, e.kind) for e in result.events] == [(e.t, e.kind) for e in expected.events]
+
+
+def test_what_a_later_save_has_made_final() -> None:
+    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
+        saved = simulation.save()
+        simulation.advance(1.0)
+        simulation.restore(saved)
+        assert simulation.t == 0.0
+        simulation.advance(4.0)
+        simulation.restore(saved)
+        simulation.advance(0.3)
+        simulation.save()
+        simulation.advance(1.0)
+        assert simulation.t == 1.0
+
+
+def test_an_end_that_is_turned_counts_its_turns() -> None:
+    """Three turns of a clamp about a straight rod, 0.3 rad a step: torque GJ 6 pi / L."""
+    line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 5.0, "torsional_stiffness": 4.0}
+    tables = {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [line | {"diameter": 0.02, "damping": {"mass": 1.0, "stiffness": 0.2}}]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]},
+            "end": {"kind": "clamped", "position": [10.01, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]},
+        },
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 80}, "time": {"duration": 40.0, "step": 0.1},
+    }  # fmt: skip
+    with hybrid.Simulation(tables) as simulation:
+        first = np.column_stack([[0.0, 0.0, 1.0], [0.0, -1.0, 0.0], [1.0, 0.0, 0.0]])
+        for k in range(1, 101):
+            angle = 6.0 * np.pi * k / 100
+            simulation.set_end("end", [10.01, 0, 0], frame=rotation(np.array([angle, 0.0, 0.0])) @ first)
+            simulation.step()
+        simulation.advance(40.0)
+        torque = simulation.forces().moment_end
+    assert torque[0] == pytest.approx(-4.0 * 6.0 * np.pi / 10.0, rel=2e-3)
+
+
+def test_a_free_end_is_pulled() -> None:
+    """A hanging chain, its lower end pulled aside by a force: it comes to rest where statics says."""
+    tables: dict[str, Any] = {
+        "cable": {"sections": [{"length": 1.0, "mass": 1.0, "axial_stiffness": 1e4, "damping": {"mass": 6.0}}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, "model": "catenary",
+        "mesh": {"cells": 20}, "time": {"duration": 15.0, "step": 0.02},
+    }  # fmt: skip
+    with hybrid.Simulation(tables) as simulation:
+        simulation.set_force("end", [3.0, 0.0, 0.0])
+        simulation.advance(15.0)
+        assert simulation.forces().end.tolist() == [0.0, 0.0, 0.0]
+        place = simulation.state.position[-1]
+    there = {"kind": "free", "force": [3.0, 0.0, 0.0]}
+    expected = hybrid.static({**tables, "ends": {**tables["ends"], "end": there}}).position[-1, -1]
+    assert np.abs(place - expected).max() < 2e-3
+
+
+def test_what_cannot_be_set_is_refused() -> None:
+    with hybrid.Simulation(touchdown("model=catenary")) as simulation:
+        with pytest.raises(ValueError, match=r"has a motion in the scene"):
+            simulation.set_end("end", [205, 0, 0])
+        with pytest.raises(ValueError, match=r"expected 'start' or 'end', found 'middle'"):
+            simulation.set_end("middle", [205, 0, 0])
+        with pytest.raises(ValueError, match=r"is held: set_end"):
+            simulation.set_force("start", [1, 0, 0])
+        with pytest.raises(ValueError, match=r"position: expected three finite numbers"):
+            simulation.set_end("start", [np.nan, 0, 0])
+        with pytest.raises(ValueError, match=r"until = 5 s, expected a time after 0 s, up to time.duration, 4 s"):
+            simulation.advance(5.0)
+
+
+@kernel
+def _driven(t, moves, position, velocity, frame, spin):
+    (position[0], position[1], position[2]), (velocity[0], velocity[1], velocity[2]) = driven_position(t, 0, moves)
+    f, w = driven_frame(t, 0, moves)
+    for i in range(9):
+        frame[i] = f[i]
+    spin[0], spin[1], spin[2] = w
+
+
+def test_python_and_kernels_move_an_end_alike() -> None:
+    moves, draw = no_moves(), np.random.default_rng(1)
+    end = DrivenEnd(moves.paths[0], draw.normal(size=3), rotation(draw.normal(size=3)), True, True)
+    end.set(1.0, 1.5, draw.normal(size=3), draw.normal(size=3), draw.normal(size=3))
+    end.set(1.2, 1.9, draw.normal(size=3), draw.normal(size=3), draw.normal(size=3))
+    assert moves.paths.shape == (2, PATH)
+    for t in (0.5, 1.2, 1.3, 1.77, 1.9, 4.0):
+        found = [np.zeros(n) for n in (3, 3, 9, 3)]
+        _driven(t, moves, *found)
+        for mine, its in zip(found, end.at(t), strict=True):
+            assert np.abs(mine - np.ravel(its)).max() < 1e-12
+    turn = np.array([0.3, -1.1, 0.7])
+    assert np.abs(rotation_vector(rotation(turn)) - turn).max() < 1e-12
+
+
+def test_a_body_and_a_cable_keep_their_energy() -> None:
+    """The example: what the body loses the cable gains, to 0.1 %."""
+    script = EXAMPLES / "09_coupled_body.py"
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, cwd=Path(__file__).parents[2])
+    assert done.returncode == 0, done.stderr
+    body, work, together = _numbers(done.stdout)
+    assert abs(together) < 1e-3 * abs(body) and body == pytest.approx(-work, rel=1e-3)
+
+
+def _numbers(text: str) -> tuple[float, ...]:
+    words = text.splitlines()[-1].replace(";", " ").replace("J", " ").split()
+    found = []
+    for word in words:
+        try:
+            found.append(float(word))
+        except ValueError:
+            continue
+    return tuple(found)
