@@ -47,8 +47,9 @@ def main(names: list[str]) -> None:
         figure = hybrid.plot(hybrid.run(scene))
         figure.savefig(page, dpi=150)
         shrink(page.getvalue(), PICTURES / f"{name}.png")
-    script = EXAMPLES / "08_python_api.py"
-    if not names or script.stem in names:
+    for script in sorted(EXAMPLES.glob("0*.py")):
+        if names and script.stem not in names:
+            continue
         picture = PICTURES / f"{script.stem}.png"
         runpy.run_path(str(script))["main"](str(picture))
         shrink(picture.read_bytes(), picture)
