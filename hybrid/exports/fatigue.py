@@ -34,6 +34,7 @@ _KEPT = 0.99
 # A touchdown so near to an end of the cable (part of its length) is that end.
 _AT_END = 0.005
 
+_SIDES = (", just before the point", ", just after the point")
 _UNITS = {"tension": "N", "end_force": "N", "curvature": "1/m"}
 
 
@@ -72,7 +73,7 @@ def count(chosen: Part) -> Counted:
             f"{len(part.times)} output{'s have' if len(part.times) > 1 else ' has'} no cycles\n"
             "    try:      a result of `hybrid run`, and a window of time with more outputs"
         )
-    bends = _bends(part)
+    bends = _bends_of(part)
     places = _places(part, bends, asked)
     series = [x for s, name in places.items() for x in _series_at(part, bends, s, name)]
     largest = {q: max((np.abs(x.values).max() for x in series if x.quantity == q), default=0.0) for q in _UNITS}
@@ -103,10 +104,10 @@ def count(chosen: Part) -> Counted:
 # ---- where ----------------------------------------------------------------------------------------
 
 
-def _places(part: Part, bends: np.ndarray, asked: Sequence[float]) -> dict[float, str]:
+def _places(part: Part, bends: _Bends, asked: Sequence[float]) -> dict[float, str]:
     """Arc lengths (m) in their order, and why each is there."""
-    s, result = part.s, part.result
-    largest = np.ptp(_about_main_axis(bends)[0], axis=0)
+    s, result = bends.s, part.result
+    largest = np.ptp(_about_main_axis(bends.vectors)[0], axis=0)
     found = [(s[0], "start"), (s[-1], "end")]
     if "touchdown" in result:
         edges, length = part.array("touchdown"), s[-1] - s[0]
@@ -124,15 +125,33 @@ def _places(part: Part, bends: np.ndarray, asked: Sequence[float]) -> dict[float
     return places
 
 
-def _bends(part: Part) -> np.ndarray:
-    """Curvature as a vector about the axis of the bend (nt, ns, 3), 1/m, inertial."""
-    theta, phi = part.array("theta"), part.array("phi")
+class _Bends(NamedTuple):
+    """Curvature as vectors (nt, n, 3) about the axis of the bend, 1/m, inertial, at s (n,), m; jumps come twice."""
+
+    s: np.ndarray
+    vectors: np.ndarray
+
+    def at(self, s: float) -> np.ndarray:
+        """(nt, 1, 3) at an arc length s, m; (nt, 2, 3), on the left and on the right, where curvature jumps."""
+        exact = np.flatnonzero(np.abs(self.s - s) <= 1e-9 * np.ptp(self.s))
+        if exact.size:
+            return self.vectors[:, exact]
+        k = int(np.clip(np.searchsorted(self.s, s) - 1, 0, len(self.s) - 2))
+        w = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
+        return np.asarray((1.0 - w) * self.vectors[:, k : k + 1] + w * self.vectors[:, k + 1 : k + 2])
+
+
+def _bends_of(part: Part) -> _Bends:
+    """The bends of the outputs that were chosen."""
+    s, curvature = part.result.both_sides("curvature")
+    theta, phi = (part.result.both_sides(name)[1][part.rows] for name in ("theta", "phi"))
     t = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
     axis = np.cross(
         np.concatenate([t[:, :1], t[:, :-1]], axis=1), np.concatenate([t[:, 1:], t[:, -1:]], axis=1), axis=2
     )
     size = np.linalg.norm(axis, axis=2, keepdims=True)
-    return part.array("curvature")[..., None] * np.divide(axis, size, out=np.zeros_like(axis), where=size > 0.0)
+    axis = np.divide(axis, size, out=np.zeros_like(axis), where=size > 0.0)
+    return _Bends(s, curvature[part.rows][..., None] * axis)
 
 
 def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -147,8 +166,8 @@ def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 # ---- what -----------------------------------------------------------------------------------------
 
 
-def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Series]:
-    """End force or tension, and curvature, at one place."""
+def _series_at(part: Part, bends: _Bends, s: float, place: str) -> list[Series]:
+    """End force or tension, and curvature, at one place; of two values the one that has the larger range."""
     result, times = part.result, part.times
     series = []
     end_force = {part.s[0]: "end_force_start", part.s[-1]: "end_force_end"}.get(s, "")
@@ -156,21 +175,21 @@ def _series_at(part: Part, bends: np.ndarray, s: float, place: str) -> list[Seri
         basis = "magnitude of the force that holds the end (of an end body: tension of the last cell), at every step"
         series.append(Series(place, s, "end_force", part.array("steps/t"), part.array(f"steps/{end_force}"), basis))
     else:
-        tension, said = result.at(s=s, names=["tension"], side="left")["tension"][part.rows], "at every output"
-        after = part.after("tension", s)
-        if after is not None:  # the side that is worse
-            worse = np.ptp(after) > np.ptp(tension)
-            tension, said = (after, f"{said}, just after the point") if worse else (tension, f"{said}, just before it")
-        series.append(Series(place, s, "tension", times, tension, said + _error(part, "tension", s)))
-    k = int(np.clip(np.searchsorted(part.s, s, side="right") - 1, 0, len(part.s) - 2))
-    w = (s - part.s[k]) / (part.s[k + 1] - part.s[k])
-    values, share = _about_main_axis((1.0 - w) * bends[:, k : k + 1] + w * bends[:, k + 1 : k + 2])
-    basis = "about the axis it bends most about, at every output; zones: " + _kinds(part, s)
-    if share[0] < _PLANAR:
-        basis += (
-            f"; only {100 * share[0]:.0f} % of its square: it bends about other axes too, and those are not counted"
+        found = [result.at(s=s, names=["tension"], side=side)["tension"][part.rows] for side in ("left", "right")]
+        k = int(np.ptp(found[1]) > np.ptp(found[0]))
+        side = _SIDES[k] if part.after("tension", s) is not None else ""
+        series.append(
+            Series(place, s, "tension", times, found[k], f"at every output{side}" + _error(part, "tension", s, k))
         )
-    series.append(Series(place, s, "curvature", times, values[:, 0], basis + _error(part, "curvature", s)))
+    values, share = _about_main_axis(bends.at(s))
+    k = int(np.ptp(values, axis=0).argmax())
+    side = _SIDES[k] if values.shape[1] > 1 else ""
+    basis = f"about the axis it bends most about, at every output{side}; zones: " + _kinds(part, s)
+    if share[k] < _PLANAR:
+        basis += (
+            f"; only {100 * share[k]:.0f} % of its square: it bends about other axes too, and those are not counted"
+        )
+    series.append(Series(place, s, "curvature", times, values[:, k], basis + _error(part, "curvature", s, k)))
     return series
 
 
@@ -180,11 +199,12 @@ def _kinds(part: Part, s: float) -> str:
     return ", ".join(f"{name} {100 * share:.0f} % of the outputs" for name, share in shares.items() if share)
 
 
-def _error(part: Part, name: str, s: float) -> str:
+def _error(part: Part, name: str, s: float, k: int) -> str:
+    """What is known of an error at a place; k: 0 on the left of a jump, 1 on its right."""
     error, basis = error_name(part, name)
     if not error:
         return "; error not estimated"
-    most = part.result.at(s=s, names=[error])[error][part.rows].max()
+    most = part.result.at(s=s, names=[error], side=("left", "right")[k])[error][part.rows].max()
     return f"; error at most {most:.3g} {_UNITS[name]}, {basis}"
 
 
