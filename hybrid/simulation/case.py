@@ -99,9 +99,7 @@ class Case:
             recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
         return loop, recorder, equilibrium
 
-    def again(
-        self, saved: Tree, loop: TimeLoop, target: Path | io.BytesIO, drive: Callable[[Model], None]
-    ) -> TimeLoop:
+    def again(self, saved: Tree, loop: TimeLoop, target: Path | io.BytesIO, drive: Callable[[Model], None]) -> TimeLoop:
         """The loop of a run as it was at a checkpoint of its own; drive: sets the ends of its model."""
         resolution = loop.run.resolution
         model, switching, correction = restored_parts([self.scene], resolution, saved, self.criterion)

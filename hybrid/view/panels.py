@@ -248,11 +248,12 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     """A quantity over time at the arc lengths s (m).
 
     component: 0, 1, 2 for x, y, z of a vector, drawn as the change since the first output;
-    None for a scalar or the magnitude of a vector. Dotted lines: the zones changed; bands: the estimated error.
+    None for a scalar or the magnitude of a vector. Dotted lines: the zones changed; bands: the estimated error, of the
+    value on the left where there are two; that on the right is dashed.
     """
     if "s" not in result.dims(name):
         raise ResultError(f"'{name}' does not depend on s; plot it as result[{name!r}] over result.times")
-    values = result.at(s=np.asarray(s, dtype=float), names=[name], side="left")[name]
+    values, right = (result.at(s=np.asarray(s, dtype=float), names=[name], side=x)[name] for x in ("left", "right"))
     jumps = result["right/s"] if f"right/{name}" in result else np.zeros(0)
     if component is not None:
         values = values[..., component] - values[0, ..., component]
@@ -262,20 +263,23 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
         label = title_of(name)
         title, caption = f"{label} over time", "At some points of the cable."
-    peak = float(np.abs(values).max())
+    peak = float(np.abs(values).max() if not jumps.size else max(np.abs(values).max(), np.abs(right).max()))
     round_off = STILL * float(np.ptp(result.position, axis=(0, 1)).max()) if label.startswith("Δ") else 0.0
     factor, unit = prefix(result.units[name], max(peak, round_off))
     error, items = error_of(result, name), list[Item]()
     for k, point in enumerate(s):
         if error is not None:
-            at = np.array([np.interp(point, result.s, row) for row in error])
+            at = result.at(s=float(point), names=[_error_name(name)], side="left")[_error_name(name)]
             size = component is None and name in _SIZES
             items.append(_doubt(result.times, values[:, k] * factor, at * factor, size=size))
     for k, point in enumerate(s):
         width = max(1.8 - 0.4 * k, 1.0)  # later curves are thinner, so that coinciding ones all show
         y, label_of = values[:, k] * factor, f"s = {point:.4g} m"
-        label_of += ", before the point" if np.isclose(point, jumps, rtol=0.0, atol=1e-9 * result.s[-1]).any() else ""
-        items.append(Line(result.times, y, label_of, _colour(k), width, symbol="o", last_only=True))
+        two = bool(np.isclose(point, jumps, rtol=0.0, atol=1e-9 * result.s[-1]).any())
+        before = f"{label_of}, before the point" if two else label_of
+        items.append(Line(result.times, y, before, _colour(k), width, symbol="o", last_only=True))
+        if two:
+            items.append(Line(result.times, right[:, k] * factor, f"{label_of}, after it", _colour(k), width, "dash"))
     changes = np.unique(result["zones/t"])[1:]
     if 0 < len(changes) <= MOST_CHANGES:
         items.append(Rule("x", changes.tolist(), "zones changed"))

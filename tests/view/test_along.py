@@ -79,6 +79,14 @@ def test_ranges_have_the_gap_at_all_times(swing: hybrid.Result) -> None:
     assert np.isnan(moving.frames[:, moving.x == CLUMP]).sum() == 11
 
 
+def test_histories_at_a_jump_are_two(swing: hybrid.Result) -> None:
+    curves = lines(panels.history(swing, "tension", [2.0, CLUMP]))
+    assert [x.label for x in curves] == ["s = 2 m", "s = 4.1 m, before the point", "s = 4.1 m, after it"]
+    ratio = curves[2].y[1:] / curves[1].y[1:]
+    assert ratio == pytest.approx(swing["right/tension"][1:, 0] / swing.tension[1:, swing.s == CLUMP][:, 0])
+    assert len(lines(panels.history(swing, "position", [CLUMP], component=0))) == 1
+
+
 def test_pages_and_films_of_jumps_are_made(swing: hybrid.Result, tmp_path: Path) -> None:
     assert hybrid.report(swing, tmp_path / "swing.html").stat().st_size > 1e5
     hybrid.plot(swing, path=tmp_path / "swing.png")
