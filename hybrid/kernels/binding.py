@@ -67,13 +67,13 @@ class Table:
 
     def __init__(self, example: Any) -> None:
         """example: with the types that all values have."""
-        self._places: dict[str, tuple[int, Any]] = {}
+        self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
         self._bound: dict[str, Any] = {}
         self._before: dict[str, tuple[Any, NDArray[np.int64]]] = {}  # what was bound before, and its numbers
         at = 0
         for name, value in example._asdict().items():
             pattern = _pattern(value)
-            self._places[name] = at, pattern
+            self._places[name] = at, at + _size(pattern), pattern
             at += _size(pattern)
         self.numbers: NDArray[np.int64] = np.zeros(at, np.int64)
         self._floats = self.numbers.view(np.float64)
@@ -84,12 +84,11 @@ class Table:
         for name, value in values.items():
             if self._bound.get(name, self) is value:
                 continue
-            at, pattern = self._places[name]
+            at, end, pattern = self._places[name]
             if not isinstance(pattern, tuple):
                 self._put(at, pattern, value, name)
             else:  # two states take turns: what was bound before this one may well come back
                 before = self._before.get(name)
-                end = at + _size(pattern)
                 if name in self._bound:
                     self._before[name] = self._bound[name], self.numbers[at:end].copy()
                 if before is not None and before[0] is value:

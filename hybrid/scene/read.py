@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gc
-import io
 import re
 import warnings
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -15,7 +14,6 @@ from pathlib import Path
 from typing import Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
-from ruamel.yaml import YAML
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import usual_model
@@ -163,13 +161,21 @@ def validate_scene(data: Any) -> Scene:
 
 def scene_text(scene: Scene) -> str:
     """The scene as YAML; `parse_scene` reads it back to an equal scene."""
-    yaml = YAML(typ="safe", pure=True)
-    yaml.default_flow_style = None  # tables in lines, vectors in brackets
-    yaml.sort_base_mapping_type_on_output = False  # type: ignore[assignment]
-    yaml.width = 120
-    out = io.StringIO()
-    yaml.dump(scene.model_dump(mode="json", exclude_none=True), out)
-    return out.getvalue()
+    import yaml
+
+    class Dumper(getattr(yaml, "CSafeDumper", yaml.SafeDumper)):  # type: ignore[misc]  # of C where it was built
+        pass
+
+    Dumper.add_representer(str, _text_in_yaml)
+    data = scene.model_dump(mode="json", exclude_none=True)
+    style: dict[str, Any] = {"default_flow_style": None, "sort_keys": False, "width": 120, "allow_unicode": True}
+    return str(yaml.dump(data, Dumper=Dumper, **style))  # tables in lines, vectors in brackets
+
+
+def _text_in_yaml(dumper: Any, text: str) -> Any:
+    """A text, in quotes where YAML 1.2 would read a number: PyYAML knows those of 1.1 only (1e5 and 0o7 are others)."""
+    quoted = re.fullmatch(r"[-+]?(\d[\d_]*)?\.?\d*([eE][-+]?\d+)?|0o[0-7]+", text) is not None
+    return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if quoted else None)
 
 
 # --- helpers -----------------------------------------------------------------------------------

@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.books import AT_STOP, FLAGS, JUMPED, PAUSED, ROWS, STEPPED, STRETCHED
+from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, PAUSED, ROWS, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -121,13 +121,18 @@ class TimeLoop:
         """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""
         run = self.run
         for code in run.advance(stop):
-            if not self.patient or code == PAUSED:
+            if code in (PAUSED, FAILED) or (code == AT_STOP and not self.patient) or not self._may_wait:
                 self.write_down()
             if code == STEPPED:
                 self.diagnostics.follow(run.model)
                 self._look(int(run.run.count[FLAGS]))
             elif code in (PAUSED, AT_STOP):
                 self._pause()
+
+    @property
+    def _may_wait(self) -> bool:
+        """Whether outputs may wait in the buffer of the run: nothing that they are made of changes."""
+        return self.run.unchanging and not self.observer.writes_criteria
 
     def _settle(self) -> None:
         """After a start: powers of the new state, and its output where one is due."""

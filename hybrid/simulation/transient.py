@@ -133,6 +133,12 @@ class Transient:
         """Whether the last step is done with, and the next not begun."""
         return bool(self.run.count[b.PHASE] == b.BEGIN_STEP)
 
+    @property
+    def unchanging(self) -> bool:
+        """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
+        changes = self._pending is not None or self._leaves or self.correction is not None
+        return not (changes or (self.switching is not None and self.switching.prepares))
+
     # --- the start ------------------------------------------------------------------------------
 
     def begin(self, equilibrium: Equilibrium | None) -> None:
@@ -293,6 +299,7 @@ class Transient:
             self._rescues = 0
         changes = self._pending is not None or self._leaves
         run.count[b.INSIDE] = changes
+        changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
         outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
         if not changes and (at == outputs.size or outputs[at] > end + dt):
             run.count[b.PHASE] = b.END_STEP  # nothing to sample, nothing to change

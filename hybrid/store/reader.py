@@ -84,7 +84,8 @@ class Result:
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
                     name = OLD_NAMES[name]
-                self._dims[name] = tuple(plain_text(d.label) for d in item.dims)
+                labels = item.attrs.get("DIMENSION_LABELS", ("",) * item.ndim)
+                self._dims[name] = tuple(plain_text(label) for label in labels)
                 self.units[name] = plain_text(item.attrs.get("units", ""))
             elif isinstance(item, h5py.Group):
                 groups.add(name)
