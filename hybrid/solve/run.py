@@ -48,7 +48,7 @@ class CompiledRun:
         self.table = Table(blank_job())
         self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
         self.clock, self.count = self.books.clock, self.books.counts
-        self.keeps_extremes = extremes
+        self.keeps_extremes, self._room = extremes, np.zeros(0)
         self.clock[b.RHO], self.clock[b.ALLOWED] = rho, np.inf
         self.clock[b.LEAST_PEAK] = np.inf
         self.states: tuple[State, State]
@@ -66,14 +66,19 @@ class CompiledRun:
         borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh.
         """
         cells = line.h.size
-        rows = max(1, min(ROWS, MOST_SAMPLED // sample_size(cells)))
+        size = sample_size(cells)
+        if not self._room.size:
+            self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
+        rows = max(1, min(ROWS, self._room.size // size))
         nodes, some = cells + 1, self.keeps_extremes
         books = self.books._replace(
             borne=borne, base=first.astype(np.int64),
             strains=np.zeros((nodes, 3) if some else (0, 3)),
         )  # fmt: skip
-        if books.samples.shape != (rows, sample_size(cells)):
-            books = books._replace(samples=np.zeros((rows, sample_size(cells))))
+        if books.samples.shape != (rows, size):  # in the same room, which a new one of some MB would cost a ms
+            if self._room.size < rows * size:
+                self._room = np.zeros(rows * size)
+            books = books._replace(samples=self._room[: rows * size].reshape(rows, size))
         if books.tension.shape[1] != cells:
             books = books._replace(tension=np.zeros((2, cells)))
         if len(books.start) != nodes:
