@@ -233,7 +233,11 @@ class Transient:
                 end = float(clock[b.TRY_END])
                 self.switching.prepare_step(end, end - self.t, self.state)
             elif code == b.TRIED:
-                self._review_try()
+                self._pending = self._review_try()
+                if self._pending is not None:
+                    yield code  # for outputs that wait, of the line as it was
+                    self._switch(self._pending)
+                    self._pending = None
             elif code == b.STEPPED:
                 self._after_step()
                 if count[b.FLAGS]:
@@ -265,8 +269,8 @@ class Transient:
             self.run.clock[b.ALLOWED] = LONGEST_IN_PACE * switching.manager.pace * (1.0 if blending else READY)
         count[b.ASKS] = asks
 
-    def _review_try(self) -> None:
-        """A try has ended: more rod, and the step again, where zones ask for it or the step failed."""
+    def _review_try(self) -> Change | None:
+        """A try has ended: more rod, and the step again, where zones ask for it or the step failed; None: as it is."""
         run, switching = self.run, self.switching
         assert switching is not None
         clock, count, tried = run.clock, run.count, run.tried
@@ -279,7 +283,7 @@ class Transient:
             clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW] if change is not None else clock[b.TRIED_DT]
         if change is not None:
             count[b.WASTED] += tried.iterations
-            self._switch(change)
+        return change
 
     def _after_step(self) -> None:
         """A step is accepted: what zones put in is booked, the model error followed, and what is to change decided."""
