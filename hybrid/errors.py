@@ -92,6 +92,9 @@ class Outcome(IntEnum):
 EVENTS_BY_WEIGHT = (
     "gains energy",
     "implausible",  # a wrong unit, from which everything else may follow
+    "bend radius below limit",
+    "tension above limit",
+    "tension below limit",
     "accuracy missed",
     "no error figure",
     "error uncertain",
@@ -117,11 +120,18 @@ EVENTS_BY_WEIGHT = (
     "zones fixed",
     "static friction neglected",
     "end rotated in",
+    "envelope incomplete",
     "other program",
     "events omitted",
 )
 
 
+# Limits of a section by their keys in the scene, and the kinds of events where they are broken.
+LIMIT_EVENTS = {
+    "min_bend_radius": "bend radius below limit",
+    "max_tension": "tension above limit",
+    "min_tension": "tension below limit",
+}
 # Changes of zones: part of a normal run.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
 # All kinds that are part of a normal run: changes of zones, and changes of loads that `resume` was asked for.

@@ -68,8 +68,9 @@ CLOCK_SIZE = 35
     STIFF,  # 1 where no cell stretches
     QUOTA,  # steps until the call returns
     MEASURED,  # steps of which `worst` knows
-) = range(23)  # fmt: skip
-COUNT_SIZE = 23
+    NEW_STATE,  # 1 where the state of a START counts among the extremes
+) = range(24)  # fmt: skip
+COUNT_SIZE = 24
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -92,7 +93,9 @@ WORST = 3
 
 # --- extremes ----------------------------------------------------------------------------------------
 
-# Rows of `extremes`; tension belongs to cells, the rest to nodes.
+# Bits of `marks`: what a node has.
+LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
+# Rows of `extremes`.
 TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT = range(6)
 EXTREMES = 6
 
@@ -118,7 +121,9 @@ class Books(NamedTuple):
     samples: Floats  # (rows, sample_size(N))
     strains: Floats  # (N+1, 3) of elements: curvature (1/m), bending moment (N m), torque (N m); empty: not wanted
     start: Floats  # (N+1, 3) m, positions from which displacements count
-    extremes: Floats  # (4, EXTREMES, N+1) lowest, highest, and their times (s); empty: not wanted
+    marks: NDArray[np.int8]  # (N+1,)
+    right: NDArray[np.int64]  # (N+1,) column of `extremes` for the value just after a node; of K marked nodes behind N
+    extremes: Floats  # (4, EXTREMES, N+1+K) lowest, highest, and their times (s); empty: not wanted
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,

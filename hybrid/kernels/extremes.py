@@ -1,20 +1,31 @@
-"""Extremes over all accepted steps: of tension, curvature, moment, torque, contact force, displacement, at every node."""
+"""Extremes over all accepted steps: of tension, curvature, moment, torque, contact force, displacement, at every node.
+
+Where a quantity may have two values, at point loads and changes of section, the one on the right has a column of its own
+(books.right).  They follow the rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and
+taken on both sides of a point load; at the ends it is the pull of what holds them.  A catenary has the curvature of the
+circle that two of its chords are tangents of; its ends, and point loads and joints, which may be kinks, have what its
+inner nodes lead to.
+"""
 
 from __future__ import annotations
 
 import math
 
-from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, TENSION, TORQUE
+from hybrid.kernels.assembly import get9
+from hybrid.kernels.books import CURVATURE, DISPLACEMENT, LOADED, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.rotations import cross, dot, sub
+from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
+from hybrid.kernels.rotations import add, cross, dot, scale, sub
+from hybrid.kernels.seabed import pressure
 
 
 @inner
 def widen(extremes, what, i, x, t):
-    """Widen the range of a quantity at node (or cell) i to x, found at time t."""
+    """Widen the range of a quantity in column i to x, found at time t."""
     if x < extremes[0, what, i]:
         extremes[0, what, i], extremes[2, what, i] = x, t
     if x > extremes[1, what, i]:
@@ -22,8 +33,64 @@ def widen(extremes, what, i, x, t):
 
 
 @inner
-def catenary_curvature(line, state, i):
-    """Curvature, 1/m, of a line without element at node i: of the circle that its two chords are tangents of."""
+def note(books, what, i, x, t):
+    """A quantity that has one value at node i."""
+    widen(books.extremes, what, i, x, t)
+    if books.right[i] != i:
+        widen(books.extremes, what, books.right[i], x, t)
+
+
+@inner
+def beyond(T, h, near, far):
+    """Tension where cell `near` ends, from the middles of two neighbours."""
+    return T[near] + (T[near] - T[far]) * h[near] / (h[near] + h[far])
+
+
+@inner
+def end_tension(line, ends, state, report, loaded, k):
+    """Tension at an end: the force of what holds or loads it along the tangent; of an end body, that of the cable."""
+    n = line.h.shape[0]
+    first = k * (n - 1)
+    second = first + 1 - 2 * k if n > 1 else first
+    if loaded[k]:
+        return beyond(state.T, line.h, first, second)
+    d, _, _ = chord(get3(state.e, first))
+    d2, _, _ = chord(get3(state.e, second))
+    t = sub(scale(1.5, d), scale(0.5, d2))
+    if line.element[k * n]:
+        R = get9(ends.frame, k)
+        t = (R[2], R[5], R[8])
+    f = scale(2.0 * k - 1.0, get3(ends.force, k))
+    if ends.held[k]:
+        at = FORCE_A + 3 * k
+        f = scale(1.0 - 2.0 * k, (report[at], report[at + 1], report[at + 2]))
+    return dot(f, t) / math.sqrt(dot(t, t))
+
+
+@inner
+def note_tension(line, ends, state, books, t):
+    T, h, n = state.T, line.h, line.h.shape[0]
+    for k in range(2):
+        note(books, TENSION, k * n, end_tension(line, ends, state, books.report[0], books.loaded, k), t)
+    for i in range(1, n):
+        if books.marks[i] & LOADED:
+            left, right = max(i - 2, 0), min(i + 1, n - 1)
+            widen(books.extremes, TENSION, i, beyond(T, h, i - 1, left), t)
+            widen(books.extremes, TENSION, books.right[i], beyond(T, h, i, right), t)
+        else:
+            note(books, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t)
+
+
+@inner
+def is_smooth(line, marks, i):
+    """Whether node i lies inside a catenary, away from loads."""
+    n = line.h.shape[0]
+    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i] & LOADED
+
+
+@inner
+def of_chords(line, state, i):
+    """Curvature, 1/m, at node i of the circle that its two chords are tangents of."""
     d, _, _ = chord(get3(state.e, i - 1))
     dn, _, _ = chord(get3(state.e, i))
     s = cross(d, dn)
@@ -31,20 +98,106 @@ def catenary_curvature(line, state, i):
 
 
 @inner
-def note_extremes(line, sea, state, books, t):
-    """Widen the extremes to the state at time t; books.strains: of its elements."""
-    extremes, n = books.extremes, line.h.shape[0]
+def note_catenary(line, state, books, i, t):
+    """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
+    if is_smooth(line, books.marks, i):
+        note(books, CURVATURE, i, of_chords(line, state, i), t)
+        return
+    n = line.h.shape[0]
+    for side in (-1, 1):
+        cell = i - 1 if side < 0 else i
+        if cell < 0 or cell == n or line.spin[cell]:
+            continue
+        x = 0.0
+        if is_smooth(line, books.marks, i + side):
+            x = of_chords(line, state, i + side)
+            if is_smooth(line, books.marks, i + 2 * side) and is_smooth(line, books.marks, i + 3 * side):
+                there = of_chords(line, state, i + 2 * side)
+                far = abs(line.s[i + side] - line.s[i]) / abs(line.s[i + 2 * side] - line.s[i + side])
+                x = max(0.0, x + far * (x - there))
+        widen(books.extremes, CURVATURE, i if side < 0 else books.right[i], x, t)
+
+
+@inner
+def note_rod_end(line, ends, state, books, i, t):
+    """Curvature, moment and torque where a rod has no element: those of the moment that is given, at a joint none.
+
+    Where the rod is curved without load and a moment is given, the curvature is the largest that both can have.
+    """
+    n = line.h.shape[0]
+    for side in (-1, 1):
+        cell = i - 1 if side < 0 else i
+        if cell < 0 or cell == n or not line.spin[cell]:
+            continue
+        d, _, _ = chord(get3(state.e, cell))
+        torque, moment = 0.0, 0.0
+        if i == 0 or i == n:
+            m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
+            torque = dot(m, d)
+            across = add(m, scale(-torque, d))
+            moment = math.sqrt(dot(across, across))
+        j, curvature = i + side, 0.0
+        if line.element[j]:
+            curvature = math.sqrt(line.k0[j, 0] ** 2 + line.k0[j, 1] ** 2) / line.hn[j]
+            stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+            if stiffness > 0.0:
+                curvature += moment / stiffness
+        at = i if side < 0 else books.right[i]
+        widen(books.extremes, CURVATURE, at, curvature, t)
+        widen(books.extremes, MOMENT, at, moment, t)
+        widen(books.extremes, TORQUE, at, torque, t)
+
+
+@inner
+def note_element(line, books, i, t):
+    """Curvature, moment and torque at an element; where sections meet, the curvature of both: the moment is one.
+
+    (Where the stiffness differs, and the cable is curved without load as well, the curvature of a side is the largest
+    that this can be.)
+    """
+    curvature, moment = books.strains[i, 0], books.strains[i, 1]
+    note(books, MOMENT, i, moment, t)
+    note(books, TORQUE, i, books.strains[i, 2], t)
+    if not (books.marks[i] & SEAM):
+        note(books, CURVATURE, i, curvature, t)
+        return
+    own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
+    for j in (i - 1, i + 1):
+        stiffness = min(line.kb[j, 0], line.kb[j, 1]) * line.hn[j]
+        x = curvature
+        if line.element[j] and own > 0.0 and stiffness > 0.0:
+            x = max(0.0, x + moment * (1.0 / stiffness - 1.0 / own))
+        widen(books.extremes, CURVATURE, i if j < i else books.right[i], x, t)
+
+
+@inner
+def first_strains(plane, space, line, ends, state, books):
+    """Strains of a state that no step has led to."""
+    if space is not None:
+        sharpest_in_space(line, ends, state.e, state.T, state.a1, books.strains)
+    if plane is not None:
+        sharpest_in_plane(line, ends, state.e, state.T, state.a1, books.strains)
+
+
+@inner
+def note_extremes(line, sea, ends, state, books, t):
+    """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
+    n = line.h.shape[0]
     normal = get3(sea.normal.reshape(1, 3), 0)
+    note_tension(line, ends, state, books, t)
     for i in range(n + 1):
-        if i < n:
-            widen(extremes, TENSION, i, state.T[i], t)
-        curvature = books.strains[i, 0]
-        if not line.element[i] and 0 < i < n:
-            curvature = catenary_curvature(line, state, i)
-        widen(extremes, CURVATURE, i, curvature, t)
-        widen(extremes, MOMENT, i, books.strains[i, 1], t)
-        widen(extremes, TORQUE, i, books.strains[i, 2], t)
+        if line.element[i]:
+            note_element(line, books, i, t)
+        else:
+            note_catenary(line, state, books, i, t)
+            if line.spin[max(i - 1, 0)] or line.spin[min(i, n - 1)]:
+                note_rod_end(line, ends, state, books, i, t)
+            else:
+                note(books, MOMENT, i, 0.0, t)
+                note(books, TORQUE, i, 0.0, t)
         if line.bits & SEABED:
-            widen(extremes, PRESSURE, i, dot(normal, get3(state.bed, i)) / line.hn[i], t)
+            p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
+            q, _, _ = pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)
+            note(books, PRESSURE, i, q, t)
         x = sub(get3(state.r, i), get3(books.start, i))
-        widen(extremes, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
+        note(books, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)

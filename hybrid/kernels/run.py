@@ -34,6 +34,7 @@ from hybrid.kernels.books import (
     LAST_DT,
     LOG,
     MUTE_CUTS,
+    NEW_STATE,
     NOW,
     PARITY,
     PAUSED,
@@ -61,7 +62,7 @@ from hybrid.kernels.books import (
 )
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
-from hybrid.kernels.extremes import note_extremes
+from hybrid.kernels.extremes import first_strains, note_extremes
 from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
 from hybrid.kernels.powers import find_powers
 from hybrid.kernels.report import REPORT_SIZE
@@ -106,7 +107,9 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
         report=z((3, REPORT_SIZE)), tension=z((2, cells)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
-        samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), extremes=z((4, 0, nodes)),
+        samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
+        right=np.arange(nodes),
+        extremes=z((4, 0, nodes)),
     )  # fmt: skip
 
 
@@ -141,7 +144,7 @@ def conclude(line, sea, ends, old, new, books, work, pushed):
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
             count[FLAGS] |= STEPS_CUT
         if books.extremes.shape[1] > 0:
-            note_extremes(line, sea, new, books, clock[NOW])
+            note_extremes(line, sea, ends, new, books, clock[NOW])
         if count[FLAGS] != 0 or count[ASKS] & ASK_STEPS:
             return STEPPED
     return -1
@@ -154,6 +157,9 @@ def between_steps(plane, space, job, old, new):
     if count[PHASE] == START:
         find_powers(job.line, job.ends, job.books.velocity, new, job.books.report[0], job.books.power[0])
         keep_imposed(job.ends, job.books.imposed)
+        if count[NEW_STATE] and job.books.extremes.shape[1] > 0:
+            first_strains(plane, space, job.line, job.ends, new, job.books)
+            note_extremes(job.line, job.sea, job.ends, new, job.books, clock[NOW])
         count[PHASE] = count[AFTER_START]
     if count[PHASE] == SAMPLE:
         if not sample_step(plane, space, job.line, job.sea, old, new, job.books):

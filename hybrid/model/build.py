@@ -84,6 +84,13 @@ class Model:
         return int(self.line.h.size)
 
     @property
+    def loaded_ends(self) -> tuple[bool, bool]:
+        """Whether there is a point load at the start, and at the end."""
+        near = 1e-9 * self.length
+        start, end = (any(abs(x - s) < near for x in self.attached) for s in (0.0, self.length))
+        return start, end
+
+    @property
     def time_scale(self) -> float:
         """A time typical of the scene, s: that of a transverse wave along the line at the tension scale."""
         return float(np.sqrt(self.line.mass.sum() * self.length / self.tension_scale))

@@ -9,6 +9,12 @@ import numpy as np
 
 from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
 
+# Limits that a section may have and that only reports ask for: unit, what it is, the stricter one of two.
+SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {
+    "min_bend_radius": ("m", "smallest bend radius allowed", np.fmax),
+    "max_tension": ("N", "largest tension allowed", np.fmin),
+    "min_tension": ("N", "smallest tension allowed", np.fmax),
+}
 # Poisson's ratio of a solid round section, used where a rod's torsional stiffness is not given.
 POISSON = 0.3
 
@@ -16,7 +22,7 @@ POISSON = 0.3
 def merged_sections(sections: Sequence[Section]) -> list[Section]:
     """Neighbouring sections that differ in nothing but length, and in what only reports ask for, are one section."""
     merged: list[Section] = []
-    for section in (x.model_copy(update={"min_bend_radius": None}) for x in sections):
+    for section in (x.model_copy(update=dict.fromkeys(SECTION_LIMITS)) for x in sections):
         if merged and merged[-1].model_copy(update={"length": section.length}) == section:
             merged[-1] = section.model_copy(update={"length": merged[-1].length + section.length})
         else:
@@ -38,9 +44,17 @@ def bending_stiffness(section: Section) -> tuple[float, float]:
     return b if isinstance(b, tuple) else (b, b)
 
 
-def allowed_radius(scene: Scene, s: np.ndarray) -> np.ndarray:
-    """Smallest bend radius allowed (ns,) m at arc lengths s (m); NaN where none is given; the larger one at a seam."""
-    return _along(scene, s, [x.min_bend_radius or np.nan for x in scene.cable.sections], np.fmax)
+def limits_along(scene: Scene, s: np.ndarray) -> dict[str, np.ndarray]:
+    """Limits (ns,) of the sections at arc lengths s (m), by name: those that the scene gives at all.
+
+    NaN where none is given; the stricter one at a seam.
+    """
+    found = {}
+    for name, (_, _, stricter) in SECTION_LIMITS.items():
+        values = [getattr(x, name) for x in scene.cable.sections]
+        if any(x is not None for x in values):
+            found[name] = _along(scene, s, [np.nan if x is None else x for x in values], stricter)
+    return found
 
 
 def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:

@@ -167,6 +167,16 @@ class Section(Table):
         description="smallest bend radius allowed; changes nothing that is computed: reports say how near the cable "
         "comes to it; absent: none [m]",
     )
+    max_tension: Positive | None = Field(
+        default=None,
+        description="largest tension allowed (minimum breaking load over the safety factor, say); changes nothing that "
+        "is computed; absent: none [N]",
+    )
+    min_tension: Number | None = Field(
+        default=None,
+        description="smallest tension allowed, 0 where the cable must not be slack, negative for a compression that it "
+        "bears; changes nothing that is computed; absent: none [N]",
+    )
     rotary_inertia: OneOrTwo | None = Field(
         default=None,
         description="rotary inertia per length: transverse, or [transverse, polar]; "
@@ -210,6 +220,13 @@ class Section(Table):
                 f"of {least:g} to {most:g} kg/m^3; this one is {density:.3g} kg/m^3"
             )
             refuse([Finding(("mass",), expected, _other_units(density, self.mass, self.diameter))])
+        return self
+
+    @model_validator(mode="after")
+    def _limits_leave_room(self) -> Section:
+        if self.min_tension is not None and self.max_tension is not None and self.min_tension >= self.max_tension:
+            expected = f"a tension below max_tension, {self.max_tension:g} N"
+            refuse([Finding(("min_tension",), expected, "are the two exchanged?")])
         return self
 
     @model_validator(mode="after")

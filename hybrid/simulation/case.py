@@ -91,9 +91,11 @@ class Case:
         """The loop of a run, its result, and the equilibrium that it starts from; kept: as `before` of `Recorder`."""
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, target)
+        assert loop.run.envelope is not None
         recorder = result_recorder(
-            self.scene, model, loop.observer, target, self._texts, equilibrium, len(output_times(self.scene)), kept
-        )
+            self.scene, model, loop.observer, target, self._texts, equilibrium, loop.run.envelope,
+            len(output_times(self.scene)), kept,
+        )  # fmt: skip
         recorder.files = self._files
         if switching is not None and switching.manager.held:
             recorder.event(0.0, 0.0, model.length, "zones fixed", ZONES_FIXED)
@@ -122,9 +124,11 @@ class Case:
                 loop.restore(point.state)
                 if not point.t <= loop.run.t <= self.scene.require_time().duration:
                     raise ValueError(f"t = {loop.run.t:g} s after an output at {point.t:g} s")
+            assert loop.run.envelope is not None
             loop.recorder = recorder = Recorder.again(
-                file, target, loop.observer.fields, STEP_FIELDS, point, self._texts, before or {}
-            )
+                file, target, loop.observer.fields, STEP_FIELDS, point, self._texts, before or {},
+                loop.run.envelope.fixed(),
+            )  # fmt: skip
         recorder.files = self._files
         with recorder:
             if point.program != program():
@@ -276,7 +280,7 @@ class Case:
         times = output_times(self.scene)
         if target is None and resolution.every > 1:
             times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
-        run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times])
+        run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times], target is not None)
         if points is None:
             points = self.points.s
         observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)

@@ -40,6 +40,10 @@ class DeferredRecorder:
         """An event, as of `Recorder.event`."""
         self._waiting.append(("event", event, more))
 
+    def replace(self, values: Mapping[str, np.ndarray]) -> None:
+        """Values as of `Recorder.replace`, of which the last count."""
+        self._recorder.replace(values)
+
     # --- what a Simulation asks of it -----------------------------------------------------------
 
     def mark(self) -> int:

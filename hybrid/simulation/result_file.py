@@ -12,9 +12,10 @@ from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
-from hybrid.model.sections import allowed_radius, weakest_bending
+from hybrid.model.sections import SECTION_LIMITS, limits_along, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
+from hybrid.simulation.envelope import Envelope
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
@@ -43,19 +44,21 @@ def result_recorder(
     target: Path | io.BytesIO,
     texts: Mapping[str, str],
     found: Equilibrium | None,
+    envelope: Envelope,
     outputs: int = 0,
     before: Tree | None = None,
 ) -> Recorder:
     """A new result, in a file or in memory; whether a file may be replaced was asked before anything was computed.
 
-    found: the equilibrium at the start; outputs: after the first, 0 of an equilibrium; before: as of `Recorder`.
+    found: the equilibrium at the start; envelope: of what is computed, its values not yet known; outputs: after the
+    first, 0 of an equilibrium; before: as of `Recorder`.
     """
     attributes: dict[str, str | float | int] = {
         "title": scene.title, "cells": model.cells, "length": model.length, "tension_scale": model.tension_scale,
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
-    fixed = [*_surroundings(model), *_limits(scene, observer)]
+    fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed()]
     if scene.output.history:
         points = np.array(scene.output.history)
         fixed.append(
@@ -112,7 +115,7 @@ def _neglected_clamps(scene: Scene, model: Model) -> Iterator[tuple[float, str]]
 
 
 def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
-    """What reports hold bends and torques against: the bend radius allowed, and of rods the bending stiffness.
+    """What reports hold a result against: limits of the sections, and of rods the bending stiffness.
 
     At jumps that of the section on the left, and in right/* of the one on the right, as of what they are held against.
     """
@@ -122,9 +125,9 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
     places = [("s", "", left), ("right/s", "right/", jumps + beside)][: 1 + bool(jumps.size)]
     out: list[tuple[Field, np.ndarray]] = []
     for dim, prefix, s in places:
-        if any(x.min_bend_radius for x in scene.cable.sections):
-            name, text = f"{prefix}min_bend_radius", "smallest bend radius allowed; NaN: none"
-            out.append((Field(name, "m", text, s.shape, (dim,), nan_ok=True), allowed_radius(scene, s)))
+        for name, values in limits_along(scene, s).items():
+            unit, text, _ = SECTION_LIMITS[name]
+            out.append((Field(f"{prefix}{name}", unit, f"{text}; NaN: none", s.shape, (dim,), nan_ok=True), values))
         if any(field.name == "torque" for field in observer.fields):
             name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
             out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))

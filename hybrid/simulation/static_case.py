@@ -23,6 +23,7 @@ from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Diagnostics, stretch_text
+from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, RunSample, compared_cells
 from hybrid.simulation.events import EventLog
@@ -45,7 +46,8 @@ class StaticCase:
         model, found, switching = self._equilibrium(resolution)
         observer = self._observer(model)
         texts = {"scene": scene_text(self.scene)}
-        with result_recorder(self.scene, model, observer, target, texts, found) as recorder:
+        envelope = Envelope(self.scene, model, moves=False)
+        with result_recorder(self.scene, model, observer, target, texts, found, envelope) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
             diagnostics = Diagnostics(model, events)
             diagnostics.begin()
@@ -63,6 +65,9 @@ class StaticCase:
                 raise ComputationError(stop[0], None, float(model.line.s[stop[1]]), detail)
             values = _values(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
+            reached = of_equilibrium(envelope, self.scene, model, found)
+            recorder.replace(reached)
+            envelope.note_broken(reached, recorder.event)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")
         return _sample(resolution, model, values, clock.process_time() - begin)
 

@@ -242,8 +242,7 @@ class Simulation:
         """Write what is left and close the file; a second call does nothing."""
         self._loop.write_down(everything=True)
         self._recorder.commit()
-        self._loop.diagnostics.finish(self._loop.run.run)
-        self._loop.run.events.write_to(self._recorder)
+        self._loop.finish()
         self._recorder.close("complete", f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s")
 
     def __enter__(self) -> Simulation:
@@ -255,6 +254,7 @@ class Simulation:
         else:
             self._loop.write_down(everything=True)
             self._recorder.commit()
+            self._loop.write_envelope()
             self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
 
     def _end(self, end: str) -> int:

@@ -96,9 +96,21 @@ class TimeLoop:
     def close(self) -> None:
         """The run is complete: a last checkpoint, what is to be said of all of it, and the file is closed."""
         self._checkpoint(at_once=True)
-        self.diagnostics.finish(self.run.run)
-        self.run.events.write_to(self.recorder)
+        self.finish()
         self.recorder.close("complete", f"{self.run.steps} steps")
+
+    def finish(self) -> None:
+        """After the last step: the envelope, what is to be said of all of the run, and limits that are broken."""
+        run = self.run
+        self.write_envelope()
+        self.diagnostics.finish(run.run)
+        if run.envelope is not None:
+            run.envelope.note_broken(run.envelope_values(), run.events.event)
+        run.events.write_to(self.recorder)
+
+    def write_envelope(self) -> None:
+        """Extremes up to now, for the file; where none are kept, nothing."""
+        self.recorder.replace(self.run.envelope_values())
 
     def until(self, end: float, exact: bool) -> None:
         """Steps end where ends are let go, and, if their length is controlled, where loads have grown."""
@@ -147,6 +159,7 @@ class TimeLoop:
             self._checkpoint()
         if self._interrupted():
             self._log()
+            self.write_envelope()
             run.events.write_to(self.recorder)
             self.recorder.close("interrupted", f"stopped from outside at t = {run.t:.6g} s")
             raise KeyboardInterrupt
@@ -222,6 +235,7 @@ class TimeLoop:
         self._log()
         if run.t > self.recorder.last:
             self._record_now()
+        self.write_envelope()
         run.events.event(run.t, s, s, tried.outcome.name.lower(), str(error))
         run.events.write_to(self.recorder)
         raise error from None
@@ -236,6 +250,7 @@ class TimeLoop:
             self._log()
             here = self.run.steps, self.run.changes
             new = isinstance(self.target, Path) and here != self._kept
+            self.write_envelope()
             recorder.flush(self._content if new else None)
             self._kept = here if new else self._kept
 

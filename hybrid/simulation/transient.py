@@ -28,6 +28,7 @@ from hybrid.model.resolution import Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import borne_strain
+from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.restore import mesh_tree
@@ -64,20 +65,24 @@ class Transient:
         correction: Correction | None,
         events: EventLog,
         outputs: Sequence[float] = (),
+        extremes: bool = False,
     ) -> None:
-        """It has no state before `begin` or `restore`.  outputs: s, increasing, times of samples."""
+        """It has no state before `begin` or `restore`.  outputs: s, increasing, times of samples; extremes: whether
+
+        lowest and highest values of all accepted steps are kept.
+        """
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self._beyond = switching, correction, -np.inf
-        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes=False)
+        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes)
+        self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
         self._turned = False  # whether an event has told of steps cut by the turn of an end
         self._pending: Change | None = None
         self._leaves, self._rescues = False, 0
-        near = 1e-9 * model.length
-        self.run.books.loaded[:] = [any(abs(x - s) < near for x in model.attached) for s in (0.0, model.length)]
+        self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
         self._set_model(model, model.start)
@@ -152,6 +157,8 @@ class Transient:
         else:
             state = equilibrium.state.copy()
         begun = self.plane_monitor.begin(model, state, self._note)
+        if self.envelope is not None:
+            self.envelope.count_from(begun, state.r)
         self._set_model(begun, state)
         self._find_accelerations()
         if self.switching is not None:
@@ -160,7 +167,7 @@ class Transient:
             with_friction = equilibrium is not None and equilibrium.with_friction
             self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
         first = slice(None) if model.layout is None else model.layout.first
-        self.run.begin(state.r[first].copy())
+        self.run.place(state.r[first].copy())
 
     def _rotate_ends_in(self, state: State) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
@@ -199,7 +206,7 @@ class Transient:
         run.clock[b.STORED] = self.stepper.told[SEABED_ENERGY]
         run.books.velocity[:] = self.model.ends.velocity
         run.clock[b.PREVIOUS] = run.clock[b.NOW]
-        run.count[b.PHASE], run.count[b.AFTER_START] = b.START, b.SAMPLE
+        run.count[b.PHASE], run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.START, b.SAMPLE, 1
 
     def restart(self) -> None:
         """A load has just stopped, or others act: accelerations jump."""
@@ -376,7 +383,8 @@ class Transient:
         if self.correction is not None:
             self.correction.switch(model)
         self._evaluate_forces()
-        run.count[b.AFTER_START] = b.TRY if trying else b.SAMPLE
+        if trying:  # the step before is done with: its state was looked at as it was then
+            run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
 
     def change_loads(self, scene: Scene) -> None:
         """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
@@ -409,6 +417,8 @@ class Transient:
 
     def _set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
+        if self.envelope is not None:
+            self.envelope.fold(self.model.line.s, self.run.books.extremes)
         self.model = model
         if self.switching is not None:
             self.switching.model = model
@@ -417,7 +427,10 @@ class Transient:
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
             self.stepper.limits, state, 1.0 + borne_strain(model), first,
+            marks_of(self.scene, model),
         )  # fmt: skip
+        if self.envelope is not None:
+            self.run.books.start[:] = self.envelope.start_of(model.line.s)
         self.plane_monitor.attach(self.run, model.line)
 
     def _note(self, node: int, kind: str, text: str) -> None:
@@ -443,6 +456,7 @@ class Transient:
             "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if self.controlled else None,
             "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
             "push": self.plane_monitor.checkpoint(self.run),
+            "envelope": self.envelope and self.envelope.checkpoint(books.extremes),
         }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
@@ -456,8 +470,10 @@ class Transient:
         state = blank_state(model.cells)
         self._set_model(model, state)
         complete = "report" in saved  # not in a checkpoint of 0.6
-        template = self.checkpoint() | {"mesh": None, "plane": None, "report": np.full((2, REPORT_SIZE), np.inf)}
+        free = dict.fromkeys(("mesh", "plane", "envelope"))
+        template = self.checkpoint() | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
         older = {"report": run.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
+        older |= {"envelope": None}
         saved = matched(older | dict(saved), template, "state")
         clock, count, books = run.clock, run.count, run.books
         clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
@@ -487,9 +503,30 @@ class Transient:
         if self.correction is not None:
             self.correction.restore(saved["correction"], model.ends.values)
         count[b.OUTPUT] = np.searchsorted(books.outputs, self.t + SAME_TIME * saved["dt"], side="right")
+        self._restore_envelope(saved["envelope"])
         if not complete:
             self._evaluate_forces()
         count[b.PHASE] = b.BEGIN_STEP
+
+    def _restore_envelope(self, saved: Mapping[str, Any] | None) -> None:
+        """Extremes up to here; where the checkpoint has none they begin here, and an event says so."""
+        envelope, books, nodes = self.envelope, self.run.books, self.model.line.s
+        if envelope is None:
+            return
+        if saved is None:
+            envelope.begin = self.t
+            envelope.count_from(self.model, self.state.r)
+            text = f"the file has no extremes of the steps before t = {self.t:.6g} s: the envelope is of those after it"
+            self.events.event(self.t, 0.0, self.model.length, "envelope incomplete", text)
+        else:
+            envelope.restore(saved, books.extremes)
+        books.start[:] = envelope.start_of(nodes)
+
+    def envelope_values(self) -> dict[str, np.ndarray]:
+        """Values of the envelope in the file, up to now; none where no extremes are kept."""
+        if self.envelope is None:
+            return {}
+        return self.envelope.values(self.model.line.s, self.run.books.extremes, self.t)
 
     def _restore_control(self, saved: Mapping[str, Any]) -> None:
         clock, largest = self.run.clock, self.resolution.step

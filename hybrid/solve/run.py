@@ -59,11 +59,13 @@ class CompiledRun:
 
     def attach(
         self, line: Line, sea: Sea, ends: Ends, moves: Moves, work: Work, limits: Limits, state: State, borne: Floats,
-        first: np.ndarray,
+        first: np.ndarray, marks: np.ndarray,
     ) -> None:  # fmt: skip
         """Go on with a line (as at the start, after a change of zones, in space after a plane) from `state`.
 
-        borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh.
+        borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh; marks: (N+1,) of
+        kernels.books, what nodes have.  Extremes are kept anew; displacements count
+        from `books.start`, which the caller fills.
         """
         cells = line.h.size
         size = sample_size(cells)
@@ -71,9 +73,13 @@ class CompiledRun:
             self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
         rows = max(1, min(ROWS, self._room.size // size))
         nodes, some = cells + 1, self.keeps_extremes
+        marked = np.flatnonzero(marks)
+        right = np.arange(nodes)
+        right[marked] = nodes + np.arange(marked.size)
         books = self.books._replace(
-            borne=borne, base=first.astype(np.int64),
-            strains=np.zeros((nodes, 3) if some else (0, 3)),
+            borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 3) if some else (0, 3)), marks=marks,
+            right=right, start=np.zeros((nodes, 3)),
+            extremes=no_extremes(nodes + marked.size) if some else np.zeros((4, 0, nodes)),
         )  # fmt: skip
         if books.samples.shape != (rows, size):  # in the same room, which a new one of some MB would cost a ms
             if self._room.size < rows * size:
@@ -81,9 +87,6 @@ class CompiledRun:
             books = books._replace(samples=self._room[: rows * size].reshape(rows, size))
         if books.tension.shape[1] != cells:
             books = books._replace(tension=np.zeros((2, cells)))
-        if len(books.start) != nodes:
-            extremes = no_extremes(nodes) if some else np.zeros((4, 0, nodes))
-            books = books._replace(extremes=extremes, start=state.r.copy())
         self.books = books
         self.states = (state, state.copy())
         if self.count[b.PARITY]:
@@ -99,11 +102,6 @@ class CompiledRun:
             now=now, work=work, books=books,
         )  # fmt: skip
 
-    def begin(self, placed: Floats) -> None:
-        """Count from this state: displacements from where base nodes are now (n, 3) m, and those of the extremes."""
-        self.books.start[:] = self.state.r
-        self.place(placed)
-
     def place(self, placed: Floats) -> None:
         """Where base nodes were at the start (n, 3) m."""
         self.books = self.books._replace(placed=placed)
@@ -118,6 +116,12 @@ class CompiledRun:
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""
         self.table.bind(moves=moves)
+
+    def note_state(self) -> None:
+        """Keep the extremes of the state as it is, of which `books.report` is the report; no step is taken."""
+        self.clock[b.STOP] = self.clock[b.NOW]
+        self.count[b.PHASE], self.count[b.AFTER_START], self.count[b.NEW_STATE] = b.START, b.BEGIN_STEP, 1
+        self.go()
 
     def go(self) -> int:
         """Go on until a code of kernels.books."""
@@ -139,7 +143,7 @@ class CompiledRun:
             mine[:] = its
 
     def _changing(self) -> Iterator[Floats]:
-        skipped = ("outputs", "log", "samples", "borne", "base", "placed", "loaded", "start")
+        skipped = ("outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right")
         yield from (x for state in self.states for x in state)
         yield from self.pushes
         yield from (x for name, x in self.books._asdict().items() if name not in skipped)
@@ -206,8 +210,8 @@ class CompiledRun:
         return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea)
 
 
-def no_extremes(nodes: int) -> Floats:
-    """Extremes (4, EXTREMES, nodes) of nothing: lowest infinite, highest minus infinite, times unknown."""
-    out = np.full((4, b.EXTREMES, nodes), np.nan)
+def no_extremes(columns: int) -> Floats:
+    """Extremes (4, EXTREMES, columns) of nothing: lowest infinite, highest minus infinite, times unknown."""
+    out = np.full((4, b.EXTREMES, columns), np.nan)
     out[0], out[1] = np.inf, -np.inf
     return out

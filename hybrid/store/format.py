@@ -140,6 +140,20 @@ def create_scales(file: h5py.File, points: int, fields: Sequence[Field], fixed: 
             attach(data, field.dims, [file[d] for d in field.dims])
 
 
+def add_fixed(file: h5py.File, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
+    """Quantities that do not grow and that the file does not have yet; of the dimensions, scales come first."""
+    for field, values in fixed:
+        if field.name in file:
+            continue
+        data = file.create_dataset(field.name, data=checked(field, np.asarray(values, dtype=field.dtype)))
+        annotate(data, field.unit, field.description, field.frame)
+        if field.dims == (field.name,):
+            data.make_scale(field.name)
+            data.dims[0].label = field.name
+        else:
+            attach(data, field.dims, [file[d] for d in field.dims])
+
+
 def write_fixed(file: h5py.File, grid_s: np.ndarray, fixed: Sequence[tuple[Field, np.ndarray]]) -> None:
     """The values of what does not grow: the output grid, and quantities that do not depend on time."""
     if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():

@@ -49,6 +49,9 @@ class MemoryRecorder:
         """Note that something happened at time t (s) from s_a to s_b (m)."""
         self.events.append((kind, f"{text} (at t = {t:.4g} s, s = {0.5 * (s_a + s_b):.4g} m)"))
 
+    def replace(self, values: Mapping[str, np.ndarray]) -> None:
+        """What does not grow is not kept."""
+
     def close(self, status: str, message: str) -> None:
         """There is no file to close."""
 

@@ -34,6 +34,7 @@ from hybrid.store.copying import copied, names_in
 from hybrid.store.format import (
     BLOCK,
     Field,
+    add_fixed,
     check_names,
     set_status,
     tables_of,
@@ -108,10 +109,11 @@ class Recorder:
     @classmethod
     def again(
         cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
-        texts: Mapping[str, str], before: Tree,
+        texts: Mapping[str, str], before: Tree, fixed: Sequence[tuple[Field, np.ndarray]] = (),
     ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
+        fixed: quantities that do not depend on time, with values for those that the file does not have.
         ResultError if the file holds other fields, or cannot be written.
         """
         self, tables = cls.__new__(cls), tables_of(fields, step_fields)
@@ -132,6 +134,7 @@ class Recorder:
         def make(new: Path) -> None:
             with drafted(new) as file:
                 copied(source, file, at.rows, {*later, BEFORE, *SLOTS})
+                add_fixed(file, fixed)
                 set_status(file, "running", "")
                 write_texts(file, texts)
                 create_slots(file)
@@ -162,6 +165,7 @@ class Recorder:
         self._number = 0  # of the next checkpoint
         self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
         self._happened: Counter[str] = Counter()  # events by kind
+        self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
         self.closed = self._broken = False
 
@@ -260,6 +264,10 @@ class Recorder:
                 row = (max(self.last, 0.0), 0.0, 0.0, OMITTED, text, kind, float(left), nan, nan)
                 self._events.add_row(row)
 
+    def replace(self, values: Mapping[str, np.ndarray]) -> None:
+        """Other values for quantities of `fixed`, by name; written with the next flush."""
+        self._replaced.update(values)
+
     def flush(self, content: Callable[[], Mapping[str, Any]] | None = None) -> None:
         """Write what is held back, for readers to see; content: makes `program`, `asks`, `resolution` and `state` of a
         checkpoint."""
@@ -292,6 +300,9 @@ class Recorder:
         waiting = [table for table in tables if table.waiting]
         for table in waiting:
             table.write()
+        for name, values in self._replaced.items():
+            self._file[name][...] = values
+        self._replaced.clear()
         if packed:
             write_slot(self._slots, self._number, packed)
         # HDF5 may write in any order between two flushes.  So: the data, then the scales that

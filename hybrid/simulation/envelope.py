@@ -1,0 +1,184 @@
+"""Extremes of a run over all accepted steps, on the finest mesh that its zones may have.
+
+The compiled run keeps them on the mesh of the moment (kernels.extremes).  Every node of any layout is a node of the
+layout that is all rod, so when zones change they are folded into those on its nodes: inside a catenary cell the
+extremes of its two nodes are interpolated, with the time of the nearer one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import LIMIT_EVENTS
+from hybrid.kernels import books as b
+from hybrid.kernels.forces import SEABED
+from hybrid.kernels.state import Floats
+from hybrid.model.build import Model
+from hybrid.model.output_points import NEAR
+from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
+from hybrid.outputs.output_grid import Grid
+from hybrid.scene.schema import Scene
+from hybrid.solve.run import CompiledRun, no_extremes
+from hybrid.solve.statics import Equilibrium
+from hybrid.solve.stepper import Stepper
+from hybrid.store.envelope import BEGIN, END, GROUP, SCALE, Judged, judged
+from hybrid.store.format import Field
+from hybrid.store.named_arrays import matched
+
+# Rows of the books: name, unit, what it is, and what a line needs to have it.
+QUANTITIES = {
+    b.TENSION: ("tension", "N", "tension", ""),
+    b.CURVATURE: ("curvature", "1/m", "curvature", ""),
+    b.MOMENT: ("bending_moment", "N m", "bending moment of the elastic strain", "rod"),
+    b.TORQUE: ("torque", "N m", "torque of the elastic strain", "rod"),
+    b.PRESSURE: ("contact", "N/m", "normal force of the seabed per length", "seabed"),
+    b.DISPLACEMENT: ("displacement", "m", "distance from where the node was at the start", "time"),
+}
+
+_S_TEXT = "arc lengths of nodes; point loads and changes of section come twice, with the value before and after them"
+
+
+def marks_of(scene: Scene, model: Model) -> np.ndarray:
+    """Bits (N+1,) of kernels.books for the nodes of a model: point loads, changes of section."""
+    s = model.line.s
+    marks = np.zeros(s.size, np.int8)
+    for places, bit in ((model.attached, b.LOADED), (section_changes(scene), b.SEAM)):
+        for x in places:
+            marks[np.argmin(np.abs(s - x))] |= bit
+    marks[[0, -1]] = 0
+    return marks
+
+
+def _doubled(nodes: Floats, marked: Floats) -> Floats:
+    """Nodes (N+1,) m with those that are marked (K,) m twice."""
+    return np.insert(nodes, np.searchsorted(nodes, marked), marked)
+
+
+class Envelope:
+    """Extremes of one run or equilibrium, lowest and highest with their times, at places s (n,) m.
+
+    Places are nodes; those where a quantity may have two values come twice, the left value first.
+    """
+
+    def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
+        """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
+        layout = model.layout if moves else None
+        nodes = model.line.s if layout is None else layout._replace(rod=np.ones_like(layout.rod)).nodes
+        marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
+        self._nodes, self._marked = nodes, marked
+        self.s = _doubled(nodes, marked)
+        self._start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
+        self.begin = 0.0  # s
+        self._bounds = no_extremes(self.s.size)  # of meshes before that of now
+        has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
+        has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
+        self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
+        side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
+        first, second = (np.flatnonzero(np.diff(self.s) == 0.0) + k for k in (0, 1))
+        beside = self.s.copy()
+        beside[first] -= side
+        beside[second] += side
+        self._limits = limits_along(scene, beside)
+
+    # --- what is kept -------------------------------------------------------------------------------
+
+    def count_from(self, model: Model, r: Floats) -> None:
+        """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
+        self._start = np.asarray(Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r)
+
+    def start_of(self, nodes: Floats) -> Floats:
+        """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""
+        return self._start[np.searchsorted(self._nodes, nodes)]
+
+    def fold(self, nodes: Floats, extremes: Floats) -> None:
+        """Take in the extremes (4, EXTREMES, N+1+K) of a mesh that ends; of no rows, before the first mesh."""
+        if extremes.shape[1]:
+            self._bounds = self._with(nodes, extremes)
+
+    def _with(self, nodes: Floats, extremes: Floats) -> Floats:
+        """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""
+        out, places = self._bounds.copy(), _doubled(nodes, self._marked)
+        columns = np.arange(places.size) - np.cumsum(second := np.append(False, places[1:] == places[:-1]))
+        columns[second] = nodes.size + np.arange(self._marked.size)
+        now = extremes[:, :, columns]
+        here = np.searchsorted(self.s, places) + second
+        nearest = np.searchsorted(0.5 * (places[1:] + places[:-1]), self.s)
+        for row in self._rows:
+            if not np.isfinite(now[:, row]).all():
+                continue  # no state of this mesh was computed yet
+            for bound, better in ((0, np.less), (1, np.greater)):
+                x, t = np.interp(self.s, places, now[bound, row]), now[2 + bound, row][nearest]
+                x[here], t[here] = now[bound, row], now[2 + bound, row]
+                found = better(x, out[bound, row])
+                out[bound, row][found], out[2 + bound, row][found] = x[found], t[found]
+        return out
+
+    # --- checkpoints --------------------------------------------------------------------------------
+
+    def checkpoint(self, now: Floats) -> dict[str, Any]:
+        """What was kept; now: extremes on the mesh of now."""
+        return {"begin": self.begin, "start": self._start, "bounds": self._bounds, "now": now.copy()}
+
+    def restore(self, saved: Mapping[str, Any], now: Floats) -> None:
+        """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
+        found = matched(saved, self.checkpoint(now), "state/envelope")
+        self.begin, self._start, self._bounds = found["begin"], found["start"], found["bounds"]
+        now[:] = found["now"]
+
+    # --- for the file -------------------------------------------------------------------------------
+
+    def fixed(self) -> list[tuple[Field, np.ndarray]]:
+        """Fields of a new file, with values: nodes and limits as they are, extremes not yet known."""
+        n, dims, unknown = (self.s.size,), (SCALE,), np.full(self.s.size, np.nan)
+        out = [(Field(SCALE, "m", _S_TEXT, n, dims), self.s)]
+        for name, values in self._limits.items():
+            unit, text, _ = SECTION_LIMITS[name]
+            out.append((Field(f"{GROUP}/{name}", unit, f"{text}; NaN: none", n, dims, nan_ok=True), values))
+        for name, unit, text, _ in self._rows.values():
+            for bound, word in (("min", "smallest"), ("max", "largest")):
+                full, of = f"{GROUP}/{name}_{bound}", f"{word} {text} at any accepted step"
+                out.append((Field(full, unit, of, n, dims, nan_ok=True), unknown))
+                when = Field(f"{GROUP}/{name}_t_{bound}", "s", f"time of {name}_{bound}", n, dims, nan_ok=True)
+                out.append((when, unknown))
+        for name, text in ((BEGIN, "the steps counted begin"), (END, "they end, so far")):
+            out.append((Field(name, "s", f"extremes are of all accepted steps: when {text}", nan_ok=True), unknown[0]))
+        return out
+
+    def judged(self, values: Mapping[str, np.ndarray]) -> list[Judged]:
+        """The limits of the sections against those values."""
+        return judged({field.name: x for field, x in self.fixed()} | dict(values))
+
+    def note_broken(self, values: Mapping[str, np.ndarray], note: Callable[..., None]) -> None:
+        """An event for every limit that those values break; note: as Recorder.event."""
+        for x in self.judged(values):
+            if x.broken:
+                note(x.t, x.s, x.s, LIMIT_EVENTS[x.limit], x.text, value=x.value, threshold=x.allowed)
+
+    def values(self, nodes: Floats, extremes: Floats, t: float) -> dict[str, np.ndarray]:
+        """Values of those fields up to time t (s), with the extremes (4, EXTREMES, N+1+K) of the mesh of now."""
+        bounds = self._with(nodes, extremes)
+        out = {BEGIN: np.array(self.begin), END: np.array(t)}
+        for row, (name, *_) in self._rows.items():
+            for k, bound in enumerate(("min", "max")):
+                x = bounds[k, row]
+                out[f"{GROUP}/{name}_{bound}"] = np.where(np.isfinite(x), x, np.nan)
+                out[f"{GROUP}/{name}_t_{bound}"] = bounds[2 + k, row]
+        return out
+
+
+def of_equilibrium(envelope: Envelope, scene: Scene, model: Model, found: Equilibrium) -> dict[str, np.ndarray]:
+    """Values of the envelope of an equilibrium under full loads: those of its one state."""
+    run, line = CompiledRun(1.0, np.zeros(0), extremes=True), model.line
+    ends, sea = model.ends.at(np.inf), model.sea.at(np.inf)
+    stepper = Stepper(line, model.length, model.tension_scale)
+    run.books.loaded[:] = model.loaded_ends
+    run.attach(
+        line, sea, ends, model.ends.moves(), stepper.work, stepper.limits, found.state, np.full(model.cells, np.inf),
+        np.zeros(0, int), marks_of(scene, model),
+    )  # fmt: skip
+    run.books.report[0] = found.report
+    run.note_state()
+    return envelope.values(line.s, run.books.extremes, 0.0)
