@@ -21,6 +21,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.exports.fatigue import count
 from hybrid.exports.vtk import image as vtkhdf
+from hybrid.store.envelope import BEGIN, END, SCALE
 from hybrid.store.reader import Result
 from hybrid.store.selection import (
     MARK,
@@ -96,7 +97,7 @@ class _Made(NamedTuple):
 
 def _csv(part: Part) -> _Made:
     columns = histories(part)
-    head = head_lines(part) + _errors_of(part) + scene_lines(part)
+    head = head_lines(part) + _span_of_envelope(part) + _errors_of(part) + scene_lines(part)
     rows = len(next(iter(columns.values())))
     text = f"{rows} row{'s' * (rows != 1)}, {len(columns)} columns; "
     return _Made((_table("histories", head, list(columns), list(columns.values())),), text)
@@ -129,13 +130,14 @@ def beside(source: Path, format: str | None = None) -> Path:
 
 
 def histories(part: Part) -> dict[str, np.ndarray]:
-    """Columns over one clock, the clock first: names with unit and place, and values (n,).
+    """Columns over one clock, the clock first: names with unit and place, and values (n,); an envelope lies over s.
 
     ResultError when the fields lie on different clocks, such as the outputs and the step log.
     """
     result, columns = part.result, {}
-    clocks = {name: (result.dims(name) or ("",))[0] for name in part.names}
-    inside = {name: clock for name, clock in clocks.items() if clock == "t" or clock.endswith("/t")}
+    names = [name for name in part.names if name not in (BEGIN, END)]
+    clocks = {name: (result.dims(name) or ("",))[0] for name in names}
+    inside = {name: clock for name, clock in clocks.items() if clock in ("t", SCALE) or clock.endswith("/t")}
     if len(set(inside.values())) != 1 or len(inside) < len(clocks):
         groups = (f"{clock or 'no time'}: {_some(clocks, clock)}" for clock in sorted(set(clocks.values())))
         raise ResultError(
@@ -143,11 +145,19 @@ def histories(part: Part) -> dict[str, np.ndarray]:
             "    try:      one export for each of them, or nc, which holds them all"
         )
     (clock,) = set(inside.values())
-    columns["t (s)"] = part.array(clock)
-    for name in part.names:
+    columns["s (m)" if clock == SCALE else "t (s)"] = part.array(clock)
+    for name in names:
         if name != clock:
             _unfold(columns, part, name)
     return columns
+
+
+def _span_of_envelope(part: Part) -> list[str]:
+    """Of which steps the extremes are, where they are among the columns."""
+    if SCALE not in part.names:
+        return []
+    begin, end = (float(part.result[name]) for name in (BEGIN, END))
+    return [f"lowest and highest values of all accepted steps, t = {begin:.9g} to {end:.9g} s, at nodes s"]
 
 
 def _some(clocks: dict[str, str], clock: str) -> str:

@@ -2,9 +2,9 @@
 
 Where a quantity may have two values, at point loads and changes of section, the one on the right has a column of its own
 (books.right).  They follow the rules of the outputs (outputs.observation): tension of the middles of cells is interpolated to nodes, and
-taken on both sides of a point load; at the ends it is the pull of what holds them.  A catenary has the curvature of the
-circle that two of its chords are tangents of; its ends, and point loads and joints, which may be kinks, have what its
-inner nodes lead to.
+taken on both sides of point loads and changes of section; at the ends it is the pull of what holds them.  A
+catenary has the curvature of the circle that two of its chords are tangents of; its ends, joints and marked nodes, where
+it may have a kink, have what its inner nodes lead to.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.assembly import get9
-from hybrid.kernels.books import CURVATURE, DISPLACEMENT, LOADED, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
+from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED
@@ -73,7 +73,7 @@ def note_tension(line, ends, state, books, t):
     for k in range(2):
         note(books, TENSION, k * n, end_tension(line, ends, state, books.report[0], books.loaded, k), t)
     for i in range(1, n):
-        if books.marks[i] & LOADED:
+        if books.marks[i]:
             left, right = max(i - 2, 0), min(i + 1, n - 1)
             widen(books.extremes, TENSION, i, beyond(T, h, i - 1, left), t)
             widen(books.extremes, TENSION, books.right[i], beyond(T, h, i, right), t)
@@ -83,9 +83,9 @@ def note_tension(line, ends, state, books, t):
 
 @inner
 def is_smooth(line, marks, i):
-    """Whether node i lies inside a catenary, away from loads."""
+    """Whether node i lies inside a catenary, away from loads and changes of section."""
     n = line.h.shape[0]
-    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i] & LOADED
+    return 0 < i < n and not line.element[i] and not line.spin[i - 1] and not line.spin[i] and not marks[i]
 
 
 @inner

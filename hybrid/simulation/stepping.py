@@ -241,8 +241,8 @@ class Simulation:
     def close(self) -> None:
         """Write what is left and close the file; a second call does nothing."""
         self._loop.write_down(everything=True)
-        self._recorder.commit()
         self._loop.finish()
+        self._recorder.commit()
         self._recorder.close("complete", f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s")
 
     def __enter__(self) -> Simulation:

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING, NamedTuple, Protocol
 
 import numpy as np
 
-from hybrid.errors import LIMIT_EVENTS
-
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
 # Names in the file: the group, its places (m), and the times (s) between which all accepted steps count.
 GROUP = "envelope"
 SCALE, BEGIN, END = f"{GROUP}/s", f"{GROUP}/begin", f"{GROUP}/end"
+# What limits are held against.
+_HELD = {"min_bend_radius": ("curvature", "max"), "max_tension": ("tension", "max"), "min_tension": ("tension", "min")}
 # Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
 NOTHING = 1e-6
 
@@ -86,22 +86,21 @@ def extreme(values: Arrays, name: str, bound: str) -> Extreme | None:
 def judged(values: Arrays) -> list[Judged]:
     """Every limit that the sections have, at the place of the envelope where the cable is worst off."""
     found = []
-    for limit in LIMIT_EVENTS:
-        name, bound = {"min_bend_radius": ("curvature", "max"), "max_tension": ("tension", "max")}.get(
-            limit, ("tension", "min")
-        )
+    for limit, (name, bound) in _HELD.items():
         full = f"{GROUP}/{name}_{bound}"
         if f"{GROUP}/{limit}" not in values or full not in values or not np.isfinite(values[full]).all():
             continue
         allowed, x, t = values[f"{GROUP}/{limit}"], values[full], values[f"{GROUP}/{name}_t_{bound}"]
-        worse = {"min_bend_radius": x * allowed, "max_tension": x / allowed}.get(limit, allowed - x)
-        if np.isnan(worse).all():
+        if np.isnan(allowed).all():
             continue
+        if limit == "min_tension":
+            worse, most = allowed - x, NOTHING * float(np.abs(x).max())
+        else:
+            worse, most = x * allowed if limit == "min_bend_radius" else x / allowed, 1.0
         k = int(np.nanargmax(worse))
-        value, used = float(x[k]), float(worse[k])
+        value, used = float(x[k]), None if limit == "min_tension" else float(worse[k])
         if limit == "min_bend_radius":
             value = 1.0 / value if value > 0.0 else np.inf
-        zero = NOTHING * float(np.abs(x).max()) if limit == "min_tension" else 1.0
-        part = None if limit == "min_tension" else used
-        found.append(Judged(limit, value, float(allowed[k]), part, used > zero, float(values[SCALE][k]), float(t[k])))
+        broken = bool(worse[k] > most)
+        found.append(Judged(limit, value, float(allowed[k]), used, broken, float(values[SCALE][k]), float(t[k])))
     return found

@@ -13,6 +13,8 @@ Layout, format 1 (`record` writes it)::
                                     they hold from output number `output` on
     /events/{t,s_a,s_b,kind,text}   one row per event; of a change of zones also
     /events/{criterion,value,threshold,energy}
+    /envelope/{s,<field>_min,<field>_max,<field>_t_min,<field>_t_max,begin,end}
+                                    extremes of all accepted steps from begin to end, over nodes (`envelope`)
     /scene                          the scene, as YAML text
     /changes                        scenes that held from some time on, as JSON; only where there are any
     /checkpoint                     from which a run goes on (`checkpoint`); for the program alone

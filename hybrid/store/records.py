@@ -71,6 +71,9 @@ class Columns(Mapping[str, np.ndarray]):
             raise AttributeError(key)
         return self[key]
 
+    def __contains__(self, key: object) -> bool:
+        return key in self._keys
+
     def __iter__(self) -> Iterator[str]:
         return iter(self._keys)
 
