@@ -63,7 +63,7 @@ CLOCK_SIZE = 35
     OUTPUT,  # next output that is due
     SAMPLES,  # in the buffer
     INSIDE,  # 1: outputs at the end of the step wait, because the line is about to change
-    ASKS,  # bits: Python is asked before every try, after it, after every step
+    ASKS,  # bits: Python is asked before every try, after it, after every step, after its outputs
     FLAGS,  # what there is to look at after the last step
     STIFF,  # 1 where no cell stretches
     QUOTA,  # steps until the call returns
@@ -74,7 +74,7 @@ COUNT_SIZE = 24
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
-ASK_BEFORE, ASK_TRIES, ASK_STEPS = 1, 2, 4
+ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
 # What a call returns: at STOP; a buffer is full or the quota is used up; a try to come; one to be judged; a step to be
 # looked at; its outputs to be looked at; a step that fails however small.
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)

@@ -16,8 +16,9 @@ from hybrid.kernels.cache import cache_folder, prune
 
 # numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
 # allowed: NaN must stay visible and the order of sums must stay as written.
+# Kernels release the GIL: runs in threads of one process share no array that they write.
 _OPTIONS: dict[str, Any] = {
-    "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False, "no_cfunc_wrapper": True,
+    "error_model": "numpy", "fastmath": {"contract"}, "_nrt": False, "no_cfunc_wrapper": True, "nogil": True,
 }  # fmt: skip
 _njit: Any = numba.njit  # its type knows of fewer options than it takes
 _folder: Path | None = None

@@ -18,6 +18,7 @@ from hybrid.kernels.binding import reader
 from hybrid.kernels.books import (
     AFTER_START,
     ASK_BEFORE,
+    ASK_SAMPLES,
     ASK_STEPS,
     ASK_TRIES,
     ASKS,
@@ -165,7 +166,7 @@ def between_steps(plane, space, job, old, new):
         if not sample_step(plane, space, job.line, job.sea, old, new, job.books):
             return PAUSED
         count[PHASE] = END_STEP
-        if count[ASKS] & ASK_STEPS:
+        if count[ASKS] & ASK_SAMPLES:
             return SAMPLED
     if count[PHASE] == END_STEP:
         end_step(job.line, new, clock, count)

@@ -10,7 +10,6 @@ operation and one product with a sparse matrix (output_grid) serve the batch.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from functools import cached_property
 
@@ -54,13 +53,6 @@ def on_grid(matrix: csr_array, x: Floats) -> Floats:
     return np.asarray((matrix @ x.reshape(x.shape[0], -1)).reshape(matrix.shape[0], *x.shape[1:]))
 
 
-def _of_batch(shifts: Sequence[Shift]) -> Shift:
-    """The shifts of all outputs in one, the outputs last; what a line has for good is that of the first."""
-    made = {name: np.stack([getattr(shift, name) for shift in shifts], axis=-1) for name in Shift._fields[:4]}
-    forces = np.stack([shift.resultants for shift in shifts], axis=-1)
-    return shifts[0]._replace(**made, resultants=forces)
-
-
 class Observation:
     """A batch of states looked at, as computed and (`corrected`) with what leaving bending out shifts it by."""
 
@@ -69,12 +61,12 @@ class Observation:
         self.shift: Shift | None = None
         self._plain = self  # the observation that this one corrects
 
-    def corrected(self, shifts: Sequence[Shift]) -> Observation:
+    def corrected(self, shift: Shift) -> Observation:
         """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
         other = self.on(self.grid)
         for name in ("r", "v", "e", "T", "length", "d"):
             other.__dict__.pop(name, None)
-        other.shift, other._plain = _of_batch(shifts), self
+        other.shift, other._plain = shift, self
         return other
 
     def on(self, grid: Grid) -> Observation:

@@ -141,7 +141,7 @@ class Observer:
 
         criteria: name and description of those that are written as well; only: names of probes, None: all.
         errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
-        for it.  `values_of` gets the criteria, and for both of the latter the shifts.
+        for it.  `values_of` gets the criteria, and for both of the latter the shift.
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
         section ends and the next begins.
         """
@@ -216,16 +216,14 @@ class Observer:
         """Whether criteria are among the fields."""
         return bool(self._criteria)
 
-    def values_of(
-        self, batch: Batch, ratios: Floats | None = None, shifts: Sequence[Shift] | None = None
-    ) -> dict[str, Floats]:
+    def values_of(self, batch: Batch, ratios: Floats | None = None, shift: Shift | None = None) -> dict[str, Floats]:
         """All fields of nb outputs, (nb, ...) in the units of the fields, as new arrays.
 
-        ratios: (nb, criteria, ns), if they are written: the largest since the output before; shifts: of every output,
+        ratios: (nb, criteria, ns), if they are written: the largest since the output before; shift: of these outputs,
         what bending that is left out would change, if results are corrected for it or its error is written.
         """
         plain = Observation(self.line, self.sea, self.grid, batch)
-        corrected = plain.corrected(shifts) if shifts is not None else plain
+        corrected = plain.corrected(shift) if shift is not None else plain
         view = corrected if self._corrected else plain
         found = {name: p.value(view) for name, p in self._probes.items()}
         if self._right:

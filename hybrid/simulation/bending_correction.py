@@ -8,11 +8,11 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from hybrid.kernels.state import Ends, State
+from hybrid.kernels.state import Batch, Ends, State
 from hybrid.kernels.zone_criteria import end_turn
 from hybrid.model.bending_reference import full_bending
 from hybrid.model.build import Model
-from hybrid.solve.bending_corrector import Corrector, Shift
+from hybrid.solve.bending_corrector import Corrector, Sample, Shift
 from hybrid.solve.stepper import Stepper
 
 
@@ -36,20 +36,19 @@ class Correction:
         """twisted: what watches the twist of the line, where something else does; None: watched here."""
         self.model, self.corrector = model, corrector_for(model)
         self._twisted = twisted or _TurnOfEnds(model)
-        self.ends = model.ends.values
+        self._samples: list[Sample] = []
 
     def begin(self, ends: Ends, state: State, at_rest: bool, with_friction: bool = False) -> None:
         """At the start of a run: the error of the equilibrium; a motion that starts from a given shape has none.
 
         with_friction: whether friction took part in the equilibrium.
         """
-        self.ends, self.corrector.sea = ends, self.model.sea.values
+        self.corrector.sea = self.model.sea.values
         if at_rest:
             self.corrector.rest(self.model.sea.values, ends, state, self._twisted.torque(ends, state), with_friction)
 
     def step(self, stepper: Stepper, ends: Ends, state: State, dt: float, before: float, rho: float) -> None:
         """After the step of dt, after one of `before`, that led to `state`, before anything else uses the stepper."""
-        self.ends = ends
         self.corrector.step(
             stepper, self.model.sea.values, ends, state, dt, before, rho, self._twisted.torque(ends, state)
         )
@@ -59,9 +58,9 @@ class Correction:
         watched = self._twisted if isinstance(self._twisted, _TurnOfEnds) else None
         return {"error": self.corrector.error, "slid": self.corrector.slid, "twist": watched.twist if watched else 0.0}
 
-    def restore(self, saved: Mapping[str, Any], ends: Ends) -> None:
+    def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on as `checkpoint` has said."""
-        self.ends, self.corrector.sea = ends, self.model.sea.values
+        self.corrector.sea = self.model.sea.values
         self.corrector.error[:], self.corrector.slid[:] = saved["error"], saved["slid"]
         if isinstance(self._twisted, _TurnOfEnds):
             self._twisted.twist = saved["twist"]
@@ -85,9 +84,19 @@ class Correction:
             )
         return ""
 
-    def shift(self, state: State, part: float = 1.0) -> Shift:
-        """The error at an output of `state`, which lies the `part` of the last step after its begin."""
-        return self.corrector.at(part).shift(self.ends, state)
+    def sample(self, part: float = 1.0) -> None:
+        """Keep the error at an output that lies the `part` of the last step after its begin."""
+        self._samples.append(self.corrector.sample(part))
+
+    @property
+    def kept(self) -> int:
+        """Number of outputs whose error is kept."""
+        return len(self._samples)
+
+    def shift(self, batch: Batch) -> Shift:
+        """The errors that are kept, of the outputs of a batch; they are let go."""
+        samples, self._samples = self._samples[: batch.t.size], self._samples[batch.t.size :]
+        return self.corrector.shift(samples, batch)
 
 
 class _TurnOfEnds:

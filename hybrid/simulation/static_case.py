@@ -97,17 +97,18 @@ class StaticCase:
 
 def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:
     """All fields of an equilibrium."""
-    ends, shifts, sea = model.ends.at(np.inf), None, model.sea.values
+    ends, correction, sea = model.ends.at(np.inf), None, model.sea.values
     if model.follows_error:
         model.sea.at(np.inf)
         correction = Correction(model)
         correction.begin(ends, found.state, at_rest=True, with_friction=found.with_friction)
-        shifts = [correction.shift(found.state)]
+        correction.sample()
     report = found.report.copy()
     if model.line.bits & SEABED:
         report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
-    return {name: x[0] for name, x in observer.values_of(batch, shifts=shifts).items()}
+    shift = correction.shift(batch) if correction is not None else None
+    return {name: x[0] for name, x in observer.values_of(batch, shift=shift).items()}
 
 
 def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:

@@ -200,8 +200,8 @@ class TimeLoop:
         observer, ratios = self.observer, None
         if switching is not None and observer.writes_criteria:
             ratios = np.repeat(switching.manager.largest_ratios(observer.grid.s)[None], batch.t.size, axis=0)
-        shifts = run.shifts(batch) if run.correction is not None else None
-        values = observer.values_of(batch, ratios, shifts)
+        shift = run.correction.shift(batch) if run.correction is not None else None
+        values = observer.values_of(batch, ratios, shift)
         self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
         if self.target is None:
             return
@@ -218,6 +218,8 @@ class TimeLoop:
         run, model = self.run, self.run.model
         books = run.run.books
         ends = model.ends.at(run.t)
+        if run.correction is not None:
+            run.correction.sample()
         self._record(batch_of_one(run.t, ends, run.state, books.report[0], books.work[0], model.sea.at(run.t)))
 
     def _stop_if(self, stop: Stop) -> None:

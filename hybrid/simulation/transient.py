@@ -19,7 +19,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import Batch, State, blank_state
+from hybrid.kernels.state import State, blank_state
 from hybrid.kernels.step_law import FIRST, WARY
 from hybrid.model.build import Model, build
 from hybrid.model.plan import parts
@@ -33,7 +33,6 @@ from hybrid.simulation.events import EventLog, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
-from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
@@ -74,6 +73,7 @@ class Transient:
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self._beyond = switching, correction, -np.inf
+        self._followed = (0.0, 0.0)  # s, begin and end of the step through which the model error was followed last
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self._set_control(resolution)
@@ -235,6 +235,8 @@ class Transient:
         while True:
             self._choose_asks()
             code = run.go()
+            if self.correction is not None:
+                self._sample_error(self.correction)
             if code == b.TRYING:
                 assert self.switching is not None
                 end = float(clock[b.TRY_END])
@@ -267,9 +269,11 @@ class Transient:
     def _choose_asks(self) -> None:
         """When the compiled run has to ask: for zones, for what follows the model error, for a plane that is left."""
         count, switching = self.run.count, self.switching
-        asks = b.ASK_STEPS if self.correction is not None or self._pending is not None or self._leaves else 0
+        asks = b.ASK_STEPS if self.correction is not None else 0
+        if switching is not None or self._leaves:
+            asks |= b.ASK_STEPS | b.ASK_SAMPLES
         if switching is not None:
-            asks |= b.ASK_TRIES | b.ASK_STEPS
+            asks |= b.ASK_TRIES
             if switching.prepares:
                 asks |= b.ASK_BEFORE
             blending = switching.manager.ramping
@@ -327,23 +331,20 @@ class Transient:
         """Follow the error of neglecting bending through the step just taken; an event where it cannot be estimated."""
         before = float(self.run.clock[b.STEP_BEFORE])
         correction.step(self.stepper, self.model.ends.values, self.state, dt, before, self.rho)
+        self._followed = end - dt, end
         beyond = correction.beyond
         if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
             s = float(self.model.line.s[max(correction.corrector.where, 0)])
             self.events.event(end, s, s, "model error not estimated", beyond)
             self._beyond = end + self.model.time_scale
 
-    def shifts(self, batch: Batch) -> list[Shift]:
-        """The model error at outputs of the last step: between that before the step and that after it."""
-        assert self.correction is not None
-        clock, now = self.run.clock, self.run.state
-        dt = float(clock[b.NOW] - clock[b.PREVIOUS])
-        parts_ = [float((t - clock[b.PREVIOUS]) / dt) if dt > 0.0 else 1.0 for t in batch.t]
-        rows = zip(batch.e, batch.v, batch.T, batch.a1, batch.w, batch.r, strict=True)
-        return [
-            self.correction.shift(now._replace(e=e, v=v, T=T, a1=a1, w=w, r=r), part)
-            for part, (e, v, T, a1, w, r) in zip(parts_, rows, strict=True)
-        ]
+    def _sample_error(self, correction: Correction) -> None:
+        """The model error at outputs that were sampled since the last call: they lie in the step followed last."""
+        samples, (begin, end) = self.run.books.samples, self._followed
+        near = SAME_TIME * (end - begin)
+        for k in range(correction.kept, int(self.run.count[b.SAMPLES])):
+            t = float(samples[k, 0])
+            correction.sample((t - begin) / (end - begin) if t < end - near else 1.0)
 
     def _adapt(self) -> None:
         """After the outputs of a step: zones change where criteria ask for it, and the plane is left where it must."""
@@ -501,7 +502,7 @@ class Transient:
         if self.switching is not None:
             self.switching.restore(saved["zoning"])
         if self.correction is not None:
-            self.correction.restore(saved["correction"], model.ends.values)
+            self.correction.restore(saved["correction"])
         count[b.OUTPUT] = np.searchsorted(books.outputs, self.t + SAME_TIME * saved["dt"], side="right")
         self._restore_envelope(saved["envelope"])
         if not complete:

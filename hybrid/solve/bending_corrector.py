@@ -5,8 +5,7 @@ One way only: nothing of it goes back into the line.  docs/theory.md, 14; the ke
 
 from __future__ import annotations
 
-from copy import copy
-from math import sqrt
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -20,7 +19,7 @@ from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, no_sea
+from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
 from hybrid.kernels.step import friction_axes
 from hybrid.solve.stepper import Stepper
 
@@ -32,12 +31,22 @@ SMALL = 1e-4
 ANCHOR = 1e-12
 
 
-class Shift(NamedTuple):
-    """What the error makes of an output: true value less the one computed, to first order.
+class Sample(NamedTuple):
+    """The error at an output: (2, N+1, 4) of position (m) and velocity with the spins; tension (N,) N; moment (N+1, 3)
+    N m, inertial; left (4, 3) N m, what of it the two nodes at either end lack."""
 
-    position, velocity: (N+1, 3) m, m/s; tension: (N,) N; moment: (N+1, 3) N m, inertial; stiffness: (N+1,) N m2, by
-    which all of a moment makes a curvature; resultants: (2, 3) N, of the forces on the first and the last node, zero
-    where they are given; clamped: (2,) 1 where an end prescribes a tangent.
+    error: Floats
+    tension: Floats
+    moment: Floats
+    left: Floats
+
+
+class Shift(NamedTuple):
+    """What the error makes of nb outputs: true values less those computed, to first order.
+
+    position, velocity: (N+1, 3, nb) m, m/s; tension: (N, nb) N; moment: (N+1, 3, nb) N m, inertial; stiffness: (N+1,)
+    N m2, by which all of a moment makes a curvature; resultants: (2, 3, nb) N, of the forces on the first and the last
+    node, zero where they are given; clamped: (2,) 1 where an end prescribes a tangent.
     """
 
     position: Floats
@@ -47,6 +56,11 @@ class Shift(NamedTuple):
     stiffness: Floats
     resultants: Floats
     clamped: np.ndarray
+
+
+def _dot(a: Floats, b: Floats) -> Floats:
+    """a . b of vectors (..., 3), as (..., 1)."""
+    return np.asarray(a[..., :1] * b[..., :1] + a[..., 1:2] * b[..., 1:2] + a[..., 2:] * b[..., 2:])
 
 
 class Corrector:
@@ -84,6 +98,7 @@ class Corrector:
         self._before = (self.x.copy(), self.moment.copy(), self.left.copy())  # before the last step, as is `_spare`
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step
+        self._ends = [0, 1, n - 1, n]  # nodes
         self._table = Table(blank_error_job())
 
     @property
@@ -117,63 +132,68 @@ class Corrector:
         self.x[1:, 0] = np.interp(0.5 * (s[1:] + s[:-1]), 0.5 * (then[1:] + then[:-1]), old.x[1:, 0])
         return self
 
-    def at(self, part: float) -> Corrector:
+    def sample(self, part: float = 1.0) -> Sample:
         """The error at a part of the last step: between that before it and that after it."""
+        now = self._of(self.error, self.x, self.moment, self.left)
         if part >= 1.0:
-            return self
-        other = copy(self)
-        x, moment, left = self._before
-        other.error = part * self.error + (1.0 - part) * self._spare
-        other.x, other.moment = part * self.x + (1.0 - part) * x, part * self.moment + (1.0 - part) * moment
-        other.left = part * self.left + (1.0 - part) * left
-        return other
+            return Sample(*(x.copy() for x in now))
+        before = self._of(self._spare, *self._before)
+        return Sample(*(part * a + (1.0 - part) * b for a, b in zip(now, before, strict=True)))
 
-    def shift(self, ends: Ends, state: State) -> Shift:
-        """What the error makes of an output of `state`."""
-        now = self._end_forces(ends, state, 0.0)
-        forces = (self._end_forces(ends, state, SMALL) - now) / SMALL * ends.held[:, None]
-        return Shift(
-            self.position.copy(), self.error[1, :, :3].copy(), self.tension.copy(), self.moment.copy(),
-            self.ki * self.line.hn, forces, self.bending.tangent,
-        )  # fmt: skip
+    def _of(self, error: Floats, x: Floats, moment: Floats, left: Floats) -> Sample:
+        """What a sample takes of these."""
+        return Sample(error[:2], x[1:, 0], moment, left[self._ends])
 
-    def _end_forces(self, ends: Ends, state: State, part: float) -> Floats:
-        """Forces (2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""
+    def shift(self, samples: Sequence[Sample], batch: Batch) -> Shift:
+        """What the errors at the outputs of a batch make of them."""
+        error, tension, moment, left = (np.stack(x) for x in zip(*samples, strict=True))
+        now = self._end_forces(batch, error, tension, left, 0.0)
+        more = self._end_forces(batch, error, tension, left, SMALL)
+        forces = (more - now) / SMALL * batch.held[:, :, None]
+        last = (np.moveaxis(x, 0, -1) for x in (error[:, 0, :, :3], error[:, 1, :, :3], tension, moment))
+        return Shift(*last, self.ki * self.line.hn, np.moveaxis(forces, 0, -1), self.bending.tangent)
+
+    def _end_forces(self, batch: Batch, error: Floats, tension: Floats, left: Floats, part: float) -> Floats:
+        """Forces (nb, 2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""
         line, n = self.line, self.line.h.size
-        M = part * self.left[[0, 1, n - 1, n]]
+        M, shift = part * left, part * error[:, 0, :, :3]
         if line.spin[0] or line.spin[-1]:  # directors carried to the chords, and spun
-            e = state.e + part * np.diff(self.position, axis=0)
-            d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-            to = e / np.linalg.norm(e, axis=1)[:, None]
-            a = state.a1 - np.einsum("ij,ij,i->i", state.a1, to, 1.0 / (1.0 + (d * to).sum(axis=1)))[:, None] * (d + to)
-            psi = part * self.error[0, :-1, 3, None]
-            a = np.cos(psi) * a + np.sin(psi) * np.cross(to, a)
+            e = batch.e + np.diff(shift, axis=1)
+            a = self._carried(batch, e, part * error[:, 0, :-1, 3])
             found, strain = np.zeros((2, n + 1, 3))
-            observe(line, ends, e, state.v, a, state.w, found, strain, np.zeros(4))
-            M += found[[0, 1, n - 1, n]]
-        out = np.zeros((2, 3))
+            for k in range(len(e)):
+                observe(line, ends_in(batch, k), e[k], batch.v[k], a[k], batch.w[k], found, strain, np.zeros(4))
+                M[k] += found[self._ends]
+        out = np.zeros((len(batch.t), 2, 3))
         for k, c, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):
-            d = state.e[c] + part * (self.position[c + 1] - self.position[c])
-            l = sqrt(d @ d)
-            d /= l
-            x, y, z = d.tolist()
-            p, q, r = (M[2 * k + 1] - M[2 * k]).tolist()
-            across = np.array((y * r - z * q, z * p - x * r, x * q - y * p))
-            out[k] = sign * ((state.T[c] + part * self.tension[c]) * d + across / l)
+            e = batch.e[:, c] + (shift[:, c + 1] - shift[:, c])
+            l = np.sqrt(_dot(e, e))
+            d = e / l
+            T = batch.T[:, c, None] + part * tension[:, c, None]
+            out[:, k] = sign * (T * d + np.cross(d, M[:, 2 * k + 1] - M[:, 2 * k]) / l)
             if line.bits & SEABED:
-                out[k] += self._bed(k, c, state, part)
+                out[:, k] += self._bed(k, c, batch, part * error[:, :2])
         return out
 
-    def _bed(self, k: int, cell: int, state: State, part: float) -> Floats:
-        """Force (3,) N of the seabed on the first or last node, which is held, as its neighbour moves."""
-        sea, near = self.sea, (cell, cell + 1) if k == 0 else (cell + 1, cell)
-        shift, rate = self.error[0, :, :3], self.error[1, :, :3]
-        p = [sea.offset + 0.5 * sea.onset - float(sea.normal @ (state.r[i] + part * shift[i])) for i in near]
-        if max(p) <= 0.0:
-            return np.zeros(3)
-        rates = [-float(sea.normal @ (state.v[i] + part * rate[i])) for i in near]
-        N = contact(*p, *rates, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0]
-        return np.asarray(N * sea.normal)
+    @staticmethod
+    def _carried(batch: Batch, e: Floats, psi: Floats) -> Floats:
+        """Directors (nb, N, 3) of a batch carried to the chords e, and turned about them by psi (nb, N)."""
+        d, to = batch.e / np.sqrt(_dot(batch.e, batch.e)), e / np.sqrt(_dot(e, e))
+        a = batch.a1 - _dot(batch.a1, to) / (1.0 + _dot(d, to)) * (d + to)
+        return np.asarray(np.cos(psi)[..., None] * a + np.sin(psi)[..., None] * np.cross(to, a))
+
+    def _bed(self, k: int, cell: int, batch: Batch, error: Floats) -> Floats:
+        """Force (nb, 3) N of the seabed on the first or last node, which is held, as its neighbour moves."""
+        sea, near = self.sea, [cell, cell + 1] if k == 0 else [cell + 1, cell]
+        r, v = batch.r[:, near] + error[:, 0, near, :3], batch.v[:, near] + error[:, 1, near, :3]
+        normal = sea.normal
+        depth = sea.offset + 0.5 * sea.onset - (r[..., 0] * normal[0] + r[..., 1] * normal[1] + r[..., 2] * normal[2])
+        rates = -(v[..., 0] * normal[0] + v[..., 1] * normal[1] + v[..., 2] * normal[2])
+        out = np.zeros((len(depth), 3))
+        for i in np.flatnonzero(depth.max(axis=1) > 0.0):
+            p, q = depth[i].tolist(), rates[i].tolist()
+            out[i] = contact(*p, *q, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0] * normal
+        return out
 
     def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, with_friction: bool = False) -> None:
         """The error of an equilibrium; with_friction: friction took part in it, so that a shift is felt as friction."""

@@ -100,26 +100,35 @@ def compare(found: dict[str, Floats], expected: dict[str, Floats]) -> None:
         np.testing.assert_allclose(x, y, rtol=0.0, atol=SAME * float(np.abs(size).max()), err_msg=name)
 
 
+# Fields of a `Shift` that have a value for each output.
+OF_OUTPUTS = ("position", "velocity", "tension", "moment", "resultants")
+
+
+def shift_at(shift: Shift | None, i: int) -> Shift | None:
+    """What bending makes of output i."""
+    return shift and shift._replace(**{x: getattr(shift, x)[..., i] for x in OF_OUTPUTS})
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     values_of, checked = Observer.values_of, set()
     past: dict[Observer, list[tuple[Batch, Any, Any, dict[str, Floats]]]] = {}
 
     def watched(
-        self: Observer, batch: Batch, ratios: Floats | None = None, shifts: Sequence[Shift] | None = None
+        self: Observer, batch: Batch, ratios: Floats | None = None, shift: Shift | None = None
     ) -> dict[str, Floats]:
-        found = values_of(self, batch, ratios, shifts)
+        found = values_of(self, batch, ratios, shift)
         corrected = self.zone_rows[0][0] == "corrected" or self.zone_rows[-1][0] == "corrected"
         expected: dict[str, Floats] = {}
         for prefix, grid in (("", self.grid), ("right/", self._after)) if self.jumps.size else (("", self.grid),):
             each = range(batch.t.size)
-            rows = [plain_values(self, batch, i, shifts[i] if shifts else None, corrected, grid) for i in each]
+            rows = [plain_values(self, batch, i, shift_at(shift, i), corrected, grid) for i in each]
             expected |= {prefix + field: np.array([row[field] for row in rows], float) for field in rows[0]}
         part = LEFT if corrected else 1.0
         compare(found, {field: x * (part if field.startswith("errors/") else 1.0) for field, x in expected.items()})
         checked.update(found.keys() & expected.keys())
         copied = Batch(*(np.array(x) for x in batch))  # the next steps overwrite it
-        past.setdefault(self, []).append((copied, ratios, shifts, found))
+        past.setdefault(self, []).append((copied, ratios, shift, found))
         return found
 
     monkeypatch.setattr(Observer, "values_of", watched)
@@ -132,7 +141,13 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
     batches, _, shifts, found = zip(*taken, strict=True)
     batch = Batch(*(np.concatenate(parts) for parts in zip(*batches, strict=True)))
     wide = Batch(*(np.repeat(x, 3, axis=0).reshape(len(x), 3, *x.shape[1:])[:, 1] for x in batch))  # views
-    many = [shift for part in shifts for shift in part] if shifts[0] is not None else None
+    many = None
+    if shifts[0] is not None:
+        parts = zip(*shifts, strict=True)
+        joined = {
+            x: np.concatenate(part, axis=-1) for x, part in zip(Shift._fields, parts, strict=True) if x in OF_OUTPUTS
+        }
+        many = shifts[0]._replace(**joined)
     again = values_of(observer, wide, None, many)
     compare(again, {field: np.concatenate([part[field] for part in found]) for field in again})
     assert all(x.flags.c_contiguous and not np.shares_memory(x, wide.work) for x in again.values())
