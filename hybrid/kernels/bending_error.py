@@ -37,10 +37,8 @@ class Step(NamedTuple):
     """The step whose error is sought."""
 
     u: Floats  # (N+1, 3) m, displacement of the nodes in it
-    dt: float  # s, 0 for an equilibrium
-    before: float  # s, the step before it
-    rho: float  # spectral radius at infinity of the time scheme
-    torque: float  # N m, of the whole line as far as its rods do not carry it
+    numbers: Floats  # (4,) length, s, 0 for an equilibrium; that of the step before it; spectral radius at infinity of
+    # the time scheme; torque, N m, of the whole line as far as its rods do not carry it
 
 
 class ErrorArrays(NamedTuple):
@@ -263,7 +261,7 @@ def blank_error_job() -> ErrorJob:
     """A job with the types that every one has."""
     z, node = np.zeros, np.zeros((2, 3))
     arrays = ErrorArrays(node, z((2, 5)), node, node, z((1, 5)), z((1, 5)), z((2, 5)), z((4, 2, 4)), z(REPORT_SIZE))
-    bending, step = Bending(z(2), z(2, np.int8), z(1)), Step(node, 0.0, 0.0, 0.0, 0.0)
+    bending, step = Bending(z(2), z(2, np.int8), z(1)), Step(node, z(4))
     error = z((4, 2, 4))
     return ErrorJob(
         blank_line(1), no_sea(1), no_ends(), bending, blank_state(1), step, z(1), z(1), error, error, 1.0, arrays
@@ -280,7 +278,8 @@ def advance_error(table):
     Returns whether it is finite, how many nodes were clipped, and the node that was furthest.
     """
     line, sea, ends, bending, state, step, X, W, old, new, most, arrays = read(table)
-    n, dt, torque, work = state.e.shape[0], step.dt, step.torque, arrays.work
+    n, work = state.e.shape[0], arrays.work
+    dt, dt_before, rho, torque = step.numbers[0], step.numbers[1], step.numbers[2], step.numbers[3]
     chords, x, dM, M = arrays.chords, arrays.x, arrays.dM, arrays.M
     tabulate_chords(state.e, chords)
     neglected_moments(line, ends, bending, chords, chords, state.T, 0.0, work[0], dM, M)
@@ -288,7 +287,7 @@ def advance_error(table):
         turn_chords(chords, state.T, bending.floor, dM, arrays.turned)
         neglected_moments(line, ends, bending, chords, arrays.turned, state.T, torque, work[0], dM, M)
     moving = dt > 0.0
-    s = scheme(step.rho, step.before, dt) if moving else Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    s = scheme(rho, dt_before, dt) if moving else Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
     history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     if moving:
         predict_error(old, s, history)

@@ -125,6 +125,6 @@ def _compile_model_error(model: Model) -> None:
     from hybrid.simulation.bending_correction import corrector_for
 
     work = workspace(model.cells, keep=True)
-    step = Step(work.u, 0.0, 0.0, 0.0, 0.0)
+    step = Step(work.u, np.zeros(4))
     with np.errstate(all="ignore"):
         corrector_for(model).follow(model.line, model.sea.values, model.ends.values, model.start, step, work)

@@ -99,6 +99,7 @@ class Corrector:
         self.clipped, self.where, self.finite = 0, -1, True
         self.sea = no_sea(n)  # of the last step
         self._ends = [0, 1, n - 1, n]  # nodes
+        self._step: Step | None = None
         self._table = Table(blank_error_job())
 
     @property
@@ -150,8 +151,9 @@ class Corrector:
         now = self._end_forces(batch, error, tension, left, 0.0)
         more = self._end_forces(batch, error, tension, left, SMALL)
         forces = (more - now) / SMALL * batch.held[:, :, None]
-        last = (np.moveaxis(x, 0, -1) for x in (error[:, 0, :, :3], error[:, 1, :, :3], tension, moment))
-        return Shift(*last, self.ki * self.line.hn, np.moveaxis(forces, 0, -1), self.bending.tangent)
+        each = (error[:, 0, :, :3], error[:, 1, :, :3], tension, moment, forces)
+        r, v, T, M, F = (np.moveaxis(x, 0, -1) for x in each)
+        return Shift(r, v, T, M, self.ki * self.line.hn, F, self.bending.tangent)
 
     def _end_forces(self, batch: Batch, error: Floats, tension: Floats, left: Floats, part: float) -> Floats:
         """Forces (nb, 2, 3) N with which the first and the last cell pull at their nodes, a part of the error added."""
@@ -205,7 +207,7 @@ class Corrector:
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)
         entry.assembly(line, sea, ends, state._replace(v=still, vd=still, w=no_spin, wd=no_spin), 0.0, ca, work)
         self.slid[:] = 0.0
-        self.follow(line, sea, ends, state, Step(still, 0.0, 0.0, 0.0, torque), work)
+        self.follow(line, sea, ends, state, Step(still, np.array([0.0, 0.0, 0.0, torque])), work)
 
     def step(
         self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, before: float, rho: float,
@@ -213,7 +215,10 @@ class Corrector:
     ) -> None:  # fmt: skip
         """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
         work = stepper.work
-        self.follow(self.line, sea, ends, state, Step(work.u, dt, before, rho, torque), work)
+        if self._step is None or self._step.u is not work.u:
+            self._step = Step(work.u, np.zeros(4))
+        self._step.numbers[:] = dt, before, rho, torque
+        self.follow(self.line, sea, ends, state, self._step, work)
 
     def follow(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, work: Work) -> None:
         """The error after `step`, with the factors of the matrix that stand in `work`."""

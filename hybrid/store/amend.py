@@ -12,10 +12,9 @@ import h5py
 import numpy as np
 
 from hybrid.store.checkpoint import BEFORE
-from hybrid.store.copying import copied
 from hybrid.store.format import EVENTS, Field, annotate, attach, checked
-from hybrid.store.hdf5_file import beside, drafted, in_memory, open_file, unwritable
-from hybrid.store.integrity import sign
+from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
+from hybrid.store.integrity import copy_unsigned, sign
 from hybrid.store.table import Table
 
 
@@ -43,8 +42,10 @@ def amend(
     target = target.expanduser().resolve()
     new = beside(target)  # and then in its place: somebody may be reading
     try:
-        with open_file(target) as old, drafted(new) as file:
-            copied(old, file, None, without={BEFORE} if done else ())
+        copy_unsigned(target, new)
+        with redrafted(new) as file:
+            if done and BEFORE in file:
+                del file[BEFORE]
             _add(file, fields, attributes, events)
         sign(new)
         os.replace(new, target)
@@ -64,6 +65,8 @@ def _add(
         file.attrs[name] = value
     for field, values in fields:
         checked(field, values[0])
+        if field.name in file:  # of a result that was amended before, and then resumed
+            del file[field.name]
         data = file.create_dataset(field.name, data=values)
         annotate(data, field.unit, field.description, field.frame)
         attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])

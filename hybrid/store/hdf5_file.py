@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import os
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -129,13 +129,18 @@ class _Draft(io.FileIO):
 
 
 @contextmanager
-def drafted(path: Path) -> Iterator[h5py.File]:
+def drafted(path: Path, mode: str = "w") -> Iterator[h5py.File]:
     """A new file that is made in one go; OSError when it could not be written."""
-    with _Draft(path, "w+") as draft:
-        with h5py.File(draft, "w", libver=_LIBVER) as file:
+    with _Draft(path, f"{mode.rstrip('+')}+") as draft:
+        with h5py.File(draft, mode, libver=_LIBVER) as file:
             yield file
         if draft.error is not None:
             raise draft.error
+
+
+def redrafted(path: Path) -> AbstractContextManager[h5py.File]:
+    """A file that is there and that nobody else has opened, changed in one go; errors as of `drafted`."""
+    return drafted(path, "r+")
 
 
 def created(path: Path, make: bytes | Callable[[Path], None]) -> h5py.File:

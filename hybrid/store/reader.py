@@ -34,8 +34,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import h5py
 import numpy as np
+from h5py import h5a, h5d, h5ds, h5o
 
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
@@ -79,20 +79,21 @@ class Result:
         self.units: dict[str, str] = {}
         groups: set[str] = set()
 
-        def visit(name: str, item: Any) -> None:
+        def visit(path: bytes, info: Any) -> None:  # HDF5's own interface: objects of h5py take four times as long
+            name = path.decode()
             if name.split("/")[0] in HIDDEN:
                 return
-            if isinstance(item, h5py.Dataset) and name not in TEXTS:
+            if info.type == h5o.TYPE_DATASET and name not in TEXTS:
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
                     name = OLD_NAMES[name]
-                labels = item.attrs.get("DIMENSION_LABELS", ("",) * item.ndim)
-                self._dims[name] = tuple(plain_text(label) for label in labels)
-                self.units[name] = plain_text(item.attrs.get("units", ""))
-            elif isinstance(item, h5py.Group):
+                data = h5d.open(self._file.id, path)
+                self._dims[name] = tuple(plain_text(h5ds.get_label(data, k)) for k in range(data.rank))
+                self.units[name] = _units(data)
+            elif info.type == h5o.TYPE_GROUP:
                 groups.add(name)
 
-        self._file.visititems(visit)
+        h5o.visit(self._file.id, visit, info=True)
         self.names = tuple(self._dims)
         self.units |= {alias: self.units[name] for alias, name in ALIASES.items() if name in self.units}
         # Taken once, so that everything read later shows the same moment of a file that grows.
@@ -376,6 +377,16 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
 def _current(name: str) -> str:
     """The name a dataset has now, from an alias or from the name an older version gave it."""
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
+
+
+def _units(data: Any) -> str:
+    """The unit of a dataset of HDF5's own interface; empty if it has none."""
+    if not h5a.exists(data, b"units"):
+        return ""
+    attribute = h5a.open(data, b"units")
+    value = np.empty(attribute.shape, attribute.dtype)
+    attribute.read(value)
+    return plain_text(value[()])
 
 
 def _plain(value: Any) -> Any:
