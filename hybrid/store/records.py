@@ -72,7 +72,7 @@ class Columns(Mapping[str, np.ndarray]):
         return self[key]
 
     def __contains__(self, key: object) -> bool:
-        return key in self._keys
+        return f"{self._group}/{key}" in self._result
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._keys)
