@@ -45,6 +45,8 @@ from hybrid.cli.tables import (
     equilibrium_table,
     errors_facts,
     errors_table,
+    extremes_facts,
+    extremes_table,
     import_notes,
     judged,
     trade_table,
@@ -261,7 +263,9 @@ def _ended(
         console.show(lambda: errors_table(errors, result))
     else:
         text += "; error not estimated"
-    facts |= {"errors": errors}
+    extremes = extremes_facts(result)
+    console.show(lambda: extremes_table(extremes))
+    facts |= {"errors": errors, "extremes": extremes}
     console.done(text, target, picture, status=result.status, t=duration, steps=steps, wall=wall, **facts)
 
 

@@ -5,6 +5,7 @@ rich is imported when a table is made: a command that prints JSON does without.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,18 +20,66 @@ if TYPE_CHECKING:
 
 def equilibrium_facts(result: Result) -> dict[str, Any]:
     """What one asks of an equilibrium first; None for what its solver does not report."""
-    s, tension, position = result.s, result.tension[-1], result.position[-1]
-    low, high, bottom = int(tension.argmin()), int(tension.argmax()), int(position[:, 2].argmin())
+    s, position = result.s, result.position[-1]
+    bottom = int(position[:, 2].argmin())
     force = {end: result[f"reaction_{end}"][-1].tolist() for end in ("start", "end") if f"reaction_{end}" in result}
     return {
         "path": result.attributes.get("static_path", result.message),
         "residual": result.attributes.get("static_residual"),
-        "tension_max": {"value": float(tension[high]), "s": float(s[high])},
-        "tension_min": {"value": float(tension[low]), "s": float(s[low])},
+        **extremes_facts(result),
         "lowest": {"position": position[bottom].tolist(), "s": float(s[bottom])},
         "force": force,
         "zones": [zone._asdict() if hasattr(zone, "_asdict") else asdict(zone) for zone in result.zones[-1]],
     } | _on_the_seabed(result)
+
+
+def extremes_facts(result: Result) -> dict[str, Any]:
+    """Largest and smallest tension (N), smallest bend radius (m) with s (m) and t (s), and the limits of sections.
+
+    Of every accepted step where the file has its envelope, else of the outputs.
+    """
+    from hybrid.view.worst import limits_of, worst
+
+    found: dict[str, Any] = {}
+    for key, low in (("tension_max", False), ("tension_min", True)):
+        x = worst(result, "tension", lowest=low)
+        found[key] = {"value": x.value, "s": x.s, "t": x.t}
+    if "curvature" in result:
+        x = worst(result, "curvature")
+        straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
+        found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
+    return found | {"limits": [x._asdict() for x in limits_of(result)]}
+
+
+def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str]]:
+    """The same in words; moves: whether there are times."""
+    limits = {x["limit"]: x for x in facts["limits"]}
+    rows = (
+        ("largest tension", "tension_max", "N", "max_tension"), ("smallest tension", "tension_min", "N", "min_tension"),
+        ("smallest bend radius", "bend_radius_min", "m", "min_bend_radius"),
+    )  # fmt: skip
+    for title, key, unit, limit in rows:
+        x, held = facts.get(key), limits.get(limit)
+        if x is None:
+            continue
+        text = f"{x['value']:.5g} {unit} at s = {x['s']:.5g} m" + f", t = {x['t']:.5g} s" * moves
+        if held is not None and held["broken"]:
+            there = "" if (held["s"], held["t"]) == (x["s"], x["t"]) else f" at s = {held['s']:.5g} m"
+            text += f"; {limit} of {held['allowed']:.5g} {unit} BROKEN{there}"
+        elif held is not None:
+            text += f"; within {limit}"
+        yield title, text
+
+
+def extremes_table(facts: dict[str, Any]) -> Any:
+    """What a run has reached, over all of its time."""
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    for row in extremes_rows(facts, moves=True):
+        table.add_row(*row)
+    table.columns[0].style = "bold"
+    return table
 
 
 def _on_the_seabed(result: Result) -> dict[str, Any]:
@@ -53,8 +102,8 @@ def equilibrium_table(facts: dict[str, Any]) -> Any:
     table.add_row("found by", facts["path"].replace("; ", "\n"))
     if facts["residual"] is not None:
         table.add_row("residual force", f"{facts['residual']:.2g} N at most")
-    for name, key in (("largest tension", "tension_max"), ("smallest tension", "tension_min")):
-        table.add_row(name, f"{facts[key]['value']:.5g} N at s = {facts[key]['s']:.5g} m")
+    for row in extremes_rows(facts, moves=False):
+        table.add_row(*row)
     for end, force in facts["force"].items():
         table.add_row(f"force at {end}", f"{vector(force)} N on the cable")
     if facts.get("grounded_length"):

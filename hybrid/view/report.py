@@ -152,6 +152,7 @@ def _facts(facts: list[Fact], several: bool) -> str:
         if fact.key == "warning" and fact.weight == "alarm":
             continue
         table = _error_table(fact) if fact.key == "errors" and fact.values else ""
+        table = _limit_table(fact) if fact.key == "limits" and fact.values else table
         text = f"<dt>{escape(fact.title)}</dt><dd>{_code(fact.text)}{table}</dd>{_show(fact, several)}"
         rows.append(f'<div class="fact {fact.weight}" id="fact-{fact.key}">{text}</div>')
     return f'<dl class="facts">{"".join(rows)}</dl>'
@@ -164,6 +165,17 @@ def _error_table(fact: Fact) -> str:
         factor, written = prefix(unit, max((x for x in cells if x is not None), default=0.0))
         rows.append([f"{name} ({written})", *("–" if x is None else short(x * factor, 2) for x in cells)])
     return _table(rows, ["largest error by", *CAUSES.values()], numbers=len(CAUSES))
+
+
+def _limit_table(fact: Fact) -> str:
+    rows = []
+    for x in fact.values["limits"]:
+        unit = "m" if x["limit"] == "min_bend_radius" else "N"
+        used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
+        verdict = "broken" if x["broken"] else "kept"
+        numbers = [amount(x["allowed"], unit), amount(x["value"], unit), used, short(x["s"], 5), short(x["t"], 5)]
+        rows.append([x["limit"], verdict, *numbers])
+    return _table(rows, ["limit", "", "allowed", "reached", "used", "s (m)", "t (s)"], numbers=5)
 
 
 def _table(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0) -> str:

@@ -1,7 +1,7 @@
 """A result in numbers and plain sentences: warnings, tension, bends, slack, torque, seabed, errors, status.
 
-`facts_of(result)` reads every output and every grid point, with both values where a quantity jumps, whatever a page
-later draws of them.  A fact has a weight:
+`facts_of(result)` reads the envelope, which knows every accepted step, and every output and grid point, with both
+values where a quantity jumps, whatever a page later draws of them.  A fact has a weight:
 "alarm", a limit is broken or a warning was given; "note", worth knowing; "plain"; "absent", with the reason.
 """
 
@@ -12,15 +12,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, weight_of_event
+from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
+from hybrid.store.envelope import NOTHING, has_envelope
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
-from hybrid.view.along import Along, along
+from hybrid.view.along import along
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix
+from hybrid.view.worst import Worst, limits_of, worst
 
-# Of the largest tension: what is below is what the solver's tolerance leaves of a force of zero, as at a free end.
-NOTHING = 1e-6
 # Of the largest tension: a torque that asks for less of it is no torque that throws loops.
 PART_OF_TENSION = 1e-4
 HOCKLING = (
@@ -46,7 +46,7 @@ def facts_of(result: Result) -> list[Fact]:
     """All facts, in the order of importance to a reader: warnings, loads, limits, errors, status."""
     facts = [*_warnings(result)]
     if len(result.times):
-        makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _hockling, _seabed, _errors)
+        makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
         facts += [make(result) for make in makers]
     return [*facts, _status(result)]
 
@@ -124,6 +124,8 @@ def warnings_of(result: Result) -> list[tuple[Event, int]]:
 def _warnings(result: Result) -> list[Fact]:
     facts = []
     for event, count in warnings_of(result):
+        if event.kind in LIMIT_EVENTS.values():
+            continue  # facts of their own
         more = f" ({count} times; this is the first)" if count > 1 else ""
         at = f"At t = {event.t:.5g} s, " if len(result.times) > 1 else ""
         where = f"s = {event.s_a:.4g} m: " if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m: "
@@ -139,71 +141,92 @@ def _warnings(result: Result) -> list[Fact]:
 
 
 def _tension(result: Result) -> Fact:
-    found = along(result, "tension")
-    tension = found.values
-    i, k = _at(tension, int(tension.argmax()))
-    most, t, s = float(tension[i, k]), float(result.times[i]), float(found.s[k])
-    text = f"{amount(most, 'N')} {place(result, s)}{moment(result, t)}{_doubt(result, 'tension', i, found, k)}."
-    values: dict[str, Any] = {"tension": most}
+    found = worst(result, "tension")
+    doubt = _doubt(result, "tension", found)
+    text = f"{amount(found.value, 'N')} {place(result, found.s)}{moment(result, found.t)}{doubt}."
+    values: dict[str, Any] = {"tension": found.value}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
             force = result[f"steps/end_force_{end}"]
             n = int(force.argmax())
             values[f"end_force_{end}"], when = float(force[n]), float(result["steps/t"][n])
-            if force[n] > most * (1.0 + 1e-3):
-                text += f" Between outputs the force at the {end} reaches {amount(force[n], 'N')}, at t = {when:.5g} s."
-    return Fact("tension", "Largest tension", text, values=values, t=t, s=s)
+            if force[n] > found.value * (1.0 + 1e-3):
+                between = "The" if has_envelope(result) else "Between outputs the"
+                text += f" {between} force at the {end} reaches {amount(force[n], 'N')}, at t = {when:.5g} s."
+    return _with_limit(
+        result, "max_tension", Fact("tension", "Largest tension", text, "plain", values, found.t, found.s)
+    )
 
 
-def _doubt(result: Result, name: str, i: int, found: Along, k: int) -> str:
-    """The estimated error at one output and place, where the file has it."""
-    error = found.of(result, f"errors/total/{name}")
-    if error is None or error.ndim < 2:
-        return ""
-    return f" (± {amount(float(error[i, k]), result.units[name], 2)})"
+def _with_limit(result: Result, limit: str, fact: Fact) -> Fact:
+    """A fact on tension with the limit that it is held against."""
+    for x in limits_of(result):
+        if x.limit == limit:
+            values = fact.values | {"allowed": x.allowed, "broken": x.broken}
+            if not x.broken:
+                text = f"{fact.text} Within the {amount(x.allowed, 'N')} allowed."
+                return fact._replace(text=text, values=values)
+            side = "above" if limit == "max_tension" else "below"
+            here = (x.s, x.t) == (fact.s, fact.t)
+            there = "" if here else f": {amount(x.value, 'N')} {place(result, x.s)}{moment(result, x.t)}"
+            text = f"{fact.text} That is {side} the {amount(x.allowed, 'N')} allowed{there}."
+            return fact._replace(text=text, values=values, weight="alarm", t=x.t, s=x.s)
+    return fact
+
+
+def _error(result: Result, name: str, found: Worst) -> float | None:
+    """The estimated error at the output and place nearest to a value; None where the file has none."""
+    error = along(result, name).of(result, f"errors/total/{name}")
+    return None if error is None or error.ndim != 2 else float(error[found.output, found.place])
+
+
+def _doubt(result: Result, name: str, found: Worst) -> str:
+    error = _error(result, name, found)
+    return "" if error is None else f" (± {amount(error, result.units[name], 2)})"
 
 
 def _bend(result: Result) -> Fact:
     title = "Smallest bend radius"
     if "curvature" not in result:
         return Fact("bend", title, "The curvature was not recorded.", "absent")
-    found = along(result, "curvature")
-    limit, curvature = found.of(result, "min_bend_radius"), found.values
-    i, k = _at(curvature, int(curvature.argmax()))
-    most, t, s = float(curvature[i, k]), float(result.times[i]), float(found.s[k])
-    values: dict[str, Any] = {"radius": 1.0 / most if most > 0.0 else None, "allowed": None, "ratio": None}
+    found = worst(result, "curvature")
+    values: dict[str, Any] = {
+        "radius": 1.0 / found.value if found.value > 0.0 else None,
+        "allowed": None,
+        "ratio": None,
+    }
     place_of: tuple[float | None, float | None]
-    if most * float(np.ptp(result.s)) < STILL:
+    if found.value * float(np.ptp(result.s)) < STILL:
         text, place_of = "The cable stays straight, to round-off.", (None, None)
     else:
-        kind = _kind_at(result, int(i), found, int(k))
+        kind = _kind_at(result, found)
         stiff = "" if kind == "rod" else ", which does not resist bending"
         inside = f", in a {kind} zone{stiff}" if kind else ""
-        text = f"{amount(1.0 / most, 'm')} {place(result, s)}{moment(result, t)}{inside}"
-        text += f"{_doubt_of_radius(result, i, found, k)}."
-        place_of = (t, s)
+        text = f"{amount(1.0 / found.value, 'm')} {place(result, found.s)}{moment(result, found.t)}{inside}"
+        text += f"{_doubt_of_radius(result, found)}."
+        place_of = (found.t, found.s)
     unknown = _bends_left_out(result)
     text += unknown
-    if limit is None:
+    limits = [x for x in limits_of(result) if x.limit == "min_bend_radius"]
+    if not limits:
         weight = "note" if unknown else "plain"
         return Fact("bend", title, f"{text} No allowed radius given.", weight, values, *place_of)
-    ratio = curvature * limit  # above 1: too tight; NaN where nothing is allowed or forbidden
-    if np.isnan(ratio).all():
-        return Fact("bend", title, f"{text} No allowed radius given.", "plain", values, *place_of)
-    i, k = _at(ratio, int(np.nanargmax(ratio)))
-    worst, allowed = float(ratio[i, k]), float(limit[k])
-    values |= {"allowed": allowed, "ratio": worst, "radius_there": 1.0 / max(float(curvature[i, k]), ZERO)}
-    t, s = float(result.times[i]), float(found.s[k])
-    if worst > 1.0:
-        times = int((np.nan_to_num(ratio) > 1.0).any(axis=1).sum())
-        part = f", at {times} of {len(result.times)} outputs" if len(result.times) > 1 else ""
-        there = f": {amount(values['radius_there'], 'm')} {place(result, s)}{moment(result, t)}"
+    (limit,) = limits
+    allowed, used, t, s = limit.allowed, limit.used or 0.0, limit.t, limit.s
+    values |= {"allowed": allowed, "ratio": used, "radius_there": limit.value}
+    if limit.broken:
+        bends = along(result, "curvature")
+        least = bends.of(result, "min_bend_radius")
+        shown = 0 if least is None else int((np.nan_to_num(bends.values * least) > 1.0).any(axis=1).sum())
+        part = f", at {shown} of {len(result.times)} outputs" if shown else ", between outputs"
+        part = part if len(result.times) > 1 else ""
+        there = f": {amount(limit.value, 'm')} {place(result, s)}{moment(result, t)}"
         verdict = f"That is below the {amount(allowed, 'm')} allowed{'' if (t, s) == place_of else there}{part}."
         return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
     if unknown:
         verdict = f"Allowed are {amount(allowed, 'm')}; whether that holds there is not known."
         return Fact("bend", title, f"{text} {verdict}", "alarm", values, t, s)
-    verdict = f"Allowed are {amount(allowed, 'm')}: {short(100 * worst, 3)} % of that bend is used."
+    verdict = f"Allowed are {amount(allowed, 'm')}: {short(100 * used, 3)} % of that bend is used."
     return Fact("bend", title, f"{text} {verdict}", "plain", values, t, s)
 
 
@@ -216,44 +239,56 @@ def _bends_left_out(result: Result) -> str:
     return f" Not known at {where}, where the bend at a point load or clamp is left out: say force_rod there."
 
 
-def _kind_at(result: Result, i: int, found: Along, k: int) -> str:
-    """Kind of the zone at an output and place: at a joint that of its side, or the rod where it has but one value."""
-    s, side = found.s[k], found.side(k)
-    kinds = [zone.kind for zone in result.zones[i] if zone.s_a <= s <= zone.s_b]
-    if not side and "rod" in kinds:
+def _kind_at(result: Result, found: Worst) -> str:
+    """Kind of the zone at a place and time: at a joint that of its side, or the rod where it has but one value."""
+    zones = result.zones[found.output]
+    kinds = [zone.kind for zone in zones if zone.s_a <= found.s <= zone.s_b]
+    if not found.side and "rod" in kinds:
         return "rod"
-    return kinds[-1 if side > 0 else 0] if kinds else ""
+    return kinds[-1 if found.side > 0 else 0] if kinds else ""
 
 
-def _doubt_of_radius(result: Result, i: int, found: Along, k: int) -> str:
-    error = found.of(result, "errors/total/curvature")
-    if error is None:
-        return ""
-    part = float(error[i, k]) / float(found.values[i, k])
-    return f" (± {short(100 * part, 2)} %)"
+def _doubt_of_radius(result: Result, found: Worst) -> str:
+    error = _error(result, "curvature", found)
+    return "" if error is None else f" (± {short(100 * error / found.value, 2)} %)"
 
 
 def _slack(result: Result) -> Fact:
-    found, title = along(result, "tension"), "Lowest tension"
-    tension = found.values
-    i, k = _at(tension, int(tension.argmin()))
-    least, t, s = float(tension[i, k]), float(result.times[i]), float(found.s[k])
-    zero = NOTHING * float(np.abs(tension).max())
+    along_line, title = along(result, "tension"), "Lowest tension"
+    found, tension = worst(result, "tension", lowest=True), along_line.values
+    zero = NOTHING * max(float(np.abs(tension).max()), abs(worst(result, "tension").value))
     pressed = tension < -zero
-    weights = np.gradient(found.s) if len(found.s) > 1 else np.ones(1)
+    weights = np.gradient(along_line.s) if len(along_line.s) > 1 else np.ones(1)
     length, outputs = float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
-    values = {"tension": least, "outputs": outputs, "length": length}
-    there = f"{place(result, s)}{moment(result, t)}"
+    values = {"tension": found.value, "outputs": outputs, "length": length}
+    there, weight = f"{place(result, found.s)}{moment(result, found.t)}", "plain"
     if outputs:
         part = f"at {outputs} of {len(result.times)} outputs" if len(result.times) > 1 else "at rest"
-        text = f"{amount(least, 'N')} {there}: the cable is slack or compressed {part}, at most {length:.3g} m of it."
-        return Fact("slack", title, text, "note", values, t, s)
-    if least <= zero:
-        return Fact("slack", title, f"Zero, {there}; nowhere is the cable compressed.", "plain", values, t, s)
-    covered = float(np.ptp(result.s)) >= 0.999 * length_of(result)
-    where = "everywhere" if covered else "at all points that were saved"
-    text = f"{amount(least, 'N')} {there}: the cable is taut {where}{' and always' * (len(result.times) > 1)}."
-    return Fact("slack", title, text, "plain", values, t, s)
+        text = f"{amount(found.value, 'N')} {there}: the cable is slack or compressed {part}"
+        text += f", at most {length:.3g} m of it."
+        weight = "note"
+    elif found.value < -zero:
+        text, weight = f"{amount(found.value, 'N')} {there}: the cable is slack or compressed between outputs.", "note"
+    elif found.value <= zero:
+        text = f"Zero, {there}; nowhere is the cable compressed."
+    else:
+        covered = has_envelope(result) or float(np.ptp(result.s)) >= 0.999 * length_of(result)
+        where = "everywhere" if covered else "at all points that were saved"
+        always = " and always" * (len(result.times) > 1)
+        text = f"{amount(found.value, 'N')} {there}: the cable is taut {where}{always}."
+    return _with_limit(result, "min_tension", Fact("slack", title, text, weight, values, found.t, found.s))
+
+
+def _limits(result: Result) -> Fact:
+    """All limits of the sections in one table."""
+    found, title = limits_of(result), "Limits of the sections"
+    if not found:
+        return Fact("limits", title, "None given: min_bend_radius, max_tension or min_tension of a section.", "absent")
+    broken = sum(x.broken for x in found)
+    text = f"{broken} of {len(found)} broken" if broken else "All are kept"
+    text += ", over every accepted step." if has_envelope(result) else ", at the outputs that were saved."
+    values = {"limits": [x._asdict() for x in found]}
+    return Fact("limits", title, text, "plain", values)
 
 
 def _hockling(result: Result) -> Fact:
