@@ -21,6 +21,7 @@ from hybrid.simulation.failure import explanation, failed_node, snapshot
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
 from hybrid.simulation.transient import StepFailed, Transient
+from hybrid.simulation.transient_checkpoint import checkpoint, restore
 from hybrid.solve.run import Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.memory_recorder import MemoryRecorder
@@ -277,7 +278,7 @@ class TimeLoop:
 
     def checkpoint(self) -> dict[str, Any]:
         """What the rest of the run depends on, between two steps."""
-        return self.run.checkpoint() | {
+        return checkpoint(self.run) | {
             "watch": self.diagnostics.checkpoint(self.run.run), "cpu": clock.process_time() - self._cpu,
             "first_energy": self.observer.first_energy or 0.0,
         }  # fmt: skip
@@ -285,7 +286,7 @@ class TimeLoop:
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
-        self.run.restore({name: x for name, x in saved.items() if name not in mine})
+        restore(self.run, {name: x for name, x in saved.items() if name not in mine})
         found = matched({name: saved[name] for name in mine}, mine, "state")
         self._cpu, self._logged = clock.process_time() - found["cpu"], found["cpu"]
         self.observer.first_energy = found["first_energy"]

@@ -7,9 +7,8 @@ decides that a healthy step was the last: simulation.time_loop.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -17,10 +16,10 @@ from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.generalized_alpha import STEEPEST
-from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
+from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import State, blank_state
-from hybrid.kernels.step_law import FIRST, WARY
+from hybrid.kernels.state import State
+from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model, build
 from hybrid.model.plan import parts
 from hybrid.model.plane import in_space, planar
@@ -31,12 +30,10 @@ from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
-from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
-from hybrid.store.named_arrays import matched
 
 LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
 READY = STEEPEST  # times as long may it be before: a change must not shorten it by more than the scheme's weights carry
@@ -72,20 +69,20 @@ class Transient:
         """
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
-        self.switching, self.correction, self._beyond = switching, correction, -np.inf
+        self.switching, self.correction, self.beyond = switching, correction, -np.inf
         self._followed = (0.0, 0.0)  # s, begin and end of the step through which the model error was followed last
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
-        self._turned = False  # whether an event has told of steps cut by the turn of an end
+        self.turned = False  # whether an event has told of steps cut by the turn of an end
         self._pending: Change | None = None
         self._leaves, self._rescues = False, 0
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
-        self._set_model(model, model.start)
+        self.set_model(model, model.start)
 
     def _set_control(self, resolution: Resolution) -> None:
         """How long steps may be."""
@@ -159,7 +156,7 @@ class Transient:
         begun = self.plane_monitor.begin(model, state, self._note)
         if self.envelope is not None:
             self.envelope.count_from(begun, state.r)
-        self._set_model(begun, state)
+        self.set_model(begun, state)
         self._find_accelerations()
         if self.switching is not None:
             self.switching.begin(begun.ends.values, state)
@@ -322,10 +319,10 @@ class Transient:
     def _note_cut(self) -> None:
         """An end turns too far in a fixed step, which was cut: an event for the first."""
         clock, most = self.run.clock, self.resolution.turn
-        if not self._turned and not self.controlled:
+        if not self.turned and not self.controlled:
             text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
             self.events.event(float(clock[b.PREVIOUS]), 0.0, self.model.length, "steps cut", text)
-        self._turned, clock[b.MUTE_CUTS] = True, 1.0
+        self.turned, clock[b.MUTE_CUTS] = True, 1.0
 
     def _correct(self, correction: Correction, end: float, dt: float) -> None:
         """Follow the error of neglecting bending through the step just taken; an event where it cannot be estimated."""
@@ -333,10 +330,10 @@ class Transient:
         correction.step(self.stepper, self.model.ends.values, self.state, dt, before, self.rho)
         self._followed = end - dt, end
         beyond = correction.beyond
-        if beyond and end > self._beyond:  # once in a while that it takes the whole line to move
+        if beyond and end > self.beyond:  # once in a while that it takes the whole line to move
             s = float(self.model.line.s[max(correction.corrector.where, 0)])
             self.events.event(end, s, s, "model error not estimated", beyond)
-            self._beyond = end + self.model.time_scale
+            self.beyond = end + self.model.time_scale
 
     def _sample_error(self, correction: Correction) -> None:
         """The model error at outputs that were sampled since the last call: they lie in the step followed last."""
@@ -355,10 +352,10 @@ class Transient:
         if self._leaves:
             self._leaves = False
             state = self.state.copy()
-            self._set_model(self.plane_monitor.leave(self.model, self.run, state), state)
-            self._evaluate_forces()
+            self.set_model(self.plane_monitor.leave(self.model, self.run, state), state)
+            self.evaluate_forces()
 
-    def _evaluate_forces(self) -> None:
+    def evaluate_forces(self) -> None:
         """The forces and the powers of a state that has changed between two steps."""
         model = self.model
         self.stepper.evaluate_forces(model.sea.at(self.t), model.ends.at(self.t), self.state)
@@ -380,10 +377,10 @@ class Transient:
                 self.t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
                 criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
             )  # fmt: skip
-        self._set_model(model, state)
+        self.set_model(model, state)
         if self.correction is not None:
             self.correction.switch(model)
-        self._evaluate_forces()
+        self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
             run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
 
@@ -406,7 +403,7 @@ class Transient:
             model = replace(model, line=in_space(model.line), plane=None)
         if self.correction is not None:
             self.correction.switch(model)
-        self._set_model(model, state)
+        self.set_model(model, state)
         if self.switching is not None:
             self.switching.manager.moments = model.ends.moments
             self.switching.manager.loaded = bool(model.ends.moments.any())
@@ -416,7 +413,7 @@ class Transient:
         self.events.event(self.t, 0.0, model.length, "loads change", text)
         self.restart()
 
-    def _set_model(self, model: Model, state: State) -> None:
+    def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
         if self.envelope is not None:
             self.envelope.fold(self.model.line.s, self.run.books.extremes)
@@ -438,101 +435,8 @@ class Transient:
         s = float(self.model.line.s[node])
         self.events.event(self.t, s, s, kind, text)
 
-    # --- checkpoints ----------------------------------------------------------------------------
-
-    def checkpoint(self) -> dict[str, Any]:
-        """What the next steps depend on, between two steps: named arrays and plain values (simulation.restore)."""
-        model, clock, count, books = self.model, self.run.clock, self.run.count, self.run.books
-        control = {
-            "next": float(clock[b.NEXT_DT]), "before": float(clock[b.ERROR_RATIO]), "wary": int(count[b.WARY])
-        }  # fmt: skip
-        parts_: dict[str, Any] = {"ends": model.ends, "zoning": self.switching, "correction": self.correction}
-        return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
-            "t": self.t, "dt": float(clock[b.LAST_DT]), "steps": self.steps, "iterations": int(count[b.ITERATIONS]),
-            "changes": self.changes, "_turned": self._turned, "_beyond": self._beyond,
-            "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
-            "_stored": float(clock[b.STORED]),
-            "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
-            "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
-            "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if self.controlled else None,
-            "state": self.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
-            "push": self.plane_monitor.checkpoint(self.run),
-            "envelope": self.envelope and self.envelope.checkpoint(books.extremes),
-        }  # fmt: skip
-
-    def restore(self, saved: Mapping[str, Any]) -> None:
-        """Continue as `checkpoint` has written, on a model that was made for it.
-
-        ValueError or ResultError: that cannot be.
-        """
-        model, monitor, run = self.model, self.plane_monitor, self.run
-        if saved["push"] is not None and model.plane is not None:
-            monitor.speed = model.length / model.time_scale
-        state = blank_state(model.cells)
-        self._set_model(model, state)
-        complete = "report" in saved  # not in a checkpoint of 0.6
-        free = dict.fromkeys(("mesh", "plane", "envelope"))
-        template = self.checkpoint() | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
-        older = {"report": run.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
-        older |= {"envelope": None}
-        saved = matched(older | dict(saved), template, "state")
-        clock, count, books = run.clock, run.count, run.books
-        clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
-        clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
-        count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
-        self.changes, self._beyond, self._turned = saved["changes"], saved["_beyond"], saved["_turned"]
-        clock[b.MUTE_CUTS] = float(self._turned)
-        clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
-        books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
-        books.tension[0] = saved["tension"]
-        for mine, its in ((state, saved["state"]), (run.before, saved["state"])):
-            for name, x in its.items():
-                getattr(mine, name)[:] = x
-        model.sea.at(self.t)
-        apart = model.ends.restore(saved["ends"], self.t)
-        if apart > SAME_PLACE * model.length:
-            moved = f"an end is {apart:.3g} m from where it was at t = {self.t:.6g} s: has its motion file changed?"
-            raise ValueError(moved)
-        run.move(model.ends.moves())
-        books.velocity[:] = model.ends.velocity
-        if saved["control"] is not None:
-            self._restore_control(saved["control"])
-        if saved["push"] is not None:
-            monitor.restore(saved["push"], run)
-        if self.switching is not None:
-            self.switching.restore(saved["zoning"])
-        if self.correction is not None:
-            self.correction.restore(saved["correction"])
-        count[b.OUTPUT] = np.searchsorted(books.outputs, self.t + SAME_TIME * saved["dt"], side="right")
-        self._restore_envelope(saved["envelope"])
-        if not complete:
-            self._evaluate_forces()
-        count[b.PHASE] = b.BEGIN_STEP
-
-    def _restore_envelope(self, saved: Mapping[str, Any] | None) -> None:
-        """Extremes up to here; where the checkpoint has none they begin here, and an event says so."""
-        envelope, books, nodes = self.envelope, self.run.books, self.model.line.s
-        if envelope is None:
-            return
-        if saved is None:
-            envelope.begin = self.t
-            envelope.count_from(self.model, self.state.r)
-            text = f"the file has no extremes of the steps before t = {self.t:.6g} s: the envelope is of those after it"
-            self.events.event(self.t, 0.0, self.model.length, "envelope incomplete", text)
-        else:
-            envelope.restore(saved, books.extremes)
-        books.start[:] = envelope.start_of(nodes)
-
     def envelope_values(self) -> dict[str, np.ndarray]:
         """Values of the envelope in the file, up to now; none where no extremes are kept."""
         if self.envelope is None:
             return {}
         return self.envelope.values(self.model.line.s, self.run.books.extremes, self.t)
-
-    def _restore_control(self, saved: Mapping[str, Any]) -> None:
-        clock, largest = self.run.clock, self.resolution.step
-        clock[b.NEXT_DT], clock[b.ERROR_RATIO] = saved["next"], saved["before"]
-        self.run.count[b.WARY] = saved["wary"]
-        good = clock[b.SHORTEST] <= saved["next"] <= largest and saved["before"] > 0.0
-        if not (good and 0 <= saved["wary"] <= WARY):
-            raise ValueError("steps that no controller chooses")

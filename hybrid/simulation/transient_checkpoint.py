@@ -1,0 +1,114 @@
+"""The checkpoint of a cable in motion: what the next steps depend on, and how they go on from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels import books as b
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.sampling import SAME_TIME
+from hybrid.kernels.state import blank_state
+from hybrid.kernels.step_law import WARY
+from hybrid.simulation.restore import mesh_tree
+from hybrid.simulation.transient import Transient
+from hybrid.store.named_arrays import matched
+
+SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
+
+
+def checkpoint(run: Transient) -> dict[str, Any]:
+    """What the next steps depend on, between two steps: named arrays and plain values (simulation.restore)."""
+    model, clock, count, books = run.model, run.run.clock, run.run.count, run.run.books
+    control = {
+        "next": float(clock[b.NEXT_DT]), "before": float(clock[b.ERROR_RATIO]), "wary": int(count[b.WARY])
+    }  # fmt: skip
+    parts_: dict[str, Any] = {"ends": model.ends, "zoning": run.switching, "correction": run.correction}
+    return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
+        "t": run.t, "dt": float(clock[b.LAST_DT]), "steps": run.steps, "iterations": int(count[b.ITERATIONS]),
+        "changes": run.changes, "_turned": run.turned, "_beyond": run.beyond,
+        "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
+        "_stored": float(clock[b.STORED]),
+        "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
+        "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
+        "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
+        "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
+        "push": run.plane_monitor.checkpoint(run.run),
+        "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
+    }  # fmt: skip
+
+
+def restore(run: Transient, saved: Mapping[str, Any]) -> None:
+    """Continue as `checkpoint` has written, on a model that was made for it.
+
+    ValueError or ResultError: that cannot be.
+    """
+    model, monitor, compiled = run.model, run.plane_monitor, run.run
+    if saved["push"] is not None and model.plane is not None:
+        monitor.speed = model.length / model.time_scale
+    state = blank_state(model.cells)
+    run.set_model(model, state)
+    complete = "report" in saved  # not in a checkpoint of 0.6
+    free = dict.fromkeys(("mesh", "plane", "envelope"))
+    template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
+    older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
+    older |= {"envelope": None}
+    saved = matched(older | dict(saved), template, "state")
+    clock, count, books = compiled.clock, compiled.count, compiled.books
+    clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
+    clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
+    count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
+    run.changes, run.beyond, run.turned = saved["changes"], saved["_beyond"], saved["_turned"]
+    clock[b.MUTE_CUTS] = float(run.turned)
+    clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
+    books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
+    books.tension[0] = saved["tension"]
+    for mine, its in ((state, saved["state"]), (compiled.before, saved["state"])):
+        for name, x in its.items():
+            getattr(mine, name)[:] = x
+    model.sea.at(run.t)
+    apart = model.ends.restore(saved["ends"], run.t)
+    if apart > SAME_PLACE * model.length:
+        moved = f"an end is {apart:.3g} m from where it was at t = {run.t:.6g} s: has its motion file changed?"
+        raise ValueError(moved)
+    compiled.move(model.ends.moves())
+    books.velocity[:] = model.ends.velocity
+    if saved["control"] is not None:
+        _restore_control(run, saved["control"])
+    if saved["push"] is not None:
+        monitor.restore(saved["push"], compiled)
+    if run.switching is not None:
+        run.switching.restore(saved["zoning"])
+    if run.correction is not None:
+        run.correction.restore(saved["correction"])
+    count[b.OUTPUT] = np.searchsorted(books.outputs, run.t + SAME_TIME * saved["dt"], side="right")
+    _restore_envelope(run, saved["envelope"])
+    if not complete:
+        run.evaluate_forces()
+    count[b.PHASE] = b.BEGIN_STEP
+
+
+def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:
+    """Extremes up to here; where the checkpoint has none they begin here, and an event says so."""
+    envelope, books, nodes = run.envelope, run.run.books, run.model.line.s
+    if envelope is None:
+        return
+    if saved is None:
+        envelope.begin = run.t
+        envelope.count_from(run.model, run.state.r)
+        text = f"the file has no extremes of the steps before t = {run.t:.6g} s: the envelope is of those after it"
+        run.events.event(run.t, 0.0, run.model.length, "envelope incomplete", text)
+    else:
+        envelope.restore(saved, books.extremes)
+    books.start[:] = envelope.start_of(nodes)
+
+
+def _restore_control(run: Transient, saved: Mapping[str, Any]) -> None:
+    clock, largest = run.run.clock, run.resolution.step
+    clock[b.NEXT_DT], clock[b.ERROR_RATIO] = saved["next"], saved["before"]
+    run.run.count[b.WARY] = saved["wary"]
+    good = clock[b.SHORTEST] <= saved["next"] <= largest and saved["before"] > 0.0
+    if not (good and 0 <= saved["wary"] <= WARY):
+        raise ValueError("steps that no controller chooses")
