@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from statistics import median
 from typing import Any
@@ -69,6 +70,31 @@ def test_the_error_figure(tmp_path: Path) -> None:
         errors = touchdown(model, 0.2, "output.errors=true")
         more = cpu(lambda s=errors: hybrid.run(s, tmp_path / "run.h5").close())
         print(f"{model}: {plain:.3f} s, with the error figure {more:.3f} s, {more / plain:.2f} times")
+
+
+def test_variants_in_two_threads(tmp_path: Path) -> None:
+    """Wall time: kernels release the GIL, what is Python of a run does not; both give the same numbers."""
+    scenes = [touchdown("catenary", 0.2, f"ends.end.motion.heave.amplitude={1.0 + 0.1 * k}") for k in range(8)]
+
+    def largest_tension(k: int) -> float:
+        with hybrid.run(scenes[k], tmp_path / f"{k}.h5") as result:
+            return float(result.tension.max())
+
+    def wall(threads: int) -> tuple[float, list[float]]:
+        begin = time.perf_counter()
+        with ThreadPoolExecutor(threads) as pool:
+            found = list(pool.map(largest_tension, range(len(scenes))))
+        return time.perf_counter() - begin, found
+
+    expected = wall(1)[1]
+    times: dict[int, list[float]] = {1: [], 2: []}
+    for _ in range(RUNS):
+        for threads, taken in times.items():
+            spent, found = wall(threads)
+            assert found == expected
+            taken.append(spent)
+    one, two = median(times[1]), median(times[2])
+    print(f"8 variants: {one:.2f} s in one thread, {two:.2f} s in two, {two / one:.2f} times")
 
 
 @pytest.mark.parametrize("cells", [100, 1000])

@@ -8,10 +8,12 @@ anywhere means a new folder and a fresh compilation.
 
 from __future__ import annotations
 
+import atexit
 import hashlib
 import os
 import platform
 import shutil
+import stat
 import tempfile
 from collections.abc import Sequence
 from functools import cache
@@ -45,10 +47,29 @@ def cache_folder() -> Path:
         writable = os.access(base, os.W_OK)
     except OSError:
         writable = False
-    if not writable:
-        base = Path(tempfile.gettempdir()) / f"hybrid-cable-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
-        base.mkdir(parents=True, exist_ok=True)
-    return base / kernel_hash()
+    return (base if writable else temporary_folder()) / kernel_hash()
+
+
+@cache
+def temporary_folder() -> Path:
+    """A folder among the temporary ones that nobody else may write to: what is loaded from a cache is executed.
+
+    The same one for all processes of a user; where its name is taken by somebody else, one for this process alone.
+    """
+    base = Path(tempfile.gettempdir()) / f"hybrid-cable-{os.getuid() if hasattr(os, 'getuid') else 'user'}"
+    try:
+        base.mkdir(mode=0o700, parents=True, exist_ok=True)
+        found = base.lstat()
+        private = stat.S_ISDIR(found.st_mode)
+        if hasattr(os, "getuid"):  # where it is missing, temporary folders belong to one user
+            private = private and found.st_uid == os.getuid() and not found.st_mode & 0o077
+    except OSError:
+        private = False
+    if private:
+        return base
+    own = Path(tempfile.mkdtemp(prefix="hybrid-cable-"))
+    atexit.register(shutil.rmtree, own, ignore_errors=True)
+    return own
 
 
 def is_warm(kernels: Sequence[str]) -> bool:

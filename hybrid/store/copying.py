@@ -13,6 +13,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
 from hybrid.store.integrity import check_stored
 
@@ -73,4 +74,11 @@ def _annotations(old: Any, new: Any) -> None:
     """Attributes but those that HDF5 keeps for dimension scales."""
     for key, value in old.attrs.items():
         if key not in ("CLASS", "NAME", "REFERENCE_LIST", "DIMENSION_LIST", "DIMENSION_LABELS"):
-            new.attrs.create(key, value, dtype=old.attrs.get_id(key).dtype)
+            try:
+                new.attrs.create(key, value, dtype=old.attrs.get_id(key).dtype)
+            except UnicodeError:
+                where = f"attribute '{key}' of {old.name.lstrip('/') or 'the file'}"
+                raise ResultError(
+                    f"{old.file.filename} cannot be resumed\n    given:    {where}: {value!r:.60}\n"
+                    "    expected: text in UTF-8\n    try:      the file as hybrid wrote it, or run its scene again"
+                ) from None

@@ -196,6 +196,28 @@ def annotate(data: h5py.Dataset, unit: str, description: str, frame: str = "") -
         data.attrs["frame"] = frame
 
 
+def check_column(file: h5py.File, group: str, field: Field) -> None:
+    """ResultError unless a dataset is one that `create_table` makes for the field, to which rows can be appended.
+
+    HDF5 never comes back from closing a file in which it could not append.
+    """
+    name = f"{group}/{field.name}".lstrip("/")
+    data = file[name]
+    if not isinstance(data, h5py.Dataset):
+        found = "a group"
+    elif data.dtype.str != np.dtype(field.dtype).str or data.shape is None or data.shape[1:] != field.shape:
+        found = f"{data.dtype} of shape {data.shape}"
+    elif data.chunks is None or data.maxshape != (None, *field.shape):
+        found = f"one that cannot grow (chunks {data.chunks}, maxshape {data.maxshape})"
+    else:
+        return
+    expected = f"{np.dtype(field.dtype)} of shape {('rows', *field.shape)}, that grows"
+    raise ResultError(
+        f"{file.filename} cannot be resumed\n    given:    {name}: {found}\n    expected: {expected}\n"
+        "    try:      the file as hybrid wrote it, or run its scene again"
+    )
+
+
 def check_names(
     fields: Sequence[Field], step_fields: Sequence[Field], fixed: Sequence[tuple[Field, np.ndarray]]
 ) -> None:

@@ -35,6 +35,7 @@ from hybrid.store.format import (
     BLOCK,
     Field,
     add_fixed,
+    check_column,
     check_names,
     set_status,
     tables_of,
@@ -120,6 +121,9 @@ class Recorder:
         missing = [f.name for group, columns in tables.items() for f in columns if f"{group}/{f.name}" not in source]
         if missing:
             raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
+        for group, columns in tables.items():
+            for field in columns:
+                check_column(source, group, field)
 
         scales = [f"{group}/{columns[0].name}".lstrip("/") for group, columns in tables.items()]
         if list(at.rows) != scales or not at.rows["t"] or source["t"][at.rows["t"] - 1] != at.t:

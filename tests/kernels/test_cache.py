@@ -6,11 +6,13 @@ import os
 import shutil
 import subprocess
 import sys
+import tempfile
 from pathlib import Path
 
 import pytest
 
 import hybrid
+from hybrid.kernels.cache import temporary_folder
 
 PACKAGE = Path(hybrid.__file__).parent
 
@@ -46,6 +48,7 @@ print(energy[0])
 
 SCENE = """
 import hybrid
+from hybrid.kernels.cache import temporary_folder
 section = {"length": 1.0, "mass": 2.0, "bending_stiffness": 300.0, "torsional_stiffness": 1.0}
 scene = hybrid.validate_scene({
     "cable": {"sections": [section]},
@@ -138,3 +141,19 @@ def test_the_cache_folder_is_where_the_user_says(tmp_path: Path, monkeypatch: py
     assert cache_folder() == tmp_path / "xdg" / "hybrid-cable" / kernel_hash()
     monkeypatch.setenv("HYBRID_CACHE_DIR", str(tmp_path / "here"))
     assert cache_folder() == tmp_path / "here" / "hybrid-cable" / kernel_hash()
+
+
+@pytest.mark.skipif(not hasattr(os, "getuid"), reason="temporary folders belong to one user")
+def test_a_temporary_cache_is_ours_alone(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What is loaded from a cache is executed, and anybody can make a folder among the temporary ones."""
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    name = tmp_path / f"hybrid-cable-{os.getuid()}"
+    ask = temporary_folder.__wrapped__
+    assert ask() == name and name.stat().st_mode & 0o777 == 0o700
+    assert ask() == name, "the next process of this user finds it again"
+    name.chmod(0o770)
+    other = ask()
+    assert other != name and other.parent == tmp_path and other.stat().st_mode & 0o077 == 0
+    name.rmdir()
+    name.symlink_to(tmp_path)
+    assert ask() not in (name, tmp_path)
