@@ -26,7 +26,7 @@ class Table:
         self._types = [_NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
         self.scale = names[0] if names else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
-        self.waiting = 0  # rows in them
+        self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
         self.count = 0  # written rows
 
     def add(self, columns: Sequence[np.ndarray]) -> None:
@@ -34,6 +34,7 @@ class Table:
         if self.fields and len(columns[0]):
             self._blocks.append([np.asarray(x, field.dtype) for field, x in zip(self.fields, columns, strict=True)])
             self.waiting += len(columns[0])
+            self.bytes_waiting += sum(x.nbytes for x in self._blocks[-1])
 
     def add_row(self, row: Sequence[Any]) -> None:
         """Let one row of numbers and texts wait."""
@@ -57,7 +58,7 @@ class Table:
             self._write_column(0)
             self._datasets[0].flush()
             self.count += self.waiting
-            self._blocks, self.waiting = [], 0
+            self._blocks, self.waiting, self.bytes_waiting = [], 0, 0
 
     def _write_column(self, k: int) -> None:
         parts, data = [block[k] for block in self._blocks], self._datasets[k]

@@ -55,6 +55,8 @@ MOST_OF_A_KIND = 10_000
 # Outputs are held back at most this long (s), and so many times as long as writing takes: a reader hardly notices, a
 # kill loses no more, and a run that saves a thousand times a second spends 2 % of its time here instead of half.
 _PAUSE, _PART = 0.2, 50.0
+# Bytes of outputs that wait at most, so that the memory of a long run stays flat: it computes 30 MB a second.
+_MOST_WAITING = 16_000_000
 AFTERWARDS = ("error_", "effort_", "accuracy_")  # attributes that `amend` brings
 _STATUS = ("running", "complete", "interrupted", "failed")
 
@@ -217,8 +219,9 @@ class Recorder:
 
     @property
     def due(self) -> bool:
-        """Whether outputs have been held back long enough."""
-        return monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
+        """Whether outputs have been held back long enough, or are many."""
+        late = monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
+        return late or self._outputs.bytes_waiting > _MOST_WAITING
 
     def log(self, values: Mapping[str, float | int]) -> None:
         """Append a row to the log of the steps; errors as of `log_rows`."""
