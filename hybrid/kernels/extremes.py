@@ -14,7 +14,7 @@ import math
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
 from hybrid.kernels.cell import chord
-from hybrid.kernels.compile import inner
+from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import FORCE_A
@@ -23,7 +23,7 @@ from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.seabed import pressure
 
 
-@inner
+@kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
 def widen(extremes, what, i, x, t):
     """Widen the range of a quantity in column i to x, found at time t."""
     if x < extremes[0, what, i]:
@@ -32,12 +32,12 @@ def widen(extremes, what, i, x, t):
         extremes[1, what, i], extremes[3, what, i] = x, t
 
 
-@inner
-def note(books, what, i, x, t):
-    """A quantity that has one value at node i."""
-    widen(books.extremes, what, i, x, t)
-    if books.right[i] != i:
-        widen(books.extremes, what, books.right[i], x, t)
+@kernel
+def widen_both(extremes, right, what, i, x, t):
+    """The same for a quantity that has one value at node i; right: columns of values just after nodes."""
+    widen(extremes, what, i, x, t)
+    if right[i] != i:
+        widen(extremes, what, right[i], x, t)
 
 
 @inner
@@ -71,14 +71,23 @@ def end_tension(line, ends, state, report, loaded, k):
 def note_tension(line, ends, state, books, t):
     T, h, n = state.T, line.h, line.h.shape[0]
     for k in range(2):
-        note(books, TENSION, k * n, end_tension(line, ends, state, books.report[0], books.loaded, k), t)
+        widen_both(
+            books.extremes,
+            books.right,
+            TENSION,
+            k * n,
+            end_tension(line, ends, state, books.report[0], books.loaded, k),
+            t,
+        )
     for i in range(1, n):
         if books.marks[i]:
             left, right = max(i - 2, 0), min(i + 1, n - 1)
             widen(books.extremes, TENSION, i, beyond(T, h, i - 1, left), t)
             widen(books.extremes, TENSION, books.right[i], beyond(T, h, i, right), t)
         else:
-            note(books, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t)
+            widen_both(
+                books.extremes, books.right, TENSION, i, (T[i - 1] * h[i] + T[i] * h[i - 1]) / (h[i - 1] + h[i]), t
+            )
 
 
 @inner
@@ -101,7 +110,7 @@ def of_chords(line, state, i):
 def note_catenary(line, state, books, i, t):
     """Curvature at a node without element; at what may be a kink, on each side, as its neighbours lead to."""
     if is_smooth(line, books.marks, i):
-        note(books, CURVATURE, i, of_chords(line, state, i), t)
+        widen_both(books.extremes, books.right, CURVATURE, i, of_chords(line, state, i), t)
         return
     n = line.h.shape[0]
     for side in (-1, 1):
@@ -156,10 +165,10 @@ def note_element(line, books, i, t):
     that this can be.)
     """
     curvature, moment = books.strains[i, 0], books.strains[i, 1]
-    note(books, MOMENT, i, moment, t)
-    note(books, TORQUE, i, books.strains[i, 2], t)
+    widen_both(books.extremes, books.right, MOMENT, i, moment, t)
+    widen_both(books.extremes, books.right, TORQUE, i, books.strains[i, 2], t)
     if not (books.marks[i] & SEAM):
-        note(books, CURVATURE, i, curvature, t)
+        widen_both(books.extremes, books.right, CURVATURE, i, curvature, t)
         return
     own = min(line.kb[i, 0], line.kb[i, 1]) * line.hn[i]
     for j in (i - 1, i + 1):
@@ -179,7 +188,7 @@ def first_strains(plane, space, line, ends, state, books):
         sharpest_in_plane(line, ends, state.e, state.T, state.a1, books.strains)
 
 
-@inner
+@kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation
 def note_extremes(line, sea, ends, state, books, t):
     """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
     n = line.h.shape[0]
@@ -193,11 +202,11 @@ def note_extremes(line, sea, ends, state, books, t):
             if line.spin[max(i - 1, 0)] or line.spin[min(i, n - 1)]:
                 note_rod_end(line, ends, state, books, i, t)
             else:
-                note(books, MOMENT, i, 0.0, t)
-                note(books, TORQUE, i, 0.0, t)
+                widen_both(books.extremes, books.right, MOMENT, i, 0.0, t)
+                widen_both(books.extremes, books.right, TORQUE, i, 0.0, t)
         if line.bits & SEABED:
             p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
             q, _, _ = pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)
-            note(books, PRESSURE, i, q, t)
+            widen_both(books.extremes, books.right, PRESSURE, i, q, t)
         x = sub(get3(state.r, i), get3(books.start, i))
-        note(books, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
+        widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
