@@ -191,8 +191,8 @@ class EndConditions:
         self.motions, self._moves = {**self.motions, k: end}, None
         return end
 
-    def load(self, what: Literal["force", "moment"], k: int, value: Floats) -> None:
-        """From now on this force (N) or moment (N m) acts on end k, for good, instead of what did."""
+    def load(self, what: Literal["force", "moment"], k: int, value: Floats, t: float) -> None:
+        """From t (s), now, this force (N) or moment (N m) acts on end k, for good, instead of what did."""
         for row, x in enumerate(self._acting):
             if (what, k) in self._set and (x.what, x.end) == (what, k):
                 x.value[:] = value
@@ -203,7 +203,17 @@ class EndConditions:
         self._set.add((what, k))
         others = [x for x in self._loads if (x.what, x.end) != (what, k)]
         self._loads = (*others, EndLoad(what, k, np.array(value, float), np.inf, None))
-        self.set_loads(0.0)
+        self.set_loads(t)
+
+    def keep_loads(self) -> Any:
+        """The loads of both ends, those that have ended included, to come back to."""
+        return tuple(x._replace(value=x.value.copy()) for x in self._loads), set(self._set)
+
+    def bring_back_loads(self, kept: Any, t: float) -> None:
+        """Be loaded again as when `keep_loads` was called, at t (s)."""
+        loads, was_set = kept
+        self._loads, self._set = tuple(x._replace(value=x.value.copy()) for x in loads), set(was_set)
+        self.set_loads(t)
 
     def _as_moves(self) -> Moves:
         prescribed, file = np.zeros((2, 2), np.int8), np.zeros((2, 2), np.int64)

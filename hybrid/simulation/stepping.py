@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple
@@ -14,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
-from hybrid.errors import SceneError
+from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
@@ -29,12 +30,15 @@ from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
+from hybrid.store.lock import locked
 from hybrid.store.named_arrays import pack, unpack
 from hybrid.store.reader import Result, open_result
 
 ENDS = ("start", "end")
-# Of a step: a time so near to the present one is the present one.
-NOW = 1e-9
+# Of a step: a step so short is round-off of the times of others.
+SLIVER = 1e-6
+# Of the largest component: what is out of a plane by no more is in it.
+IN_PLANE = 1e-9
 STILL: Floats = np.zeros(3)
 
 
@@ -82,9 +86,16 @@ class Simulation:
         if output is not None:
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
+        self._closed, self._failed, self._stack = False, "", ExitStack()
+        if isinstance(self._target, Path):
+            self._stack.enter_context(locked(self._target))
         compile_beside(self.scene)
         self._case = Case(self.scene, criterion)
-        self._loop, recorder, equilibrium = self._case.prepare(first_resolution(self.scene), self._target)
+        try:
+            self._loop, recorder, equilibrium = self._case.prepare(first_resolution(self.scene), self._target)
+        except BaseException:
+            self._stack.close()
+            raise
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
         self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
@@ -110,15 +121,20 @@ class Simulation:
         time = self.scene.require_time()
         if time.controlled or time.step is None:
             raise ValueError("steps follow the motion: use advance(until), or give time.step")
-        return self.advance(min(self.t + time.step, time.duration))
+        taken, until = round(self.t / time.step), self.t + time.step
+        if abs(taken * time.step - self.t) < SLIVER * time.step:
+            until = (taken + 1) * time.step  # a multiple of the step, without round-off that adds up
+        return self.advance(until if time.duration - until > SLIVER * time.step else time.duration)
 
     def advance(self, until: float) -> float:
         """Steps to a time `until` (s), where one ends; returns it.  Ends that are set reach their place there.
 
         ValueError: a time that has passed, or beyond the scene's duration.
         """
+        self._check_open()
         now, duration = self.t, self.scene.require_time().duration
-        if not now < until <= duration * (1.0 + NOW):
+        sliver = SLIVER * self._loop.run.resolution.step
+        if not now + sliver < until <= duration + sliver:
             raise ValueError(
                 f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
             )
@@ -128,34 +144,51 @@ class Simulation:
             end.set(now, until, position, velocity, STILL if turn is None else turn)
         self._recorder.commit_old()
         try:
-            self._loop.until(min(until, duration), exact=False)
+            self._step_to(min(until, duration))
+        except ComputationError as error:
+            self._failed = str(error)
+            raise
+        return self.t
+
+    def _step_to(self, until: float) -> None:
+        try:
+            self._loop.until(until, exact=False)
         except StepFailed as failed:
             self._loop.fail(failed.tried, failed.dt)
-        return self.t
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError("the simulation is over: its result has been written")
 
     # --- what is set and felt --------------------------------------------------------------------
 
     def set_end(
-        self, end: str, position: Sequence[float] | Floats, velocity: Sequence[float] | Floats | None = None,
+        self, end: str, position: Sequence[float] | Floats | None, velocity: Sequence[float] | Floats | None = None,
         frame: Floats | None = None,
     ) -> None:  # fmt: skip
         """Where a held end is to be at the end of the next `step` or `advance`, which it reaches smoothly.
 
-        end: "start" or "end"; position: (3,) m, inertial; velocity: (3,) m/s there, None: at rest; frame: (3, 3),
-        columns a1, a2 and the tangent along increasing s, of an end that holds a direction.  An end that is not set
-        again stays where it is.  ValueError: the end is free, has a motion in the scene, or is moved by no finite way.
+        end: "start" or "end"; position: (3,) m, inertial, None: where it is (of a guided end, which only turns);
+        velocity: (3,) m/s there, None: at rest; frame: (3, 3), columns a1, a2 and the tangent along increasing s, of an
+        end that holds a direction.  An end that is not set again stays where it is.  ValueError: the end is free, has a
+        motion in the scene, holds no direction, or would leave the plane of `dimension: 2`.
         """
+        self._check_open()
         k = self._end(end)
         conditions = self._loop.run.model.ends
-        if not conditions.values.held[k]:
+        if not conditions.values.held[k] and (position is not None or not self._turns(k)):
             raise ValueError(f"ends.{end} is not held: set_force acts on it")
+        if frame is not None and not self._turns(k):
+            raise ValueError(f"ends.{end} holds no direction: it has no frame")
         if k not in self._driven:
             if k in conditions.motions:
                 raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
             self._driven[k] = conditions.drive(k)
             self._loop.run.run.move(conditions.moves())
-        there, speed = _vector(position, "position"), _vector((0, 0, 0) if velocity is None else velocity, "velocity")
-        turn = None
+        here = self._driven[k].at(self.t)[0]
+        there = here if position is None else _vector(position, "position")
+        speed, turn = _vector(STILL if velocity is None else velocity, "velocity"), None
+        self._check_plane(end, "position", there - here)
         if frame is not None:
             now = self._driven[k].at(self.t)[2]
             wanted = np.array(frame, float)
@@ -169,20 +202,35 @@ class Simulation:
     ) -> None:
         """From the next step on this force (3,) N, and moment (3,) N m, act on an end that is free to move."""
         k, conditions = self._end(end), self._loop.run.model.ends
+        self._check_open()
         if conditions.values.held[k]:
             raise ValueError(f"ends.{end} is held: set_end moves it")
-        conditions.load("force", k, _vector(force, "force"))
+        if moment is not None and not self._loop.run.model.line.spin[-k]:
+            raise ValueError(f"moment: the cable is a catenary at ends.{end}, which takes no moment")
+        self._check_plane(end, "force", _vector(force, "force"))
+        conditions.load("force", k, _vector(force, "force"), self.t)
         if moment is not None:
-            conditions.load("moment", k, _vector(moment, "moment"))
+            conditions.load("moment", k, _vector(moment, "moment"), self.t)
         self._loop.run.run.move(conditions.moves())
 
     def forces(self) -> EndForces:
         """Forces and moments of the cable on what holds its ends, now."""
         report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
         start, end = (report[k : k + 3] * held[j] for j, k in enumerate((FORCE_A, FORCE_B)))
-        return EndForces(
-            start, end, report[MOMENT_A : MOMENT_A + 3] * held[0], -report[MOMENT_B : MOMENT_B + 3] * held[1]
-        )
+        first, last = report[MOMENT_A : MOMENT_A + 3], report[MOMENT_B : MOMENT_B + 3]
+        return EndForces(start, end, first * self._turns(0), -last * self._turns(1))
+
+    def _turns(self, k: int) -> bool:
+        """Whether end k holds the direction of a rod."""
+        return bool(self._loop.run.model.line.element[-k])
+
+    def _check_plane(self, end: str, what: str, vector: Floats) -> None:
+        plane = self._loop.run.model.plane
+        if self.scene.dimension == 2 and plane is not None:
+            across = float(vector @ plane[2])
+            if abs(across) > IN_PLANE * float(np.abs(vector).max(initial=1.0)):
+                out = "out of the plane that dimension: 2 keeps the cable in"
+                raise ValueError(f"{what} of ends.{end}: {across:.3g} {out}; leave dimension out of the scene")
 
     @property
     def state(self) -> CableState:
@@ -204,27 +252,34 @@ class Simulation:
         run, watch = self._loop.run, self._loop.remembered()
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
-        return _Saved(self._recorder.mark(), state, watch, paths)
+        loads = run.model.ends.keep_loads()
+        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads)
 
     def restore(self, saved: Any) -> None:
         """Back to what `save` returned.  ValueError: a later `save` has made final what came after it."""
+        self._check_open()
         self._recorder.back_to(saved.mark)
         if isinstance(saved.state, bytes):
             self._loop = self._case.again(
-                unpack(saved.state), self._loop, self._target, lambda model: self._drive_again(model, saved.paths)
+                unpack(saved.state), self._loop, self._target, lambda model: self._drive_again(model, saved)
             )
             self._loop.recorder = self._recorder
         else:
-            self._loop.run.run.bring_back(saved.state)
+            run = self._loop.run
+            run.run.bring_back(saved.state)
             for k, path in saved.paths.items():
                 self._driven[k].path[:] = path
+            run.model.ends.bring_back_loads(saved.loads, saved.t)
+            run.run.move(run.model.ends.moves())
         self._loop.remember(saved.watch)
         self._next.clear()
+        self._failed = ""
 
-    def _drive_again(self, model: Model, paths: Mapping[int, Floats]) -> None:
-        self._driven = {k: model.ends.drive(k) for k in paths}
-        for k, path in paths.items():
+    def _drive_again(self, model: Model, saved: _Saved) -> None:
+        self._driven = {k: model.ends.drive(k) for k in saved.paths}
+        for k, path in saved.paths.items():
             self._driven[k].path[:] = path
+        model.ends.bring_back_loads(saved.loads, saved.t)
 
     @property
     def _plain(self) -> bool:
@@ -240,10 +295,15 @@ class Simulation:
 
     def close(self) -> None:
         """Write what is left and close the file; a second call does nothing."""
-        self._loop.write_down(everything=True)
-        self._loop.finish()
-        self._recorder.commit()
-        self._recorder.close("complete", f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s")
+        if self._closed:
+            return
+        self._closed = True
+        with self._stack:
+            self._loop.write_down(everything=True)
+            self._loop.finish()
+            self._recorder.commit()
+            until = f"{self._loop.run.steps} steps, stepped from outside to t = {self.t:.6g} s"
+            self._recorder.close("failed" if self._failed else "complete", self._failed or until)
 
     def __enter__(self) -> Simulation:
         return self
@@ -251,11 +311,13 @@ class Simulation:
     def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
         if kind is None:
             self.close()
-        else:
-            self._loop.write_down(everything=True)
-            self._recorder.commit()
-            self._loop.write_envelope()
-            self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
+        elif not self._closed:
+            self._closed = True
+            with self._stack:
+                self._loop.write_down(everything=True)
+                self._recorder.commit()
+                self._loop.write_envelope()
+                self._recorder.close("failed" if issubclass(kind, Exception) else "interrupted", str(error))
 
     def _end(self, end: str) -> int:
         if end not in ENDS:
@@ -267,9 +329,11 @@ class _Saved(NamedTuple):
     """What `save` keeps."""
 
     mark: int
+    t: float  # s
     state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
     watch: Mapping[str, Any]
     paths: Mapping[int, Floats]
+    loads: Any
 
 
 def _vector(x: Sequence[float] | Floats, name: str) -> Floats:

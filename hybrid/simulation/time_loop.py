@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import time as clock
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -30,6 +30,20 @@ from hybrid.store.writer import Recorder
 
 # Rows of the log that wait for an output at most.
 LOGGED = 100
+
+
+# Of a step: stops that are so near to each other are one, or a step between them would be round-off.
+SAME_STOP = 1e-6
+
+
+def apart(stops: Iterable[float], t: float, step: float) -> list[float]:
+    """Stops after t in their order; of those that are the same but for round-off the last."""
+    out: list[float] = []
+    for stop in sorted(x for x in stops if x > t + SAME_STOP * step):
+        if out and stop - out[-1] <= SAME_STOP * step:
+            out.pop()
+        out.append(stop)
+    return out
 
 
 class TimeLoop:
@@ -122,11 +136,11 @@ class TimeLoop:
             stops |= {t for t in ramp_ends(run.scene) if t < end}
         if exact:
             stops |= {float(t) for t in run.run.books.outputs if t < end}
-        for stop in sorted(t for t in stops if t > run.t):
+        for stop in apart(stops, run.t, run.resolution.step):
             self.go_to(stop)
             if exact:
                 run.begin_leg()
-            if stop in breaks:
+            if any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
                 run.restart()
                 self._settle()
 
@@ -269,11 +283,13 @@ class TimeLoop:
 
     def remembered(self) -> dict[str, Any]:
         """What has been noted so far, to be given to `remember`."""
-        return {name: getattr(self.diagnostics, name) for name in REMEMBERED}
+        noted = {name: getattr(self.diagnostics, name) for name in REMEMBERED}
+        return {"diagnostics": noted, "run": {name: getattr(self.run, name) for name in ("turned", "beyond")}}
 
     def remember(self, noted: Mapping[str, Any]) -> None:
         """Forget what has been noted since `remembered`."""
-        vars(self.diagnostics).update(noted)
+        vars(self.diagnostics).update(noted["diagnostics"])
+        vars(self.run).update(noted["run"])
         self.diagnostics.watch(self.run.run)
 
     def checkpoint(self) -> dict[str, Any]:

@@ -177,3 +177,142 @@ def test_a_body_and_a_cable_keep_their_energy() -> None:
         body, given = main(step=step)
         left.append(abs(body + given) / abs(given))
     assert left[0] < 1e-3 and 3.0 < left[0] / left[1] < 5.0
+
+
+# --- what an attack found ------------------------------------------------------------------------
+
+
+def rod(**tables: Any) -> dict[str, Any]:
+    """A hanging rod of 1 m in air, its lower end free."""
+    section = {"length": 1.0, "diameter": 0.01, "mass": 0.5, "axial_stiffness": 1e4, "bending_stiffness": 0.05}
+    return {
+        "cable": {"sections": [section | {"torsional_stiffness": 0.04, "damping": {"mass": 1.0}}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"},
+        "initial": {"kind": "equilibrium", "guess": "straight", "direction": [0, 0, -1]}, "model": "rod",
+        "mesh": {"cells": 10}, "time": {"duration": 2.0, "step": 0.1}, **tables,
+    }  # fmt: skip
+
+
+def test_the_loop_of_the_manual_ends_at_the_duration() -> None:
+    """Times of steps do not add up round-off, which would leave a step of 2e-14 s."""
+    with hybrid.Simulation(rod()) as simulation:
+        while simulation.t < 2.0:
+            simulation.step()
+        assert simulation.t == 2.0
+        with pytest.raises(ValueError, match=r"up to time\.duration"):
+            simulation.advance(np.nextafter(2.0, 3.0))
+        dt = simulation.result()["steps/dt"]
+    assert len(dt) == 20 and dt.min() > 0.0999
+
+
+@pytest.mark.parametrize("model", ["rod", "adaptive"])
+def test_what_loads_an_end_is_brought_back(model: str) -> None:
+    """A force that ends, and forces that are set, before and after a state that is come back to."""
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}}
+    free = {"kind": "free", "force": {"value": [0.5, 0, 0], "until": 0.55}}
+
+    def place(back: bool) -> np.ndarray:
+        with hybrid.Simulation(rod(ends=ends | {"end": free}, model=model)) as simulation:
+            simulation.advance(0.4)
+            if back:
+                saved = simulation.save()
+                simulation.advance(0.8)
+                simulation.set_force("end", [0.0, 3.0, 0.0])
+                simulation.advance(1.0)
+                simulation.restore(saved)
+            simulation.advance(0.7)
+            simulation.set_force("end", [0.2, 0.0, 0.0])
+            if back:
+                saved = simulation.save()
+                simulation.set_force("end", [0.0, 3.0, 0.0])
+                simulation.advance(1.0)
+                simulation.restore(saved)
+            simulation.advance(1.0)
+            return simulation.state.position
+
+    assert np.array_equal(place(True), place(False))
+
+
+def test_a_load_that_has_ended_does_not_come_back() -> None:
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}}
+    free = {"kind": "free", "moment": {"value": [0, 0.05, 0], "until": 0.3}}
+    with hybrid.Simulation(rod(ends=ends | {"end": free}, time={"duration": 10.0, "step": 0.1})) as simulation:
+        simulation.advance(6.0)
+        simulation.set_force("end", [0.0, 0.0, 0.0])
+        simulation.advance(10.0)
+        assert abs(simulation.state.position[-1, 0]) < 1e-2
+
+
+def test_a_guided_end_has_a_moment_and_turns() -> None:
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "guided", "tangent": [0.3, 0, -1]}}
+    with hybrid.Simulation(rod(ends=ends)) as simulation:
+        first = simulation.forces().moment_end
+        assert abs(first[1]) > 1e-3 and simulation.forces().end.tolist() == [0.0, 0.0, 0.0]
+        with pytest.raises(ValueError, match="is not held"):
+            simulation.set_end("end", [1, 0, 0])
+        simulation.set_end("end", None, frame=rotation(np.array([0.0, 0.2, 0.0])) @ simulation_frame([0.3, 0, -1]))
+        simulation.advance(1.0)
+        assert np.abs(simulation.forces().moment_end - first).max() > 1e-3
+        result = simulation.result()
+    assert np.abs(result["moment_end"][0] + first).max() < 1e-9
+
+
+def simulation_frame(tangent: list[float]) -> np.ndarray:
+    from hybrid.model.ends import first_director
+
+    t = np.array(tangent) / np.linalg.norm(tangent)
+    a = first_director(tangent)
+    return np.column_stack([a, np.cross(t, a), t])
+
+
+def test_in_a_plane_nothing_is_set_across_it() -> None:
+    simulation = hybrid.Simulation(touchdown("model=catenary", PINNED, "dimension=2"))
+    with simulation, pytest.raises(ValueError, match=r"position of ends.end: .*0.05 out of the plane"):
+        simulation.set_end("end", [205.0, 0.05, 0.0])
+
+
+def test_an_event_that_was_taken_back_comes_again() -> None:
+    line = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e6, "bending_stiffness": 5.0, "torsional_stiffness": 4.0}
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "normal": [0, 0, 1]}
+    tables = rod(
+        environment={"gravity": 0.0}, cable={"sections": [line | {"diameter": 0.02}]}, mesh={"cells": 20},
+        ends={"start": start, "end": start | {"position": [10.01, 0, 0]}}, initial="equilibrium",
+    )  # fmt: skip
+    turned = rotation(np.array([2.8, 0.0, 0.0])) @ np.column_stack([[0, 0, 1.0], [0, -1.0, 0], [1.0, 0, 0]])
+    with hybrid.Simulation(tables) as simulation:
+        saved = simulation.save()
+        for _ in range(2):
+            simulation.restore(saved)
+            simulation.set_end("end", [10.01, 0, 0], frame=turned)
+            simulation.step()
+        assert [e.kind for e in simulation.result().events].count("steps cut") == 1
+
+
+def test_files_of_simulations(tmp_path: Path) -> None:
+    """One file, one simulation; a failure that was caught is in the file; what is over takes no steps."""
+    path = tmp_path / "run.h5"
+    simulation = hybrid.Simulation(rod(), path)
+    with pytest.raises(hybrid.ResultError):
+        hybrid.Simulation(rod(), path)
+    simulation.step()
+    simulation.set_force("end", [1e9, 0.0, 0.0])
+    with pytest.raises(hybrid.ComputationError):
+        simulation.advance(2.0)
+    simulation.close()
+    with hybrid.open(path) as result:
+        assert result.status == "failed"
+    with pytest.raises(ValueError, match="the simulation is over"):
+        simulation.step()
+    hybrid.Simulation(rod(), path).close()
+
+
+def test_stops_that_differ_by_round_off_are_one() -> None:
+    """Loads that end at 0.3 s and at 0.1 + 0.2 s, and an output there: no step of 5e-17 s between."""
+    end = {
+        "kind": "free",
+        "force": {"value": [0.1, 0, 0], "until": 0.3},
+        "moment": {"value": [0, 0.01, 0], "until": 0.1 + 0.2},
+    }
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}
+    result = hybrid.run(rod(ends=ends, output={"every": 0.03, "exact": True}))
+    assert result["steps/dt"].min() > 1e-3 and result.status == "complete"
