@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.adapt.manager import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
+from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build, rod_cells
@@ -124,6 +125,9 @@ class Case:
                 loop.restore(point.state)
                 if not point.t <= loop.run.t <= self.scene.require_time().duration:
                     raise ValueError(f"t = {loop.run.t:g} s after an output at {point.t:g} s")
+                due, at = loop.run.run.books.outputs, int(loop.run.run.count[OUTPUT])
+                if at < due.size and not due[at] > point.t:
+                    raise ValueError(f"an output at {due[at]:g} s is due, after one at {point.t:g} s")
             assert loop.run.envelope is not None
             loop.recorder = recorder = Recorder.again(
                 file, target, loop.observer.fields, STEP_FIELDS, point, self._texts, before or {},
