@@ -128,7 +128,17 @@ class Books(NamedTuple):
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N).
-HEAD = 1 + 4 + 6 + 18 + 3 * 6 + REPORT_SIZE + WORKS
+SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
+    1,
+    5,
+    11,
+    29,
+    35,
+    41,
+    47,
+)
+SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
+HEAD = SAMPLE_WORK + WORKS
 
 
 def sample_size(cells: int) -> int:

@@ -10,8 +10,26 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.assembly import get9
-from hybrid.kernels.books import EARLIER_DT, HEAD, INSIDE, LAST_DT, NOW, OUTPUT, PREVIOUS, RATES, SAMPLES, WORKS
+from hybrid.kernels.books import (
+    EARLIER_DT,
+    HEAD,
+    INSIDE,
+    LAST_DT,
+    NOW,
+    OUTPUT,
+    PREVIOUS,
+    RATES,
+    SAMPLE_FORCE,
+    SAMPLE_FRAME,
+    SAMPLE_MOMENT,
+    SAMPLE_POSITION,
+    SAMPLE_REPORT,
+    SAMPLE_SEA,
+    SAMPLE_SPIN,
+    SAMPLE_WORK,
+    SAMPLES,
+    WORKS,
+)
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import carry_director
@@ -105,20 +123,30 @@ def sample_cells(plane, space, line, old, new, x, dt, k, tension, row):
 
 
 @inner
+def end_frame(imposed, m, k):
+    """Frame of end k, now (m = 0) or before the last step (m = 1)."""
+    f = imposed[m, k]
+    return (f[3], f[4], f[5], f[6], f[7], f[8], f[9], f[10], f[11])
+
+
+@inner
 def sample_ends(imposed, x, row):
     """What the ends impose: frames turned by parts from the one to the other, the rest by parts."""
     for k in range(2):
+        old, new = imposed[1, k], imposed[0, k]
         for j in range(3):
-            for part in range(4):  # position, spin, force, moment
-                at = 0 if part == 0 else 9 + 3 * part
-                put = (5, 29, 35, 41)[part] + 3 * k + j
-                row[put] = (1.0 - x) * imposed[1, k, at + j] + x * imposed[0, k, at + j]
-        Ra, Rb = get9(imposed[1, :, 3:12], k), get9(imposed[0, :, 3:12], k)
+            at = 3 * k + j
+            row[SAMPLE_POSITION + at] = (1.0 - x) * old[j] + x * new[j]
+            row[SAMPLE_SPIN + at] = (1.0 - x) * old[12 + j] + x * new[12 + j]
+            row[SAMPLE_FORCE + at] = (1.0 - x) * old[15 + j] + x * new[15 + j]
+            row[SAMPLE_MOMENT + at] = (1.0 - x) * old[18 + j] + x * new[18 + j]
+        R = end_frame(imposed, 0, k)
         if x < 1.0:
-            turn, _ = turn_by_vector(scale(x, log_rotation(relative_rotation(Ra, Rb))), (0.0, 0.0, 0.0))
-            Rb = mat_mat(Ra, turn)
+            before = end_frame(imposed, 1, k)
+            turn, _ = turn_by_vector(scale(x, log_rotation(relative_rotation(before, R))), (0.0, 0.0, 0.0))
+            R = mat_mat(before, turn)
         for j in range(9):
-            row[11 + 9 * k + j] = Rb[j]
+            row[SAMPLE_FRAME + 9 * k + j] = R[j]
 
 
 @inner
@@ -126,20 +154,19 @@ def sample_head(sea, books, x, dt, k, t, row):
     """Time, growth of the sea, ends, report and work."""
     row[0] = t
     for j in range(4):
-        row[1 + j] = sea.now[j]
+        row[SAMPLE_SEA + j] = sea.now[j]
     sample_ends(books.imposed, x, row)
     report = books.report
     for j in range(REPORT_SIZE):
-        row[47 + j] = report[0, j]
+        row[SAMPLE_REPORT + j] = report[0, j]
         if x < 1.0:  # what the assembly reports follows from forces; the rest may jump
-            row[47 + j] = parabola(x, k if j < ASSEMBLED else 0.0, report[2, j], report[1, j], report[0, j])
-    at = 47 + REPORT_SIZE
+            row[SAMPLE_REPORT + j] = parabola(x, k if j < ASSEMBLED else 0.0, report[2, j], report[1, j], report[0, j])
     for j in range(WORKS):
-        row[at + j] = books.work[0, j]
+        row[SAMPLE_WORK + j] = books.work[0, j]
         if x < 1.0:
-            row[at + j] = (1.0 - x) * books.work[1, j] + x * books.work[0, j]
+            row[SAMPLE_WORK + j] = (1.0 - x) * books.work[1, j] + x * books.work[0, j]
             if j < RATES:  # the powers change evenly
-                row[at + j] -= 0.5 * x * (1.0 - x) * dt * (books.power[0, j] - books.power[1, j])
+                row[SAMPLE_WORK + j] -= 0.5 * x * (1.0 - x) * dt * (books.power[0, j] - books.power[1, j])
 
 
 @inner

@@ -274,7 +274,9 @@ class Transient:
             if switching.prepares:
                 asks |= b.ASK_BEFORE
             blending = switching.manager.ramping
-            self.run.clock[b.ALLOWED] = LONGEST_IN_PACE * switching.manager.pace * (1.0 if blending else READY)
+            self.run.clock[b.ALLOWED] = (
+                LONGEST_IN_PACE * switching.manager.pace * self.resolution.every * (1.0 if blending else READY)
+            )
         count[b.ASKS] = asks
 
     def _review_try(self) -> Change | None:

@@ -127,7 +127,7 @@ def _checkpoint(tree: Tree) -> Checkpoint:
         matched(table, dict.fromkeys(table, 0) if isinstance(table, dict) else {}, name)
     matched(point.files, dict.fromkeys(point.files, "") if isinstance(point.files, dict) else {}, "files")
     zones = matched(point.zones, [["", 0.0, 0.0]] * (len(point.zones) if isinstance(point.zones, list) else 0), "zones")
-    if min(point.number, *point.rows.values(), *point.happened.values()) < 0:
+    if min([point.number, *point.rows.values(), *point.happened.values()]) < 0:
         raise ValueError("a count is negative")
     return point._replace(zones=[tuple(zone) for zone in zones])
 
