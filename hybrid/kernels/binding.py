@@ -85,12 +85,13 @@ class Table:
             if self._bound.get(name, self) is value:
                 continue
             at, end, pattern = self._places[name]
+            bound = self._bound.pop(name, None)  # nothing is bound there if this fails half-way
             if not isinstance(pattern, tuple):
                 self._put(at, pattern, value, name)
             else:  # two states take turns: what was bound before this one may well come back
                 before = self._before.get(name)
-                if name in self._bound:
-                    self._before[name] = self._bound[name], self.numbers[at:end].copy()
+                if bound is not None:
+                    self._before[name] = bound, self.numbers[at:end].copy()
                 if before is not None and before[0] is value:
                     self.numbers[at:end] = before[1]
                 else:

@@ -59,14 +59,14 @@ class Observation:
     def __init__(self, line: Line, sea: Sea, grid: Grid, batch: Batch) -> None:
         self.line, self.sea, self.grid, self.batch = line, sea, grid, batch
         self.shift: Shift | None = None
-        self._plain = self  # the observation that this one corrects
+        self._corrects: Observation | None = None  # the observation that this one corrects
 
     def corrected(self, shift: Shift) -> Observation:
         """The same states with position, tension, curvature and moment corrected; energies and contact stay."""
         other = self.on(self.grid)
         for name in ("r", "v", "e", "T", "length", "d"):
             other.__dict__.pop(name, None)
-        other.shift, other._plain = shift, self
+        other.shift, other._corrects = shift, self
         return other
 
     def on(self, grid: Grid) -> Observation:
@@ -75,9 +75,12 @@ class Observation:
         other.grid = grid
         for name in ("tension", "tangent", "moment", "torque", "curvature_twist"):
             other.__dict__.pop(name, None)
-        if self._plain is self:
-            other._plain = other
         return other
+
+    @property
+    def _plain(self) -> Observation:
+        """As computed.  (An attribute that refers to itself would keep a batch until garbage is searched for.)"""
+        return self._corrects or self
 
     # ---- what was computed --------------------------------------------------------------------
 
@@ -118,8 +121,8 @@ class Observation:
     @cached_property
     def _observed(self) -> tuple[Floats, Floats, Floats]:
         """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad and energies (4, nb) J of what was computed."""
-        if self._plain is not self:
-            return self._plain._observed
+        if self._corrects is not None:
+            return self._corrects._observed
         b, line = self.batch, self.line
         nb, n = b.T.shape
         M, strain, energy = np.zeros((nb, n + 1, 3)), np.zeros((nb, n + 1, 3)), np.zeros((nb, 4))

@@ -28,29 +28,28 @@ Tree = dict[str, Any]
 def pack(tree: Mapping[str, Any]) -> bytes:
     """A tree as bytes."""
     arrays: list[bytes] = []
-    length = 0
-
-    def plain(x: Any) -> Any:
-        nonlocal length
-        if isinstance(x, Mapping):
-            return {name: plain(value) for name, value in x.items()}
-        if isinstance(x, list | tuple):
-            return [plain(value) for value in x]
-        if isinstance(x, np.generic):
-            return x.item()
-        if not isinstance(x, np.ndarray):
-            return x
-        name = x.dtype.newbyteorder("<").str
-        if name not in DTYPES:
-            raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
-        arrays.append(np.asarray(x, name).tobytes())
-        at, length = length, length + len(arrays[-1])
-        return {ARRAY: [name, list(x.shape), at]}
-
-    head = json.dumps(plain(tree)).encode()
+    head = json.dumps(_plain(tree, arrays)).encode()
     body = b"".join([len(head).to_bytes(8, "little"), head, *arrays])
     body = len(body).to_bytes(8, "little") + body
     return MAGIC + hashlib.blake2b(body, digest_size=DIGEST).digest() + body
+
+
+def _plain(x: Any, arrays: list[bytes]) -> Any:
+    """What JSON can write; the bytes of arrays are appended to `arrays`."""
+    if isinstance(x, Mapping):
+        return {name: _plain(value, arrays) for name, value in x.items()}
+    if isinstance(x, list | tuple):
+        return [_plain(value, arrays) for value in x]
+    if isinstance(x, np.generic):
+        return x.item()
+    if not isinstance(x, np.ndarray):
+        return x
+    name = x.dtype.newbyteorder("<").str
+    if name not in DTYPES:
+        raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
+    at = sum(map(len, arrays))
+    arrays.append(np.asarray(x, name).tobytes())
+    return {ARRAY: [name, list(x.shape), at]}
 
 
 def unpack(data: bytes) -> Tree:

@@ -100,11 +100,11 @@ class Result:
         # t first: the zones of an output are complete before its time is.
         scales = sorted((n for n, dims in self._dims.items() if dims == (n,)), key=lambda n: n != "t")
         self._rows = {n: self._dataset(n).shape[0] for n in scales}
-        self._groups = {g: Columns(self, g) for g in sorted(groups)}
+        self._groups = sorted(groups)
         self.attributes: dict[str, Any] = Attributes(
             {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._file.attrs.items()}
         )
-        table = self._groups["zones"]
+        table = self["zones"]
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
         self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
 
@@ -148,7 +148,7 @@ class Result:
 
     def __getitem__(self, name: str) -> Any:
         if name in self._groups:
-            return self._groups[name]
+            return Columns(self, name)  # made anew: a cycle would keep all arrays until garbage is searched for
         name = self._known(name)
         if name not in self._cache:
             if not self._file:
@@ -189,7 +189,7 @@ class Result:
         """What an array is: dimensions, unit, frame, in a sentence; of a group, what is in it."""
         if name in self._groups:
             units: dict[str, list[str]] = {}
-            for key in self._groups[name]:
+            for key in self[name]:
                 units.setdefault(self.units[f"{name}/{key}"], []).append(key)
             return f"{name}: " + "; ".join(", ".join(keys) + f" ({u})" * bool(u) for u, keys in units.items())
         name = self._known(name)
@@ -278,7 +278,7 @@ class Result:
     def events(self) -> list[Event]:
         """What happened and why, in the order of time."""
         with readable(self._source):
-            table = self._groups["events"]
+            table = self["events"]
             rows = zip(*(table[k].tolist() for k in Event._fields if k in table), strict=True)
             events = [Event._make(None if x != x else x for x in row) for row in rows]  # NaN: there is none
         return [

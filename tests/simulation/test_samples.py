@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 from pathlib import Path
 from typing import Any
 
@@ -97,3 +98,21 @@ def test_outputs_wait_for_nothing_that_changes(name: str, monkeypatch: pytest.Mo
     for field in batches.names:
         if "t" in batches.dims(field)[:1]:
             assert np.array_equal(batches[field], one_by_one[field], equal_nan=True), field
+
+
+def test_no_outputs_wait_for_the_search_for_garbage() -> None:
+    """Batches, checkpoints and results go when they are done with: in a reference cycle they would fill the memory."""
+    scene = swinging("rod", 0.02, 0.05)
+    hybrid.run(scene)
+    gc.collect()
+    gc.disable()
+    try:
+        hybrid.run(scene)
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        gc.collect()
+        found = {type(x).__name__ for x in gc.garbage if type(x).__module__.startswith("hybrid")}
+    finally:
+        gc.set_debug(0)
+        gc.garbage.clear()
+        gc.enable()
+    assert not found
