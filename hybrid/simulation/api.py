@@ -180,7 +180,7 @@ def _compute(
         return
     compute = _replacing(target, first, refinement)
     try:
-        control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute)
+        control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute, case.beside)
         if remaining is not None and remaining.before:
             with refused(source or Path()):
                 control.restore(remaining.before, scene, case.points)

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import time as clock
 from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
 from pathlib import Path
+from threading import Event
 
 import numpy as np
 
@@ -18,12 +20,13 @@ from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Resolution, mesh_is_free, wants_errors
+from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, NOT_ESTIMATED, RunSample, compared_cells
 from hybrid.simulation.events import EventLog
@@ -50,6 +53,9 @@ ZONES_FIXED = (
     "more mesh.cells, or a larger model.tolerance, let them move"
 )
 
+# Steps of a result from which on runs to compare with are computed in threads: before, all takes about 0.1 s.
+WORTH_THREADS = 500
+
 
 class Case:
     """One scene in motion, computed as often and as finely as it takes."""
@@ -70,6 +76,7 @@ class Case:
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self._results = 0  # that were begun
+        self._unwanted = Event()  # what runs to compare with still compute
 
     # --- results --------------------------------------------------------------------------------
 
@@ -213,12 +220,24 @@ class Case:
 
     # --- runs to compare with -------------------------------------------------------------------
 
+    def beside(
+        self, samples: Sequence[Callable[[], RunSample]]
+    ) -> AbstractContextManager[Sequence[Callable[[], RunSample]]]:
+        """Runs to compare with, in threads where that is worth it (simulation.beside).
+
+        A criterion of the user may not expect to be called by several threads.
+        """
+        steps = self._duration / first_resolution(self.scene).step
+        threads = thread_count() if self.criterion is None and steps >= WORTH_THREADS else 1
+        self._unwanted.clear()
+        return beside(samples, threads, self.progress.look, self._unwanted.set)
+
     def sample(self, resolution: Resolution, points: Floats | None = None) -> RunSample:
         """Compute for comparison only; points: places, m, instead of those of the result.
 
         An resolution with longer steps has as many times fewer outputs, so that these do not shorten its steps.
         """
-        begin = clock.process_time()
+        begin = clock.thread_time()
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None, points=points)
@@ -228,7 +247,7 @@ class Case:
         assert isinstance(found, MemoryRecorder)
         values = {name: found[name] for name in COMPARED if name in found}
         errors = {x.removeprefix(MODEL_ERRORS): found[x] for x in found.names if x.startswith(MODEL_ERRORS)}
-        cpu = clock.process_time() - begin
+        cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(found.events) if kind == NOT_ESTIMATED}.values())
         return RunSample(
@@ -288,7 +307,8 @@ class Case:
         if points is None:
             points = self.points.s
         observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)
-        return TimeLoop(run, observer, target, self._report, self.interrupted)
+        interrupted = self.interrupted if target is not None else lambda: self._unwanted.is_set() or self.interrupted()
+        return TimeLoop(run, observer, target, self._report, interrupted)
 
     def _observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
         kinds = {"rod", "catenary"} if zones_move else None

@@ -7,8 +7,10 @@ docs/accuracy.md
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -52,12 +54,17 @@ def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolut
     )
 
 
+Samples = Sequence[Callable[[], RunSample]]
+Beside = Callable[[Samples], AbstractContextManager[Samples]]
+
+
 @dataclass
 class ErrorController:
     """Chooses mesh, step and zones of one run after the other until the accuracy that is asked is met.
 
     asked: None asks for an error figure alone.  sample: computes a run to compare with; result: computes the result;
-    both raise ComputationError.  Its `checkpoint` is in the file of every result, so that what was cut off continues
+    both raise ComputationError.  beside: computes several of the former at the same time (simulation.beside);
+    None: one after the other.  Its `checkpoint` is in the file of every result, so that what was cut off continues
     with `proceed`.
     """
 
@@ -66,6 +73,7 @@ class ErrorController:
     moves: bool  # whether there is a time
     sample: Callable[[Resolution], RunSample]
     result: Callable[[Resolution], RunSample]
+    beside: Beside | None = None
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
@@ -124,18 +132,19 @@ class ErrorController:
         self, resolution: Resolution
     ) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
         """The runs to compare with; None: the first has failed."""
-        found: list[RunSample | None] = []
-        for coarser in comparison_resolutions(resolution, self.moves):
-            try:
-                same = not self.moves and len(found) == 1
-                coarser = replace(coarser, follow=not found)
-                found.append(None if same else self._counted(self.sample(coarser)))
-            except ComputationError as error:
-                if not found:
-                    text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
-                    self._notes.append(("no error figure", text))
-                    return None
-                found.append(None)
+        found: list[RunSample | None] = [None, None, None]
+        coarser = [replace(x, follow=k == 0) for k, x in enumerate(comparison_resolutions(resolution, self.moves))]
+        which = (0, 1, 2) if self.moves else (0, 2)  # without steps the second is the first
+        samples = [partial(self.sample, coarser[k]) for k in which]
+        with self.beside(samples) if self.beside is not None else nullcontext(samples) as runs:
+            for k, run in zip(which, runs, strict=True):
+                try:
+                    found[k] = self._counted(run())
+                except ComputationError as error:
+                    if not k:
+                        text = f"no error figure: a coarser run to compare with failed: {str(error).splitlines()[0]}"
+                        self._notes.append(("no error figure", text))
+                        return None
         assert found[0] is not None
         return found[0], found[1], found[2]
 

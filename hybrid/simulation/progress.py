@@ -2,11 +2,14 @@
 
 One bar spans all passes.  Their costs are weighed beforehand by steps and cells; a refinement that turns out to be
 needed is added to the total when it begins, so that the fraction done falls back then.
+
+Listeners are called by the thread that made the reporter; what runs in other threads have done counts in its reports.
 """
 
 from __future__ import annotations
 
 import sys
+import threading
 import time as clock
 from collections import deque
 from collections.abc import Callable, Sequence
@@ -74,7 +77,10 @@ class ProgressReporter:
         self._listener, self._duration = listener, duration
         self._expected: list[tuple[str, float]] = []  # name and cost of passes to come
         self._result: Resolution | None = None  # whose cost is 1
-        self._name, self._run = RESULT, 0
+        self._name, self._run, self._begun = RESULT, 0, 0  # the present pass, its number, and passes that have begun
+        self._owner, self._lock = threading.get_ident(), threading.Lock()
+        self._beside: dict[int, tuple[float, float]] = {}  # last passes of other threads: cost, and how much is done
+        self._where: tuple[float, int, int, tuple[Zone, ...]] = (0.0, 0, 0, ())  # in the present pass
         self._done, self._cost = 0.0, 0.0  # of passes that have ended, of the present one
         self._begin: float | None = None  # s of the clock, at the first report
         self._last = -REPORT_EVERY  # s of wall time, of the last report
@@ -95,32 +101,61 @@ class ProgressReporter:
 
     def begin(self, name: str, resolution: Resolution) -> None:
         """A pass begins; those expected before it that did not take place are dropped."""
-        cost = cost_of(resolution, self._result or resolution)
-        names = [expected for expected, _ in self._expected]
-        if name in names:
-            del self._expected[: names.index(name) + 1]
-        self._done, self._cost = self._done + self._cost, cost
-        self._name, self._run = name, self._run + 1
+        cost, here = cost_of(resolution, self._result or resolution), threading.get_ident()
+        with self._lock:
+            names = [expected for expected, _ in self._expected]
+            if name in names:
+                del self._expected[: names.index(name) + 1]
+            self._begun += 1
+            if here != self._owner:
+                self._done += self._beside.get(here, (0.0, 0.0))[0]
+                self._beside[here] = cost, 0.0
+                return
+            if name != ESTIMATION:  # those in other threads have ended
+                self._done += sum(whole for whole, _ in self._beside.values())
+                self._beside.clear()
+            self._done, self._cost = self._done + self._cost, cost
+            self._name, self._run, self._where = name, self._begun, (0.0, 0, 0, ())
 
     def __call__(self, t: float, step: int, iterations: int, zones: tuple[Zone, ...], finished: bool = False) -> None:
         """A step has ended at t (s); finished: the last of its pass."""
         if self._listener is None:
             return
+        here = threading.get_ident()
+        if here == self._owner:
+            self._where = t, step, iterations, zones
+            self._report(finished)
+        else:
+            with self._lock:
+                cost = self._beside[here][0]
+                self._beside[here] = cost, cost if finished else cost * t / self._duration
+
+    def look(self) -> None:
+        """The present pass has ended, and others, in other threads, go on."""
+        if self._listener is not None:
+            self._report(False)
+
+    def _report(self, finished: bool) -> None:
+        """Tell the listener where the present pass is, if it is time to."""
+        assert self._listener is not None
         now = clock.perf_counter()
         self._begin = now if self._begin is None else self._begin
         wall = now - self._begin
         if not finished and wall - self._last < REPORT_EVERY:
             return
         self._last = wall
-        total = self._done + self._cost + sum(cost for _, cost in self._expected)
-        fraction = min((self._done + self._cost * t / self._duration) / total, 1.0)
+        t, step, iterations, zones = self._where
+        with self._lock:
+            costs, parts = (sum(x) for x in zip((0.0, 0.0), *self._beside.values(), strict=True))
+            total = self._done + self._cost + costs + sum(cost for _, cost in self._expected)
+            fraction = min((self._done + parts + self._cost * t / self._duration) / total, 1.0)
+            runs = self._begun + len(self._expected)
         if self._past and fraction < self._past[-1][1]:
             self._past.clear()
         self._past.append((wall, fraction))
         before, earlier = self._past[0]
         rate = (fraction - earlier) / (wall - before) if wall > before else 0.0
         left = (1.0 - fraction) / rate if rate > 0.0 else None
-        runs = self._run + len(self._expected)
         self._listener(
             Progress(t, self._duration, step, iterations, zones, wall, self._run, runs, self._name, fraction, left)
         )

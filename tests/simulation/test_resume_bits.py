@@ -28,7 +28,7 @@ CASES = {
     "error figure": ("touchdown", ["time.duration=10", "output.errors=true"]),
     "controlled steps": ("rov_tether", ["time={duration: 10, tolerance: 1.0e-4}"]),
     "accuracy": ("06_whip", ["accuracy=0.3%", "time={duration: 0.3}"]),
-    "accuracy by a second result": ("touchdown", ["accuracy={tension: 0.1%}", "time={duration: 12}"]),
+    "accuracy by a second result": ("touchdown", ["accuracy={tension: 0.3%}", "time={duration: 12}"]),
 }
 # What they consist of others do too, together.
 LONG = ("friction, slack", "error figure", "accuracy by a second result", "adaptive in space")
