@@ -56,7 +56,7 @@ def header(path: Path) -> tuple[str, dict[str, str]]:
 def title(path: Path) -> str:
     """What the page calls an example."""
     if path.suffix == ".py":
-        return "The suspension three ways, from Python"
+        return header(path)[0].partition(":")[0].rstrip(".")
     found = re.search(r"^title: (.*)$", path.read_text(encoding="utf-8"), re.MULTILINE)
     assert found, path
     return found[1]

@@ -52,7 +52,7 @@ output: {every: 0.2, history: [0, 20, 100]}
 TAIL = """\
 ## What is refused
 
-Everything below is said at once, with file, line, column, the value, what was expected and what to try:
+Everything below is reported at once, with file, line, column, the value, what was expected and what to try:
 unknown keys and kinds; numbers out of bounds or written as text; two pinned ends farther apart than an inextensible
 cable is long; zones that do not add up to the length; a rod zone, or zones that move, over a section without
 bending stiffness; zones that move with rotary inertia; drag,
@@ -203,7 +203,7 @@ A force on a `free` end pulls but has no inertia: however the cable moves, the t
 That is right for a winch that holds a tension; a weight that swings or is heaved is a `body`.
 
 A cable that no end holds can be in equilibrium, too: a heavy one on a seabed, a light one at a surface, as long as
-nothing pushes it along.  It has to be said where it lies, with `points`:
+nothing pushes it along.  State where it lies, with `points`:
 
 ```yaml
 environment:

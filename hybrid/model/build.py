@@ -292,7 +292,7 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:
-    """Give inextensible cells exactly their length: points carry round-off, which would be a blow at the first step.
+    """Give inextensible cells exactly their length: points carry round-off, which would be an impact at the first step.
 
     The gap this leaves at a held end is closed by small shifts of all chords, until both are met.
     """

@@ -270,7 +270,7 @@ class EndConditions:
         """Let tangents start as the cable lies, and reach their given directions after `duration` s, at ends `which`.
 
         chords: directions (3,) of the first and last cell at t = 0.  A tangent imposed at once on a cable
-        that does not have it is a blow whose strength depends on the mesh alone; a force on such an end
+        that does not have it is an impact whose strength depends on the mesh alone; a force on such an end
         grows with it.  Returns (end, angle in rad) of those concerned.
         """
         for k in range(2):

@@ -235,7 +235,8 @@ class Case:
     def sample(self, resolution: Resolution, points: Floats | None = None) -> RunSample:
         """Compute for comparison only; points: places, m, instead of those of the result.
 
-        An resolution with longer steps has as many times fewer outputs, so that these do not shorten its steps.
+        A resolution with longer steps has as many times fewer outputs, to save time, and so that outputs do not
+        shorten its steps where these end at outputs.
         """
         begin = clock.thread_time()
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)

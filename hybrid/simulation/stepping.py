@@ -1,6 +1,6 @@
 """A cable that is stepped from outside: by a controller, a vessel, another program.
 
-`Simulation` is the loop of `hybrid.run` with its handle outside: the same steps, the same outputs, the same file.
+`Simulation` is the time loop of `hybrid.run`, advanced by the caller: the same steps, the same outputs, the same file.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Motions with an exact or an independent solution: flight, sinking, blows, pendulums, twist, whips, moves."""
+"""Motions with an exact or an independent solution: flight, sinking, impacts, pendulums, twist, whips, moves."""
 
 from __future__ import annotations
 
@@ -356,8 +356,8 @@ def moves() -> Iterator[Case]:
         yield Case("moves to rest", name, d["model"], tables, truth, source)
 
 
-def blows() -> Iterator[Case]:
-    """A slack line pulled taut at speed: without stretch the blow has no height that steps and cells could find."""
+def impacts() -> Iterator[Case]:
+    """A slack line pulled taut at speed: without stretch the impact has no peak that steps and cells could find."""
     source = "what does not stretch stops at once, at an infinite force: no answer but one that says so"
     for L in (0.1, 10.0, 1e4):
         for dt in (2e-4, 1e-3):
@@ -369,7 +369,7 @@ def blows() -> Iterator[Case]:
                 name = told(L=L, dt=f"{dt:g} sqrt(L/g)")
                 cause = "snap|energy|goes into compression"
                 yield Case(
-                    "inextensible blows",
+                    "inextensible impacts",
                     name,
                     model,
                     tables,
@@ -403,4 +403,4 @@ def presses() -> Iterator[Case]:
                 )
 
 
-CASES = [*flights(), *sinking(), *drops(), *pendulums(), *twists(), *moves(), *blows(), *presses()]
+CASES = [*flights(), *sinking(), *drops(), *pendulums(), *twists(), *moves(), *impacts(), *presses()]

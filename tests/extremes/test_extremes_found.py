@@ -89,7 +89,7 @@ def test_steps_in_which_an_end_rolls_too_far_are_cut():
 
 
 @pytest.mark.parametrize(("stiff", "said"), [(None, True), (1e5, False)])
-def test_the_height_of_a_blow_that_nothing_stretches_under_is_said(stiff, said):
+def test_the_peak_of_an_impact_on_an_inextensible_line_is_reported(stiff, said):
     end = pinned((7, 0, 0), motion={"travel": {"by": [2.95, 0, 0], "over": 0.5}})
     line = rod(10.0, 1e-3, 0.1) | ({"axial_stiffness": stiff} if stiff else {})
     tables = scene(line, pinned(), end, "rod", 30, 9.81, time={"duration": 0.7, "step": 0.001})

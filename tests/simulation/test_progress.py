@@ -83,11 +83,11 @@ def test_reports_come_about_ten_times_a_second(monkeypatch: pytest.MonkeyPatch) 
     monkeypatch.setattr(module.clock, "perf_counter", lambda: now[0])
     made, resolution = reporter(heard.append)
     made.begin(RESULT, resolution)
-    for k in range(1, 101):
-        now[0] = 0.01 * k
-        made(0.05 * k, k, 2, ())
-    assert 9 <= len(heard) <= 11
-    assert heard[-1].seconds_left == pytest.approx(1.0, rel=0.05), "5 s of 10 took 1 s"
+    for k in range(1, 65):
+        now[0] = k / 64  # so that times are exact in binary
+        made(5.0 * k / 64, k, 2, ())
+    assert [p.step for p in heard] == [*range(1, 65, 7)], "7/64 s is the first that is 0.1 s after the last"
+    assert heard[-1].seconds_left == pytest.approx(1.0), "5 s of 10, at 5 s a second"
 
 
 def test_true_shows_a_line_on_the_error_stream(capsys: pytest.CaptureFixture[str]) -> None:

@@ -520,7 +520,7 @@ TELLINGS = {
 
 @pytest.mark.parametrize("friction", [False, True], ids=["smooth", "rough"])
 @pytest.mark.parametrize("kind", ["catenary", "rod", "hybrid"])
-def test_the_same_sea_said_differently(kind, friction, report):
+def test_the_same_sea_described_differently(kind, friction, report):
     """Round-off: 2e-7 of length and tension, as in tests/test_equivalence.py; 1 km away has 1e4 roundings of 1 km."""
     base = hybrid.run(everything(kind, friction)[0])
     assert base.grounded_length.min() > 50.0
@@ -534,7 +534,7 @@ def test_the_same_sea_said_differently(kind, friction, report):
         tension = np.abs(before[:, along] - now).max() / base.tension.max()
         worst[name] = max(position, 0.1 * tension)
     report(
-        f"A {kind} in a sea of everything{' with friction' if friction else ''}, said in five ways", "equivalence",
+        f"A {kind} in a sea of everything{' with friction' if friction else ''}, described in five ways", "equivalence",
         ", ".join(f"{name} {x:.0e}" for name, x in worst.items()), "round-off: 2e-7",
     )  # fmt: skip
     assert max(worst.values()) <= 2e-7
