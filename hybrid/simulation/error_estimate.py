@@ -21,7 +21,7 @@ from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
-# 2, contact and impacts have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
+# 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
 # is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
 ORDER, ORDERS = 1.5, (1.25, 2.0)
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
