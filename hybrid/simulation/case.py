@@ -20,7 +20,7 @@ from hybrid.model.build import Model, build, rod_cells
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free, wants_errors
+from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
@@ -46,6 +46,7 @@ from hybrid.store.hdf5_file import is_result, opened
 from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import open_result
+from hybrid.store.stored_array import StoredArray
 from hybrid.store.writer import Recorder
 
 ZONES_FIXED = (
@@ -211,9 +212,12 @@ class Case:
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
         with open_result(target) as result:
-            values = {name: np.array(result[name]) for name in COMPARED if name in result}
-            errors = result["errors/model"].items() if "errors/model" in result else ()
-            model_error = {name: np.array(x) for name, x in errors}
+            # they stay in the file, if that is one and no finer result may replace it
+            stay = target if isinstance(target, Path) and requested_accuracy(self.scene) is None else None
+            names = [name for name in result.names if name in COMPARED or name.startswith(MODEL_ERRORS)]
+            found = {name: StoredArray(stay, name) if stay is not None else np.array(result[name]) for name in names}
+            values = {name: found[name] for name in COMPARED if name in found}
+            model_error = {x.removeprefix(MODEL_ERRORS): y for x, y in found.items() if x not in values}
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
             notes = damped_vibrations(result) if resolution.local is not None else ()
         return RunSample(resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes)
@@ -272,11 +276,11 @@ class Case:
         model = build(self.scene, coarse)
         s = np.linspace(0.0, model.length, POINTS)
         try:
-            found = self.sample(coarse, s)
+            found = self.sample(coarse, s).values
         except ComputationError:
             return None
         bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
-        return survey_grading(model, s, found.values, bend)
+        return survey_grading(model, s, {name: np.asarray(x) for name, x in found.items()}, bend)
 
     # --- parts of a run -------------------------------------------------------------------------
 

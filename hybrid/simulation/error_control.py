@@ -158,12 +158,12 @@ class ErrorController:
             self._notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons)
-        if not estimate.by_mesh:
+        if not estimate.has_mesh:
             text = f"no error figure: {result.cells} cells are so few that there is nothing coarser to compare with"
             self._notes.append(("no error figure", text))
             self._notes += [*result.notes, *estimate.notes]
             return False
-        if self.moves and not estimate.by_step:
+        if self.moves and not estimate.has_step:
             text = (
                 "the share of the time step is not known: runs with longer steps fail, or are halved to what they were"
             )

@@ -7,9 +7,9 @@ docs/accuracy.md
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field, fields
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.stored_array import StoredArray
 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
 # 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
@@ -39,6 +40,9 @@ END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_en
 # What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
 MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
 
+# Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
+MOST = 500_000
+
 Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind and text
 
 
@@ -47,43 +51,73 @@ class RunSample:
     """What is compared of a run: how finely it was computed, and its outputs (nt, ...) by name."""
 
     resolution: Resolution
-    values: Mapping[str, np.ndarray]
+    values: Mapping[str, np.ndarray | StoredArray]
     cells: int  # of zones that move: base cells
     steps: int
     cpu: float  # s
     every: int = 1  # outputs of the result to one of these; the last is there always
     unresolved: bool = False  # whether a bend was sharper than its cells can show
-    model_error: Mapping[str, np.ndarray] = field(default_factory=dict)
+    model_error: Mapping[str, np.ndarray | StoredArray] = field(default_factory=dict)
     bound: float = 0.0  # m, that the criteria of zones that move let pass; 0 where there are none
     notes: Notes = ()  # that the result should carry
 
-    def at(self, name: str, every: int) -> np.ndarray:
-        """Every so many-th value of an output, and the last."""
-        values = self.values[name]
-        return values[_every(len(values), every // self.every)]
+    def rows(self, name: str, numbers: np.ndarray) -> np.ndarray:
+        """The values of an output with these numbers, which increase."""
+        begin = numbers[0]
+        return np.asarray(self.values[name][begin : numbers[-1] + 1])[numbers - begin]
 
     @property
     def largest_end_force(self) -> float:
         """The largest force at the ends, N."""
-        return max(
-            (float(np.linalg.norm(self.values[x], axis=1).max()) for x in END_FORCES if x in self.values), default=0.0
-        )
+        forces = [np.asarray(self.values[x]) for x in END_FORCES if x in self.values]
+        return max((float(np.linalg.norm(x, axis=1).max()) for x in forces), default=0.0)
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        return {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
+        out = {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
+        return out | {x: {name: np.asarray(y) for name, y in out[x].items()} for x in ("values", "model_error")}
 
 
-@dataclass(frozen=True)
+class Block(NamedTuple):
+    """Errors of an output by one cause: magnitudes (n, ...) at n output times, from number `begin` on."""
+
+    cause: str
+    name: str
+    begin: int
+    values: np.ndarray
+
+
 class Errors:
-    """Estimated errors of a run: cause ("mesh", "time", "model", "total") -> output -> magnitude (nt, ...)."""
+    """Estimated errors of a run, by cause ("mesh", "time", "model", "total") and output, computed in blocks."""
 
-    fields: Mapping[str, Mapping[str, np.ndarray]]
+    def __init__(self, fields: Mapping[str, Mapping[str, tuple[int, ...]]], blocks: Callable[[], Iterator[Block]]):
+        """fields: shapes (nt, ...) of all errors, by cause and output; blocks: computes them."""
+        self.fields, self._compute = fields, blocks
+        self._largest: dict[tuple[str, str], float] | None = None
+
+    @classmethod
+    def of(cls, values: Mapping[str, Mapping[str, np.ndarray]]) -> Errors:
+        """From magnitudes, by cause and output."""
+        shapes = {cause: {name: x.shape for name, x in found.items()} for cause, found in values.items()}
+        flat = [Block(cause, name, 0, x) for cause, found in values.items() for name, x in found.items()]
+        return cls(shapes, lambda: iter(flat))
+
+    def blocks(self) -> Iterator[Block]:
+        """All of them, each computed when it is asked for."""
+        largest: dict[tuple[str, str], float] = {}
+        for block in self._compute():
+            key = block.cause, block.name
+            largest[key] = float(np.max(block.values, initial=largest.get(key, 0.0)))
+            yield block
+        self._largest = largest
 
     def largest(self, cause: str, name: str) -> float:
         """Largest error of an output; 0 where it is not estimated."""
-        found = self.fields.get(cause, {}).get(name)
-        return float(np.max(found, initial=0.0)) if found is not None else 0.0
+        if self._largest is None:
+            for _ in self.blocks():
+                pass
+        assert self._largest is not None
+        return self._largest.get((cause, name), 0.0)
 
 
 def compared_cells(model: Model) -> int:
@@ -107,68 +141,130 @@ class Estimate:
         self.run = result
         self.order = {name: _order(name, result, coarse, coarsest) for name in result.values if name in coarse.values}
         self.set_model_errors(coarse)
-        self.by_step: dict[str, np.ndarray] = {}  # errors of the result by its time step, with their sign
-        self.by_mesh: dict[str, np.ndarray] = {}  # the same by its mesh
-        for name, p in self.order.items():
-            count = len(result.values[name])
-            if rough is not None and name in rough.values and coarse.steps > LEAST_RATIO * rough.steps:
-                late = (coarse.at(name, rough.every) - rough.values[name]) / ((coarse.steps / rough.steps) ** p - 1.0)
-                late = late / (result.steps / coarse.steps) ** p
-                self.by_step[name] = _at_all_outputs(late, count, rough.every)
-            if result.cells < LEAST_RATIO * coarse.cells:
-                continue
-            change = result.at(name, coarse.every) - coarse.values[name]
-            self.by_mesh[name] = self._mesh_error(name, _at_all_outputs(change, count, coarse.every), coarse)
+        slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
+        self._coarse, self._rough = coarse, rough if slower else None
+        self.by_step: dict[str, np.ndarray] | None = (
+            None  # errors by the time step, with their sign, once they are kept
+        )
+        self.by_mesh: dict[str, np.ndarray] | None = None  # the same by the mesh
+        self.has_step = self._rough is not None and any(name in self._rough.values for name in self.order)
+        self.has_mesh = bool(self.order) and result.cells >= LEAST_RATIO * coarse.cells
 
-    def _mesh_error(self, name: str, change: np.ndarray, before: RunSample) -> np.ndarray:
+    def _signed(self, name: str, a: int, b: int) -> tuple[np.ndarray | None, np.ndarray | None]:
+        """Errors by time step and mesh of the outputs from number a to b, with their sign; None: not known."""
+        if self.by_step is not None and self.by_mesh is not None:
+            step, mesh = self.by_step.get(name), self.by_mesh.get(name)
+            return step if step is None else step[a:b], mesh if mesh is None else mesh[a:b]
+        result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
+        count, by_step = len(result.values[name]), None
+        if rough is not None and name in rough.values:
+            known, own = _around(_every(count, rough.every), a, b)
+            later = coarse.rows(name, _every(len(coarse.values[name]), rough.every // coarse.every)[own])
+            late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
+            late = late / (result.steps / coarse.steps) ** p
+            by_step = _at_all_outputs(late, known, a, b)
+        if not self.has_mesh:
+            return by_step, None
+        known, own = _around(_every(count, coarse.every), a, b)
+        change = result.rows(name, known) - coarse.values[name][own]
+        return by_step, self._mesh_error(name, _at_all_outputs(change, known, a, b), by_step, coarse)
+
+    def _mesh_error(self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample) -> np.ndarray:
         """Error by the mesh, from a change since a run with other cells: less what its steps have changed."""
         p = self.order[name]
-        if name in self.by_step:
-            change = change - self.by_step[name] * ((self.run.steps / before.steps) ** p - 1.0)
+        if by_step is not None:
+            change = change - by_step * ((self.run.steps / before.steps) ** p - 1.0)
         return np.asarray(change / ((self.run.cells / before.cells) ** p - 1.0))
+
+    def _keep(self) -> tuple[dict[str, np.ndarray], dict[str, np.ndarray]]:
+        """Errors by time step and by mesh of all outputs, kept from here on; the runs before are done with."""
+        if self.by_step is None or self.by_mesh is None:
+            signed = {name: self._signed(name, 0, len(self.run.values[name])) for name in self.order}
+            self.by_step = {name: x for name, (x, _) in signed.items() if x is not None}
+            self.by_mesh = {name: x for name, (_, x) in signed.items() if x is not None}
+            del self._coarse, self._rough
+        return self.by_step, self.by_mesh
 
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
         doubtful = _implausible(coarse)
         self.notes: Notes = (*coarse.notes, *(((NOT_ESTIMATED, doubtful),) if doubtful else ()))
-        count = len(next(iter(self.run.values.values())))
         found = coarse.model_error if not doubtful else {}
-        self._model = {name: _at_all_outputs(x, count, coarse.every) for name, x in found.items() if len(x)}
+        self._model: Mapping[str, np.ndarray | StoredArray] = {name: x for name, x in found.items() if len(x)}
+        self._model_every = coarse.every
 
     def update(self, result: RunSample) -> None:
         """A finer run has become the result."""
+        by_step, by_mesh = self._keep()
         before, self.run = self.run, result
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         for name, p in self.order.items():
-            change = result.values[name] - before.values[name]
-            if finer > LEAST_RATIO and name in self.by_mesh:
-                if name in self.by_step:
-                    self.by_step[name] = self.by_step[name] / shorter**p
-                self.by_mesh[name] = self._mesh_error(name, change, before)
+            change = np.asarray(result.values[name]) - np.asarray(before.values[name])
+            if finer > LEAST_RATIO and name in by_mesh:
+                if name in by_step:
+                    by_step[name] = by_step[name] / shorter**p
+                by_mesh[name] = self._mesh_error(name, change, by_step.get(name), before)
             elif shorter > LEAST_RATIO:
-                self.by_step[name] = change / (shorter**p - 1.0)
+                by_step[name] = change / (shorter**p - 1.0)
+
+    def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
+        """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
+        if quantity in self.run.model_error:
+            return np.asarray(self.run.model_error[quantity][a:b])
+        if quantity not in self._model:
+            return None
+        known, own = _around(_every(self._count, self._model_every), a, b)
+        return _at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
 
     @property
-    def model(self) -> dict[str, np.ndarray]:
-        """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
-        return self._model | dict(self.run.model_error)
+    def _count(self) -> int:
+        """Outputs of the result."""
+        return len(next(iter(self.run.values.values())))
 
     @property
     def errors(self) -> Errors:
         """Magnitudes by cause.  Causes add up in magnitude: that they cancel is seldom true at all times."""
-        out: dict[str, dict[str, np.ndarray]] = {"mesh": {}, "time": {}, "model": self.model, "total": {}}
-        for name, by_mesh in self.by_mesh.items():
-            by_step, quantity = self.by_step.get(name), (END_FORCES | RIGHT).get(name, name)
-            out["mesh"][quantity] = total = _magnitude(by_mesh, name)
+        shapes: dict[str, dict[str, tuple[int, ...]]] = {}
+        for block in self._blocks(1):
+            shapes.setdefault(block.cause, {})[block.name] = (self._count, *block.values.shape[1:])
+        order = ("mesh", "time", "model", "total")
+        return Errors({cause: shapes[cause] for cause in order if cause in shapes}, self._blocks)
+
+    def _blocks(self, most: int | None = None) -> Iterator[Block]:
+        """All errors, in blocks of so many outputs; most: of the first output alone."""
+        names = {(END_FORCES | RIGHT).get(name, name): name for name in self.order}
+        for quantity in dict.fromkeys([*names, *self._model, *self.run.model_error]):
+            name = names.get(quantity, "")
+            shape = (
+                self.run.values[name].shape[1:] if name else (self.run.model_error or self._model)[quantity].shape[1:]
+            )
+            rows = max(1, MOST // max(1, int(np.prod(shape))))
+            for a in range(0, self._count, rows):
+                b = min(a + rows, self._count) if most is None else most
+                yield from (Block(cause, quantity, a, x) for cause, x in self._causes(name, quantity, a, b).items())
+                if most is not None:
+                    break
+
+    def _causes(self, name: str, quantity: str, a: int, b: int) -> dict[str, np.ndarray]:
+        """Magnitudes by cause of the outputs from number a to b; name: of the output, empty if it is not compared."""
+        by_step, by_mesh = self._signed(name, a, b) if name else (None, None)
+        model, out = self._model_error(quantity, a, b), dict[str, np.ndarray]()
+        if model is not None:
+            out["model"] = model
+        if by_mesh is not None:
+            out["mesh"] = total = _magnitude(by_mesh, name)
             if by_step is not None:
-                out["time"][quantity] = _magnitude(by_step, name)
-                total = total + out["time"][quantity]
-            out["total"][quantity] = total + out["model"].get(quantity, 0.0)
-        return Errors({cause: found for cause, found in out.items() if found})
+                out["time"] = _magnitude(by_step, name)
+                total = total + out["time"]
+            out["total"] = total + (model if model is not None else 0.0)
+        return out
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
-        found = {"order": self.order, "late": self.by_step, "cells": self.by_mesh, "model": self._model}
+        by_step, by_mesh = self._keep()
+        model = {name: _at_all_outputs(np.asarray(x), _every(self._count, self._model_every), 0, self._count)
+                 for name, x in self._model.items()}  # fmt: skip
+        found = {"order": self.order, "late": by_step, "cells": by_mesh, "model": model}
         return found | {"notes": self.notes, "run": self.run.checkpoint()}
 
     @classmethod
@@ -178,7 +274,8 @@ class Estimate:
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         late, cells, model = (_restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
-        self.by_step, self.by_mesh, self._model = late, cells, model
+        self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
+        self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
         if not all(ORDERS[0] <= p <= ORDERS[1] for p in self.order.values()):
@@ -202,22 +299,27 @@ def _order(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample 
     """The order with which an output converges, by three runs; bounded, because a ratio of noise is one as well."""
     if coarsest is None or name not in coarsest.values:
         return ORDER
-    every = coarsest.every
-    later = _size(result.at(name, every) - coarse.at(name, every))  # of all times: peaks jump about
-    earlier = _size(coarse.at(name, every) - coarsest.values[name])
+    values, every = coarsest.values[name], coarsest.every
+    final, middle = (_every(len(x.values[name]), every // x.every) for x in (result, coarse))
+    rows, later, earlier = max(1, MOST // int(np.prod(values.shape[1:]))), 0.0, 0.0
+    for a in range(0, len(values), rows):  # of all times: peaks jump about
+        between = coarse.rows(name, middle[a : a + rows])
+        later += _squares(result.rows(name, final[a : a + rows]) - between)
+        earlier += _squares(between - values[a : a + rows])
     if not (later > 0.0 and earlier > 0.0):
         return ORDER
-    return float(np.clip(np.log(earlier / later) / np.log(COARSER), *ORDERS))
+    return float(np.clip(np.log(np.sqrt(earlier) / np.sqrt(later)) / np.log(COARSER), *ORDERS))
 
 
-def _size(x: np.ndarray) -> float:
-    """Root of the sum of all squares; numpy's norm wakes the threads of BLAS, which takes a hundred times as long."""
-    return float(np.sqrt((x * x).sum()))
+def _squares(x: np.ndarray) -> float:
+    """Sum of all squares; numpy's norm wakes the threads of BLAS, which takes a hundred times as long."""
+    return float((x * x).sum())
 
 
 def _implausible(coarse: RunSample) -> str:
     """What to say where the model error of a line whose zones move is too large to be true; else empty."""
-    error = coarse.model_error.get("position")
+    found = coarse.model_error.get("position")
+    error = np.asarray(found) if found is not None else None
     if error is None or not coarse.bound or float(np.max(error, initial=0.0)) <= BELIEVED * coarse.bound:
         return ""
     return (
@@ -231,17 +333,24 @@ def _every(count: int, step: int) -> np.ndarray:
     return np.unique(np.append(np.arange(0, count, step), count - 1))
 
 
-def _at_all_outputs(error: np.ndarray, count: int, every: int) -> np.ndarray:
-    """Errors at some outputs at all of them; in between the larger of the two beside it: peaks are not averaged out."""
-    if every == 1:
+def _around(known: np.ndarray, a: int, b: int) -> tuple[np.ndarray, slice]:
+    """Of the outputs whose errors are known, the numbers of those that errors from a to b follow from; and which."""
+    first = max(0, int(np.searchsorted(known, a, side="right")) - 1)
+    own = slice(first, int(np.searchsorted(known, b - 1)) + 1)
+    return known[own], own
+
+
+def _at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.ndarray:
+    """Errors at the outputs `known` at all of them from a to b; in between the larger of the two beside it: peaks are
+    not averaged out."""
+    if known.size == b - a and known[0] == a and known[-1] == b - 1:
         return error
-    at = np.arange(count)
-    known = _every(count, every)
+    at = np.arange(a, b)
     right = np.clip(np.searchsorted(known, at), 1, known.size - 1)
     before, after = error[right - 1], error[right]
     between = np.where(np.abs(before) > np.abs(after), before, after)
     exact = np.isin(at, known)
-    between[exact] = error
+    between[exact] = error[np.isin(known, at)]
     return np.asarray(between)
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 
 import numpy as np
@@ -46,26 +47,34 @@ def write_errors(
     if control.asked is not None:
         attributes["accuracy_asked"] = control.asked.text
     fields = _error_fields(result, errors) if errors is not None else []
-    attributes |= summary(errors) if errors is not None else {}
-    with open_result(target) as file:
-        total = errors.fields.get("total", {}) if errors is not None and control.moves else {}
-        undersampled = undersampled_end_forces(file, total)
-    amend(target, fields, attributes, [*dict(reversed(control.notes)).items(), *undersampled], done)
+    names = {field.name for field in fields}
+
+    def blocks() -> Iterator[tuple[str, int, np.ndarray]]:
+        for cause, name, begin, values in errors.blocks() if errors is not None else ():
+            if f"errors/{cause}/{name}" in names:
+                yield f"errors/{cause}/{name}", begin, values
+
+    def known_then() -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
+        with open_result(target) as file:
+            total = errors.fields.get("total", {}) if errors is not None and control.moves else {}
+            largest = {name: errors.largest("total", name) for name in total if errors is not None}
+            undersampled = undersampled_end_forces(file, largest)
+        found = summary(errors) if errors is not None else {}
+        return attributes | found, [*dict(reversed(control.notes)).items(), *undersampled]
+
+    amend(target, fields, blocks(), known_then, done)
 
 
-def _error_fields(result: RunSample, errors: Errors) -> list[tuple[Field, np.ndarray]]:
+def _error_fields(result: RunSample, errors: Errors) -> list[Field]:
     """Errors by cause and quantity; those by neglected bending only where the run has not written them itself."""
     return [
-        (
-            Field(
-                f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
-                values.shape[1:], ("right/s" if name.startswith("right_") else "s",) if values.ndim == 2 else (),
-            ),
-            values,
+        Field(
+            f"errors/{cause}/{name}", UNITS[name], f"{CAUSES[cause]} of {_words(name)}, estimated",
+            shape[1:], ("right/s" if name.startswith("right_") else "s",) if len(shape) == 2 else (),
         )
         for cause, quantities in errors.fields.items()
         if not (cause == "model" and result.model_error)
-        for name, values in quantities.items()
+        for name, shape in quantities.items()
     ]  # fmt: skip
 
 

@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from typing import NamedTuple
 
+import numpy as np
+
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.accuracy import ROUGHEST
 from hybrid.simulation.error_estimate import END_FORCES, Errors, RunSample
@@ -51,7 +53,7 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
         if asked.of_end_force is not None:
             bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
     if asked.of_curvature is not None and "curvature" in run.values:
-        sharpest = float(run.values["curvature"].max())
+        sharpest = float(np.asarray(run.values["curvature"]).max())
         bounds.append(("curvature", "1/m", asked.of_curvature * sharpest, sharpest))
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
     for name, unit, bound, most in bounds:

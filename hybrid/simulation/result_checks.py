@@ -20,8 +20,8 @@ NOTHING_LOST = 1e-6
 IN_BOOKS = 0.01
 
 
-def undersampled_end_forces(result: Result, errors: Mapping[str, np.ndarray]) -> list[tuple[str, str]]:
-    """Events (kind, text): where an end force leaves the curve through its outputs by more than its error."""
+def undersampled_end_forces(result: Result, errors: Mapping[str, float]) -> list[tuple[str, str]]:
+    """Events (kind, text): where an end force leaves the curve through its outputs by more than its error, N."""
     out: list[tuple[str, str]] = []
     times, t = result.times, result["steps/t"] if "steps/t" in result else np.zeros(0)
     if len(times) < 4 or len(t) <= len(times):
@@ -38,7 +38,7 @@ def undersampled_end_forces(result: Result, errors: Mapping[str, np.ndarray]) ->
         inside = (t >= times[1]) & (t <= times[-2])  # at the first and last output the curve has one side only
         off = np.where(inside, np.abs(force - seen(t)), 0.0)
         i = int(off.argmax())
-        error = float(errors[name].max())
+        error = errors[name]
         if off[i] > max(TIMES_THE_ERROR * error, PART * largest):
             every = float(np.median(np.diff(times)))
             text = (

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import io
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from math import nan
 from pathlib import Path
 
@@ -17,22 +17,27 @@ from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign
 from hybrid.store.table import Table
 
+# Name of a quantity, number of its first output, and values; attributes, and events (kind, text).
+Block = tuple[str, int, np.ndarray]
+Others = tuple[Mapping[str, str | float | int], Sequence[tuple[str, str]]]
+
 
 def amend(
     target: Path | io.BytesIO,
-    fields: Sequence[tuple[Field, np.ndarray]],
-    attributes: Mapping[str, str | float | int],
-    events: Sequence[tuple[str, str]] = (),
+    fields: Sequence[Field],
+    blocks: Iterable[Block],
+    others: Callable[[], Others],
     done: bool = True,
 ) -> None:
     """Add to a complete result what is known only afterwards.
 
-    fields: quantities over the output times, (nt, ...), with their values; events: kind and text, of all the cable;
-    done: whether nothing is left to go on with.
+    fields: quantities over the output times, (nt, ...); blocks: all their values: name, number of the first output, and
+    values (n, ...) of n outputs; others: gives attributes, and events of all the cable (kind, text), after the last
+    block; done: whether nothing is left to go on with.
     """
     if isinstance(target, io.BytesIO):
         with in_memory(target.getvalue()) as file:
-            _add(file, fields, attributes, events)
+            _add(file, fields, blocks, others)
             file.flush()
             image = file.id.get_file_image()
         target.seek(0)
@@ -46,7 +51,7 @@ def amend(
         with redrafted(new) as file:
             if done and BEFORE in file:
                 del file[BEFORE]
-            _add(file, fields, attributes, events)
+            _add(file, fields, blocks, others)
         sign(new)
         os.replace(new, target)
     except (OSError, RuntimeError) as error:
@@ -55,21 +60,20 @@ def amend(
         new.unlink(missing_ok=True)
 
 
-def _add(
-    file: h5py.File,
-    fields: Sequence[tuple[Field, np.ndarray]],
-    attributes: Mapping[str, str | float | int],
-    events: Sequence[tuple[str, str]],
-) -> None:
-    for name, value in attributes.items():
-        file.attrs[name] = value
-    for field, values in fields:
-        checked(field, values[0])
+def _add(file: h5py.File, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[], Others]) -> None:
+    named = {field.name: field for field in fields}
+    for field in fields:
         if field.name in file:  # of a result that was amended before, and then resumed
             del file[field.name]
-        data = file.create_dataset(field.name, data=values)
+        data = file.create_dataset(field.name, (len(file["t"]), *field.shape), field.dtype)
         annotate(data, field.unit, field.description, field.frame)
         attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
+    for name, begin, values in blocks:
+        checked(named[name], values[0])
+        file[name][begin : begin + len(values)] = values
+    attributes, events = others()
+    for name, value in attributes.items():
+        file.attrs[name] = value
     if events:
         table = Table(file, "events", EVENTS)
         table.count = len(file["events/t"])

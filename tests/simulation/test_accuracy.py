@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -10,9 +12,12 @@ from hybrid.errors import SceneError
 from hybrid.model.mesh_grading import GROWTH, grading
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
+from hybrid.simulation import error_estimate
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate, RunSample
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
 
 # --- what is written -----------------------------------------------------------------------------
 
@@ -153,8 +158,24 @@ def test_without_the_rougher_runs_an_order_in_between_is_taken():
     assert "time" not in estimate.errors.fields
 
 
+@pytest.mark.parametrize("settings", [["model=rod"], [], ["model=corrected"]])
+def test_errors_do_not_depend_on_the_blocks_they_are_computed_in(settings, tmp_path, monkeypatch):
+    """Of a result in a file, which is read block by block, and of one in memory; the order is a sum over blocks."""
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=9.4", *settings])
+    whole = hybrid.run(scene)
+    for most in (1, 2000):
+        monkeypatch.setattr(error_estimate, "MOST", most)
+        found = hybrid.run(scene, tmp_path / "run.h5")
+        names = [x for x in whole.names if x.startswith("errors/")]
+        assert len(names) > 10 and found.names == whole.names
+        for name in names:
+            assert found[name] == pytest.approx(whole[name], rel=1e-12, abs=1e-12 * float(whole[name].max())), name
+        for name in (x for x in whole.attributes if x.startswith("error_")):
+            assert found.attributes[name] == pytest.approx(whole.attributes[name], rel=1e-12)
+
+
 def test_judging_and_refining():
-    errors = Errors({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
+    errors = Errors.of({"mesh": {"position": np.full((2, 3), 0.3)}, "time": {"position": np.full((2, 3), 0.1)},
                      "total": {"position": np.full((2, 3), 0.4), "end_force_end": np.full(2, 1.0)}})  # fmt: skip
     resolution = Resolution(1.0, 0.1, 1e-3, 1e-3)
     run = RunSample(resolution, {"reaction_end": np.full((2, 3), 10.0)}, 50, 10, 0.0)
