@@ -32,7 +32,6 @@ from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
-from hybrid.simulation.error_estimate import RunSample
 from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
@@ -40,11 +39,13 @@ from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, Pr
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import RemainingRun, remaining_run
 from hybrid.simulation.restore import refused
+from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.static_case import StaticCase
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result
+from hybrid.store.stored_rows import remove_rows
 
 # s between two signals of which the second ends a run at once: process managers may send the same one twice.
 IMPATIENT = 1.0
@@ -178,12 +179,13 @@ def _compute(
     if not wants_errors(scene):
         first(resolution, target)
         return
-    compute = _replacing(target, first, refinement)
+    compute, kept = _replacing(target, first, refinement), False
+    case.beside_result = target if isinstance(target, Path) else None
     try:
         control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute, case.beside)
         if remaining is not None and remaining.before:
             with refused(source or Path()):
-                control.restore(remaining.before, scene, case.points)
+                control.restore(remaining.before, scene, case.points, source)
             result, errors = control.proceed()
         else:
             surveys = remaining is None and requested_accuracy(scene) is not None
@@ -195,8 +197,14 @@ def _compute(
         if control is not None and control.estimate is not None:  # the result before the finer run stands
             result, errors = control.without_refinement("a finer run was stopped from outside")
             write_errors(target, scene, control, result, errors, clock.process_time() - begin, done=False)
+        begun = control is not None and (control.comparisons or control.estimate) is not None
+        kept = begun and isinstance(target, Path) and target.exists()  # it can be resumed
         raise
-    write_errors(target, scene, control, result, errors, clock.process_time() - begin)
+    else:
+        write_errors(target, scene, control, result, errors, clock.process_time() - begin)
+    finally:
+        if isinstance(target, Path) and not kept:
+            remove_rows(target)
 
 
 def _free(scene: Scene) -> Free:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import math
 import time as clock
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
@@ -28,7 +29,6 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
-from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, NOT_ESTIMATED, RunSample, compared_cells
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
 from hybrid.simulation.mesh_survey import POINTS, survey_grading, survey_resolution
@@ -37,6 +37,15 @@ from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
 from hybrid.simulation.result_checks import damped_vibrations
 from hybrid.simulation.result_file import STEP_FIELDS, result_recorder
+from hybrid.simulation.run_sample import (
+    COMPARED,
+    MODEL_ERRORS,
+    NOT_ESTIMATED,
+    RunSample,
+    compared_cells,
+    rows_key,
+    split_outputs,
+)
 from hybrid.simulation.time_loop import TimeLoop
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
@@ -47,6 +56,7 @@ from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.reader import open_result
 from hybrid.store.stored_array import StoredArray
+from hybrid.store.stored_rows import RowsRecorder, rows_path
 from hybrid.store.writer import Recorder
 
 ZONES_FIXED = (
@@ -56,6 +66,8 @@ ZONES_FIXED = (
 
 # Steps of a result from which on runs to compare with are computed in threads: before, all takes about 0.1 s.
 WORTH_THREADS = 500
+# Numbers that the outputs of a run to compare with may take in memory and in checkpoints, 8 MB; more go into a file.
+MOST_IN_MEMORY = 1_000_000
 
 
 class Case:
@@ -76,6 +88,7 @@ class Case:
         self.points = points if points is not None else output_points(scene)
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
+        self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self._results = 0  # that were begun
         self._unwanted = Event()  # what runs to compare with still compute
 
@@ -246,12 +259,17 @@ class Case:
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
         loop = self._loop(self.scene, model, resolution, switching, None, points=points)
-        loop.begin(equilibrium)
-        loop.to_the_end(self._duration, self._exact, self.changes)
+        numbers = len(loop.run.run.books.outputs) * sum(math.prod(field.shape) for field in loop.observer.fields)
+        if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
+            loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)))
         found = loop.recorder
         assert isinstance(found, MemoryRecorder)
-        values = {name: found[name] for name in COMPARED if name in found}
-        errors = {x.removeprefix(MODEL_ERRORS): found[x] for x in found.names if x.startswith(MODEL_ERRORS)}
+        try:
+            loop.begin(equilibrium)
+            loop.to_the_end(self._duration, self._exact, self.changes)
+        finally:
+            found.close("", "")
+        values, errors = split_outputs({name: found[name] for name in found.names})
         cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0
         notes = tuple({kind: (kind, text) for kind, text in reversed(found.events) if kind == NOT_ESTIMATED}.values())
@@ -266,6 +284,7 @@ class Case:
             errors,
             bound,
             notes,
+            found.reference() if isinstance(found, RowsRecorder) else {},
         )
 
     def survey(self, resolution: Resolution) -> Grading | None:

@@ -11,6 +11,7 @@ from collections.abc import Callable, Mapping, Sequence
 from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,17 +21,12 @@ from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
-from hybrid.simulation.error_estimate import (
-    COARSER,
-    Errors,
-    Estimate,
-    RunSample,
-    restored_notes,
-    restored_sample,
-)
+from hybrid.simulation.error_estimate import COARSER, Errors, Estimate
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
+from hybrid.simulation.run_sample import RunSample, restored_notes, restored_sample
 from hybrid.store.named_arrays import Tree, matched
+from hybrid.store.stored_rows import MissingRows
 
 # A finer run whose error is more than this part of that before it tells that more will not help: zones that change a
 # little earlier or later, or friction that holds elsewhere, are what is left.
@@ -80,6 +76,7 @@ class ErrorController:
     estimate: Estimate | None = None  # of the result as it is
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
+    _lost: bool = False  # whether the runs to compare with are to be computed again
     _notes: list[tuple[str, str]] = field(default_factory=list)
 
     @property
@@ -95,6 +92,9 @@ class ErrorController:
 
     def proceed(self) -> tuple[RunSample, Errors | None]:
         """The same from the next result on."""
+        if self._lost and self.next is not None:
+            self.runs, self._notes, self._lost = [], [], False
+            self.comparisons = self._compute_comparisons(self.next)
         while self.next is not None:
             resolution = self.next
             try:
@@ -220,8 +220,9 @@ class ErrorController:
             "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
-    def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints) -> None:
-        """Continue as `checkpoint` has said; points: of the result.
+    def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
+        """Continue as `checkpoint` has said; points: of the result.  source: its file; runs to compare with whose
+        outputs are no longer beside it are computed again.
 
         ResultError or ValueError: it is none of this scene.
         """
@@ -232,8 +233,11 @@ class ErrorController:
         self._notes = list(restored_notes(saved["notes"]))
         self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None
         if saved["coarse"] is not None:
-            first, second, third = (x and restored_sample(x, scene, shape) for x in saved["coarse"])
-            self.comparisons = first, second, third
+            try:
+                first, second, third = (x and restored_sample(x, scene, shape, source) for x in saved["coarse"])
+                self.comparisons = first, second, third
+            except MissingRows:
+                self._lost = True
         if saved["estimate"] is not None:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
         if self.next is None and self.estimate is None:

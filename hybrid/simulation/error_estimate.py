@@ -8,18 +8,24 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field, fields
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from hybrid.model.build import Model
-from hybrid.model.resolution import Resolution, first_resolution
-from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
-from hybrid.simulation.restore import resolution_from, resolution_tree
+from hybrid.simulation.run_sample import (
+    END_FORCES,
+    NOT_ESTIMATED,
+    RIGHT,
+    Notes,
+    Outputs,
+    RunSample,
+    every_of,
+    restored_notes,
+    restored_outputs,
+    restored_sample,
+)
 from hybrid.store.named_arrays import Tree, matched
-from hybrid.store.stored_array import StoredArray
 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
 # 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
@@ -31,51 +37,8 @@ LEAST_RATIO = 1.1
 COARSER = 2.0
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
-# Outputs by which runs are compared; those that a run does not have are skipped.
-RIGHT = {f"right/{name}": f"right_{name}" for name in SIDED_ERRORS}  # and under which names their errors are reported
-COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end", *RIGHT)
-# Of reactions, the magnitude is reported, under these names.
-END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
-
-# What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
-MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
-
 # Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
 MOST = 500_000
-
-Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind and text
-
-
-@dataclass(frozen=True)
-class RunSample:
-    """What is compared of a run: how finely it was computed, and its outputs (nt, ...) by name."""
-
-    resolution: Resolution
-    values: Mapping[str, np.ndarray | StoredArray]
-    cells: int  # of zones that move: base cells
-    steps: int
-    cpu: float  # s
-    every: int = 1  # outputs of the result to one of these; the last is there always
-    unresolved: bool = False  # whether a bend was sharper than its cells can show
-    model_error: Mapping[str, np.ndarray | StoredArray] = field(default_factory=dict)
-    bound: float = 0.0  # m, that the criteria of zones that move let pass; 0 where there are none
-    notes: Notes = ()  # that the result should carry
-
-    def rows(self, name: str, numbers: np.ndarray) -> np.ndarray:
-        """The values of an output with these numbers, which increase."""
-        begin = numbers[0]
-        return np.asarray(self.values[name][begin : numbers[-1] + 1])[numbers - begin]
-
-    @property
-    def largest_end_force(self) -> float:
-        """The largest force at the ends, N."""
-        forces = [np.asarray(self.values[x]) for x in END_FORCES if x in self.values]
-        return max((float(np.linalg.norm(x, axis=1).max()) for x in forces), default=0.0)
-
-    def checkpoint(self) -> Tree:
-        """All of it, as named arrays and plain values."""
-        out = {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
-        return out | {x: {name: np.asarray(y) for name, y in out[x].items()} for x in ("values", "model_error")}
 
 
 class Block(NamedTuple):
@@ -120,11 +83,6 @@ class Errors:
         return self._largest.get((cause, name), 0.0)
 
 
-def compared_cells(model: Model) -> int:
-    """Cells by which meshes of one scene are compared: of zones that move, their base cells."""
-    return model.cells if model.layout is None else int(model.layout.rod.size)
-
-
 class Estimate:
     """Errors of the last of several runs, by what finer cells and steps have changed.
 
@@ -158,15 +116,15 @@ class Estimate:
         result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
         count, by_step = len(result.values[name]), None
         if rough is not None and name in rough.values:
-            known, own = _around(_every(count, rough.every), a, b)
-            later = coarse.rows(name, _every(len(coarse.values[name]), rough.every // coarse.every)[own])
+            known, own = _around(every_of(count, rough.every), a, b)
+            later = coarse.some(name, every_of(len(coarse.values[name]), rough.every // coarse.every)[own])
             late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
             late = late / (result.steps / coarse.steps) ** p
             by_step = _at_all_outputs(late, known, a, b)
         if not self.has_mesh:
             return by_step, None
-        known, own = _around(_every(count, coarse.every), a, b)
-        change = result.rows(name, known) - coarse.values[name][own]
+        known, own = _around(every_of(count, coarse.every), a, b)
+        change = result.some(name, known) - coarse.values[name][own]
         return by_step, self._mesh_error(name, _at_all_outputs(change, known, a, b), by_step, coarse)
 
     def _mesh_error(self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample) -> np.ndarray:
@@ -190,7 +148,7 @@ class Estimate:
         doubtful = _implausible(coarse)
         self.notes: Notes = (*coarse.notes, *(((NOT_ESTIMATED, doubtful),) if doubtful else ()))
         found = coarse.model_error if not doubtful else {}
-        self._model: Mapping[str, np.ndarray | StoredArray] = {name: x for name, x in found.items() if len(x)}
+        self._model: Mapping[str, Outputs] = {name: x for name, x in found.items() if len(x)}
         self._model_every = coarse.every
 
     def update(self, result: RunSample) -> None:
@@ -213,7 +171,7 @@ class Estimate:
             return np.asarray(self.run.model_error[quantity][a:b])
         if quantity not in self._model:
             return None
-        known, own = _around(_every(self._count, self._model_every), a, b)
+        known, own = _around(every_of(self._count, self._model_every), a, b)
         return _at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
 
     @property
@@ -262,7 +220,7 @@ class Estimate:
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
         by_step, by_mesh = self._keep()
-        model = {name: _at_all_outputs(np.asarray(x), _every(self._count, self._model_every), 0, self._count)
+        model = {name: _at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
                  for name, x in self._model.items()}  # fmt: skip
         found = {"order": self.order, "late": by_step, "cells": by_mesh, "model": model}
         return found | {"notes": self.notes, "run": self.run.checkpoint()}
@@ -273,7 +231,7 @@ class Estimate:
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
-        late, cells, model = (_restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
+        late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
         self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
@@ -300,11 +258,11 @@ def _order(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample 
     if coarsest is None or name not in coarsest.values:
         return ORDER
     values, every = coarsest.values[name], coarsest.every
-    final, middle = (_every(len(x.values[name]), every // x.every) for x in (result, coarse))
+    final, middle = (every_of(len(x.values[name]), every // x.every) for x in (result, coarse))
     rows, later, earlier = max(1, MOST // int(np.prod(values.shape[1:]))), 0.0, 0.0
     for a in range(0, len(values), rows):  # of all times: peaks jump about
-        between = coarse.rows(name, middle[a : a + rows])
-        later += _squares(result.rows(name, final[a : a + rows]) - between)
+        between = coarse.some(name, middle[a : a + rows])
+        later += _squares(result.some(name, final[a : a + rows]) - between)
         earlier += _squares(between - values[a : a + rows])
     if not (later > 0.0 and earlier > 0.0):
         return ORDER
@@ -326,11 +284,6 @@ def _implausible(coarse: RunSample) -> str:
         f"the error of leaving bending out comes to {float(np.max(error)):.3g} m, beyond what its criteria let pass "
         f"({coarse.bound:.3g} m): it is not believed, and not part of the error; compare with model: rod"
     )
-
-
-def _every(count: int, step: int) -> np.ndarray:
-    """Numbers of every `step`-th of `count` outputs, and of the last."""
-    return np.unique(np.append(np.arange(0, count, step), count - 1))
 
 
 def _around(known: np.ndarray, a: int, b: int) -> tuple[np.ndarray, slice]:
@@ -357,44 +310,3 @@ def _at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.
 def _magnitude(error: np.ndarray, name: str) -> np.ndarray:
     """Of vectors their length, of numbers their size."""
     return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))
-
-
-# --- from a checkpoint --------------------------------------------------------------------------
-
-
-def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int]) -> RunSample:
-    """A sample from a checkpoint; shape: number of outputs of the result, of its output points, and of its jumps.
-
-    ResultError or ValueError: it is none of this scene.
-    """
-    blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
-    saved = matched(tree, blank | dict.fromkeys(("resolution", "values", "model_error", "notes")), "run")
-    if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
-        raise ValueError("a run without cells, steps or outputs")
-    shape = (_every(shape[0], saved["every"]).size, *shape[1:])
-    return RunSample(
-        **saved | {
-            "resolution": resolution_from(saved["resolution"], scene), "notes": restored_notes(saved["notes"]),
-            "values": _restored_outputs(saved["values"], shape),
-            "model_error": _restored_outputs(saved["model_error"], shape),
-        }
-    )  # fmt: skip
-
-
-def restored_notes(tree: Any) -> Notes:
-    """Events from a checkpoint."""
-    return tuple((kind, text) for kind, text in matched(tree, [["", ""]] * len(tree), "notes"))
-
-
-def _restored_outputs(tree: Any, shape: tuple[int, int, int]) -> dict[str, np.ndarray]:
-    """Outputs by name from a checkpoint; shape: as of `restored_sample`.  ResultError: they are of another shape."""
-    (count, ns, jumps), points, template = shape, {"position": (3,)}, {}
-    right = {*RIGHT, *RIGHT.values()}
-    for name, value in tree.items():
-        along = (count, jumps if name in right else ns)
-        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else along
-        scalar = name == "position" and np.ndim(value) == 2  # of an error, its size
-        template[name] = np.zeros((*full, *(() if scalar else points.get(name, ()))))
-    if not set(tree) <= {*COMPARED, *END_FORCES.values(), *right}:
-        raise ValueError(f"outputs that are not compared: {', '.join(tree)}")
-    return dict(matched(tree, template, "outputs"))

@@ -10,8 +10,9 @@ import numpy as np
 
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_estimate import Errors, RunSample, summary
+from hybrid.simulation.error_estimate import Errors, summary
 from hybrid.simulation.result_checks import undersampled_end_forces
+from hybrid.simulation.run_sample import RunSample
 from hybrid.store.amend import amend
 from hybrid.store.format import Field
 from hybrid.store.reader import open_result

@@ -10,7 +10,8 @@ import numpy as np
 
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.accuracy import ROUGHEST
-from hybrid.simulation.error_estimate import END_FORCES, Errors, RunSample
+from hybrid.simulation.error_estimate import Errors
+from hybrid.simulation.run_sample import END_FORCES, RunSample
 
 # Part of what is asked that the next run aims at.
 AIM = 0.7

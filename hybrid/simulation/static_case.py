@@ -25,10 +25,10 @@ from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
-from hybrid.simulation.error_estimate import COMPARED, MODEL_ERRORS, RunSample, compared_cells
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
 from hybrid.simulation.result_file import result_recorder
+from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, compared_cells
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS

@@ -36,6 +36,9 @@ class MemoryRecorder:
             if not finite.all():
                 raise ResultError(f"{name} is not finite at t = {times[np.argmin(finite)]:.9g} s")
         self.times += times.tolist()
+        self._keep(values)
+
+    def _keep(self, values: Mapping[str, np.ndarray]) -> None:
         for name, value in values.items():
             self._kept.setdefault(name, []).append(np.asarray(value, float))
 

@@ -14,8 +14,9 @@ from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolut
 from hybrid.scene.accuracy import amount
 from hybrid.simulation import error_estimate
 from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate, RunSample
+from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
+from hybrid.simulation.run_sample import RunSample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 

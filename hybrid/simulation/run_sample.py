@@ -1,0 +1,141 @@
+"""What is compared of a run: how finely it was computed, its outputs, and where these are."""
+
+from __future__ import annotations
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, field, fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.model.build import Model
+from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.outputs.probes import SIDED_ERRORS
+from hybrid.scene.schema import Scene
+from hybrid.simulation.restore import resolution_from, resolution_tree
+from hybrid.store.named_arrays import Tree, matched, pack
+from hybrid.store.stored_array import StoredArray
+from hybrid.store.stored_rows import StoredRows, rows_from, rows_path
+
+# Outputs by which runs are compared; those that a run does not have are skipped.
+RIGHT = {f"right/{name}": f"right_{name}" for name in SIDED_ERRORS}  # and under which names their errors are reported
+COMPARED = ("position", "tension", "curvature", "bending_moment", "reaction_start", "reaction_end", *RIGHT)
+# Of reactions, the magnitude is reported, under these names.
+END_FORCES = {"reaction_start": "end_force_start", "reaction_end": "end_force_end"}
+
+# What datasets of errors of neglected bending begin with, and the kind of events that say they are not known.
+MODEL_ERRORS, NOT_ESTIMATED = "errors/model/", "model error not estimated"
+
+# In memory, in the file of a complete result, or in a file beside that.
+Outputs = np.ndarray | StoredArray | StoredRows
+Notes = tuple[tuple[str, str], ...]  # events of the whole line, at t = 0: kind and text
+
+
+@dataclass(frozen=True)
+class RunSample:
+    """What is compared of a run: how finely it was computed, and its outputs (nt, ...) by name."""
+
+    resolution: Resolution
+    values: Mapping[str, Outputs]
+    cells: int  # of zones that move: base cells
+    steps: int
+    cpu: float  # s
+    every: int = 1  # outputs of the result to one of these; the last is there always
+    unresolved: bool = False  # whether a bend was sharper than its cells can show
+    model_error: Mapping[str, Outputs] = field(default_factory=dict)
+    bound: float = 0.0  # m, that the criteria of zones that move let pass; 0 where there are none
+    notes: Notes = ()  # that the result should carry
+    rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
+
+    def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
+        """The values of an output with these numbers, which increase."""
+        begin = numbers[0]
+        return np.asarray(self.values[name][begin : numbers[-1] + 1])[numbers - begin]
+
+    @property
+    def largest_end_force(self) -> float:
+        """The largest force at the ends, N."""
+        forces = [np.asarray(self.values[x]) for x in END_FORCES if x in self.values]
+        return max((float(np.linalg.norm(x, axis=1).max()) for x in forces), default=0.0)
+
+    def checkpoint(self) -> Tree:
+        """All of it, as named arrays and plain values."""
+        out = {x.name: getattr(self, x.name) for x in fields(self)} | {"resolution": resolution_tree(self.resolution)}
+        kept = {} if self.rows else {"values": self.values, "model_error": self.model_error}
+        blank: Tree = {"values": {}, "model_error": {}}
+        return out | blank | {x: {name: np.asarray(y) for name, y in found.items()} for x, found in kept.items()}
+
+
+def compared_cells(model: Model) -> int:
+    """Cells by which meshes of one scene are compared: of zones that move, their base cells."""
+    return model.cells if model.layout is None else int(model.layout.rod.size)
+
+
+def every_of(count: int, step: int) -> np.ndarray:
+    """Numbers of every `step`-th of `count` outputs, and of the last."""
+    return np.unique(np.append(np.arange(0, count, step), count - 1))
+
+
+# --- from a checkpoint --------------------------------------------------------------------------
+
+
+def rows_key(resolution: Resolution) -> str:
+    """What tells files of outputs apart (store.stored_rows)."""
+    return hashlib.blake2b(pack(resolution_tree(resolution)), digest_size=4).hexdigest()
+
+
+def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result: Path | None = None) -> RunSample:
+    """A sample from a checkpoint; shape: number of outputs of the result, of its output points, and of its jumps.
+
+    result: the file that the checkpoint is in.  ResultError or ValueError: it is none of this scene; MissingRows: its
+    outputs are not beside it.
+    """
+    blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
+    free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
+    saved = matched({"rows": {}} | tree, blank | free, "run")  # a checkpoint of 0.6 has no rows
+    resolution = resolution_from(saved["resolution"], scene)
+    if saved["rows"] and result is not None:
+        found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))
+        saved["values"], saved["model_error"] = split_outputs(found)
+    if min(saved["cells"], saved["steps"], saved["every"]) < 1 or saved["bound"] < 0.0:
+        raise ValueError("a run without cells, steps or outputs")
+    shape = (every_of(shape[0], saved["every"]).size, *shape[1:])
+    return RunSample(
+        **saved | {
+            "resolution": resolution, "notes": restored_notes(saved["notes"]),
+            "values": restored_outputs(saved["values"], shape),
+            "model_error": restored_outputs(saved["model_error"], shape),
+        }
+    )  # fmt: skip
+
+
+def split_outputs(found: Mapping[str, Any]) -> tuple[dict[str, Any], dict[str, Any]]:
+    """Of all that a run to compare with has written: outputs, and errors of neglected bending."""
+    values = {name: found[name] for name in COMPARED if name in found}
+    return values, {x.removeprefix(MODEL_ERRORS): y for x, y in found.items() if x.startswith(MODEL_ERRORS)}
+
+
+def restored_notes(tree: Any) -> Notes:
+    """Events from a checkpoint."""
+    return tuple((kind, text) for kind, text in matched(tree, [["", ""]] * len(tree), "notes"))
+
+
+def restored_outputs(tree: Any, shape: tuple[int, int, int]) -> dict[str, np.ndarray]:
+    """Outputs by name from a checkpoint; shape: as of `restored_sample`.  ResultError: they are of another shape."""
+    (count, ns, jumps), points, template = shape, {"position": (3,)}, {}
+    right = {*RIGHT, *RIGHT.values()}
+    for name, value in tree.items():
+        along = (count, jumps if name in right else ns)
+        full = (count, 3) if name in END_FORCES else (count,) if name in END_FORCES.values() else along
+        scalar = name == "position" and len(getattr(value, "shape", ())) == 2  # of an error, its size
+        expected = *full, *(() if scalar else points.get(name, ()))
+        if isinstance(value, StoredRows):
+            if value.shape != expected:
+                raise ValueError(f"{name}: shape {value.shape}, expected {expected}")
+        else:
+            template[name] = np.zeros(expected)
+    if not set(tree) <= {*COMPARED, *END_FORCES.values(), *right}:
+        raise ValueError(f"outputs that are not compared: {', '.join(tree)}")
+    return dict(tree) | matched({name: tree[name] for name in template}, template, "outputs")
