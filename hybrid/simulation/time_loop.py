@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, PAUSED, ROWS, STEPPED, STRETCHED
+from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -68,6 +68,7 @@ class TimeLoop:
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
         self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
+        self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 
@@ -148,6 +149,7 @@ class TimeLoop:
         """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""
         run = self.run
         for code in run.advance(stop):
+            self._keep_ratios(int(run.run.count[SAMPLES]))
             if code in (PAUSED, FAILED) or (code == AT_STOP and not self.patient) or not self._may_wait:
                 self.write_down()
             if code == STEPPED:
@@ -159,7 +161,7 @@ class TimeLoop:
     @property
     def _may_wait(self) -> bool:
         """Whether outputs may wait in the buffer of the run: nothing that they are made of changes."""
-        return self.run.unchanging and not self.observer.writes_criteria
+        return self.run.unchanging and not (self.patient and self.observer.writes_criteria)
 
     def _settle(self) -> None:
         """After a start: powers of the new state, and its output where one is due."""
@@ -212,9 +214,10 @@ class TimeLoop:
         model, switching = run.model, run.switching
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
-        observer, ratios = self.observer, None
-        if switching is not None and observer.writes_criteria:
-            ratios = np.repeat(switching.manager.largest_ratios(observer.grid.s)[None], batch.t.size, axis=0)
+        observer, ratios, count = self.observer, None, batch.t.size
+        if observer.writes_criteria:
+            self._keep_ratios(count)
+            ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
         shift = run.correction.shift(batch) if run.correction is not None else None
         values = observer.values_of(batch, ratios, shift)
         self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
@@ -227,6 +230,12 @@ class TimeLoop:
             diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)
         run.events.write_to(self.recorder)
         self._stop_if(stop)
+
+    def _keep_ratios(self, count: int) -> None:
+        """Of the outputs that wait, `count` by now: the largest ratios of criteria since the output before."""
+        switching, new = self.run.switching, count - len(self._ratios)
+        if new > 0 and switching is not None and self.observer.writes_criteria:
+            self._ratios += [switching.manager.largest_ratios(self.observer.grid.s)] * new
 
     def _record_now(self) -> None:
         """Record the state as it is, whatever outputs are due."""

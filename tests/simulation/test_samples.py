@@ -11,6 +11,8 @@ import pytest
 
 import hybrid
 import hybrid.solve.run
+from hybrid.simulation.time_loop import TimeLoop
+from hybrid.store.writer import Recorder
 
 ROD = {
     "length": 10.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0,
@@ -116,3 +118,27 @@ def test_no_outputs_wait_for_the_search_for_garbage() -> None:
         gc.garbage.clear()
         gc.enable()
     assert not found
+
+
+def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Those of a batch have each their own ratios: the same bits as one output at a time."""
+    settings = ["time.duration=30", "output.criteria=true"]
+    scene = hybrid.load_scene(Path(__file__).parents[2] / "examples" / "touchdown.yaml", settings)
+    batches: list[int] = []
+    save = Recorder.save_batch
+
+    def counted(self: Recorder, times: np.ndarray, *more: Any) -> None:
+        batches.append(times.size)
+        save(self, times, *more)
+
+    monkeypatch.setattr(Recorder, "save_batch", counted)
+    many = hybrid.run(scene)
+    assert max(batches) > 20  # while lengths or bending are on their way, outputs do not wait
+    monkeypatch.setattr(TimeLoop, "_may_wait", False)
+    batches.clear()
+    one = hybrid.run(scene)
+    assert set(batches) == {1}
+    names = [x for x in many.names if x.startswith("criteria/")]
+    assert len(names) > 3 and len({x.kind for x in many.events} & {"grow", "split"}) > 0
+    for name in [*names, "position", "tension"]:
+        assert np.array_equal(many[name], one[name]), name
