@@ -19,7 +19,6 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.binding import reader
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
@@ -27,6 +26,7 @@ from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.neglected_moments import Bending, chord_of, neglected_moments, tabulate_chords, turn_chords
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
+from hybrid.kernels.references import reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
@@ -277,7 +277,9 @@ def advance_error(table):
 
     Returns whether it is finite, how many nodes were clipped, and the node that was furthest.
     """
-    line, sea, ends, bending, state, step, X, W, old, new, most, arrays = read(table)
+    job = read(table)
+    line, sea, ends, bending, state, step = job.line, job.sea, job.ends, job.bending, job.state, job.step
+    old, new, most, arrays = job.old, job.new, job.most, job.arrays
     n, work = state.e.shape[0], arrays.work
     dt, dt_before, rho, torque = step.numbers[0], step.numbers[1], step.numbers[2], step.numbers[3]
     chords, x, dM, M = arrays.chords, arrays.x, arrays.dM, arrays.M
@@ -292,7 +294,7 @@ def advance_error(table):
     if moving:
         predict_error(old, s, history)
     right_hand_side(line, sea, ends, chords, state, step.u, M, moving, history, arrays.b)
-    if not solve_again(X, W, arrays.b, x):
+    if not solve_again(job.X, job.W, arrays.b, x):
         return False, 0, -1
     clipped, where, far = 0, -1, 0.0
     for i in range(n + 1):

@@ -9,57 +9,8 @@ from __future__ import annotations
 
 from typing import Any
 
-import numba
 import numpy as np
-from numba import types
-from numba.core import cgutils
-from numba.extending import intrinsic
 from numpy.typing import NDArray
-
-
-def reader(example: Any) -> Any:
-    """A function for kernels, read(table) -> a NamedTuple of the same type as `example`."""
-    kind = numba.typeof(example)
-
-    @intrinsic
-    def read(typingctx: Any, table: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            table = context.make_array(signature.args[0])(context, builder, args[0])
-            return _built(context, builder, kind, table.data, 0)[0]
-
-        return kind(table), generate
-
-    return read
-
-
-def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
-    """The value of a type from the table's numbers at `at` on, and where the next begins."""
-
-    def number(k: int) -> Any:
-        return builder.load(cgutils.gep_inbounds(builder, table, k))
-
-    if isinstance(kind, types.NamedTuple):
-        values = []
-        for each in kind.types:
-            value, at = _built(context, builder, each, table, at)
-            values.append(value)
-        return context.make_tuple(builder, kind, values), at
-    if isinstance(kind, types.Array):
-        array = context.make_array(kind)(context, builder)
-        item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
-        shape = [number(at + 1 + k) for k in range(kind.ndim)]
-        strides = [context.get_constant(types.intp, item)]
-        for size in shape[:0:-1]:
-            strides.insert(0, builder.mul(strides[0], size))
-        data = builder.inttoptr(number(at), array.data.type)
-        context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
-        return array._getvalue(), at + 1 + kind.ndim
-    value = number(at)
-    if isinstance(kind, types.Float):
-        value = builder.bitcast(value, context.get_data_type(types.float64))
-    elif isinstance(kind, types.Boolean):
-        value = builder.icmp_signed("!=", value, value.type(0))
-    return value, at + 1
 
 
 class Table:

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from functools import cached_property
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numba
 from numba import config
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
+from hybrid.kernels import references  # noqa: F401  (arguments of kernels)
 from hybrid.kernels.cache import cache_folder, prune
 
 # numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
@@ -40,12 +44,92 @@ class _Kernel(CPUDispatcher):
             gc.enable()
 
 
+class _Entry(_Kernel):
+    """Called by another kernel it is compiled as a part of that one; as an entry only when Python calls it."""
+
+    @cached_property
+    def part(self) -> Any:
+        return _for_kernels(self.py_func)
+
+    def get_call_template(self, args: Any, kws: Any) -> Any:
+        return self.part.get_call_template(args, kws)
+
+    def get_overload(self, sig: Any) -> Any:
+        return self.part.get_overload(sig)
+
+
 class _Inner(_Kernel):
     def __call__(self, *args: Any, **named: Any) -> Any:
         """There is no entry for Python: numba would jump to address 0."""
         raise TypeError(
             f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python"
         )
+
+
+class _NoEnvironment:
+    def set_env(self, name: str, environment: Any) -> None:
+        """The environment is for objects of Python, of which kernels use none."""
+
+
+class _InlinedCode(JITCodeLibrary):
+    """LLVM code of one function that kernels call, without what it calls itself.
+
+    numba would optimise it together with all of that, and make machine code of it, at every level of calls anew; only
+    the machine code of entries is ever executed.
+    """
+
+    codegen = _NoEnvironment()
+
+    def finalize(self) -> None:
+        self._finalized = True
+
+    def get_pointer_to_function(self, name: str) -> int:
+        return 0
+
+    def _get_module_for_linking(self) -> Any:
+        """With all that it calls: for a function of numba that is none of ours."""
+        whole = super()._get_module_for_linking().clone()
+        _link(self, whole)
+        return whole
+
+
+class _EntryCode(JITCodeLibrary):
+    """Code of an entry with all that it calls: optimised together, once."""
+
+    def finalize(self) -> None:
+        _link(self, self._final_module)
+        self._linking_libraries = []
+        super().finalize()
+
+
+def _link(code: Any, module: Any) -> None:
+    """Link into a module all that the code calls, each once."""
+    found: dict[Any, None] = {}  # in order
+
+    def collect(calling: Any) -> None:
+        for called in calling._linking_libraries:
+            if called not in found:
+                found[called] = None
+                if isinstance(called, _InlinedCode):
+                    collect(called)
+
+    collect(code)
+    for called in found:
+        code._reload_init.update(called._reload_init)
+        module.link_in(JITCodeLibrary._get_module_for_linking(called), preserve=True)
+
+
+class _EntryCompiler(Compiler):
+    made: type = _EntryCode
+
+    def __init__(self, typing: Any, target: Any, library: Any, *rest: Any) -> None:
+        library = self.made(target.codegen(), "hybrid")
+        library.enable_object_caching()
+        super().__init__(typing, target, library, *rest)
+
+
+class _InnerCompiler(_EntryCompiler):
+    made = _InlinedCode
 
 
 def named(function: Any, name: str) -> FunctionType:
@@ -65,10 +149,10 @@ def kernel(function: Callable[..., Any]) -> Any:
     before = config.CACHE_DIR  # type: ignore[attr-defined]
     config.CACHE_DIR = str(_folder)  # type: ignore[attr-defined]
     try:
-        made = _njit(cache=True, **_OPTIONS)(function)
+        made = _njit(cache=True, pipeline_class=_EntryCompiler, **_OPTIONS)(function)
     finally:
         config.CACHE_DIR = before  # type: ignore[attr-defined]  # the user's own numba functions keep their own cache
-    made.__class__ = _Kernel
+    made.__class__ = _Entry
     return made
 
 
@@ -77,6 +161,10 @@ def inner(function: Callable[..., Any]) -> Any:
 
     Without an entry for Python it takes two thirds of the time.
     """
-    made = _njit(forceinline=True, no_cpython_wrapper=True, **_OPTIONS)(function)
+    return _for_kernels(function, forceinline=True)
+
+
+def _for_kernels(function: Callable[..., Any], **options: Any) -> Any:
+    made = _njit(no_cpython_wrapper=True, pipeline_class=_InnerCompiler, **_OPTIONS, **options)(function)
     made.__class__ = _Inner
     return made

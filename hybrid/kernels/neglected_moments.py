@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.node_forces import Z3, get3
+from hybrid.kernels.references import by_reference
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.state import Floats
 
@@ -38,6 +39,9 @@ class Bending(NamedTuple):
     soft: Floats  # (N+1,) 1/(N m), 1/ki, 0 where there is no bending stiffness
     tangent: NDArray[np.int8]  # (2,) 1 where an end prescribes one
     floor: Floats  # (N,) N, least tension that counts
+
+
+by_reference(Bending(np.zeros(2), np.zeros(2, np.int8), np.zeros(1)))
 
 
 @inner

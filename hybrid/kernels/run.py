@@ -14,7 +14,6 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.accept import accept, end_step, judge, keep_imposed, note_try, watch, watch_push
-from hybrid.kernels.binding import reader
 from hybrid.kernels.books import (
     AFTER_START,
     ASK_BEFORE,
@@ -66,6 +65,7 @@ from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.extremes import first_strains, note_extremes
 from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
 from hybrid.kernels.powers import find_powers
+from hybrid.kernels.references import reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
 from hybrid.kernels.state import (
@@ -81,6 +81,7 @@ from hybrid.kernels.state import (
     no_ends,
     no_moves,
     no_sea,
+    no_work,
 )
 from hybrid.kernels.step_control import begin_step, end_of_try
 
@@ -118,11 +119,9 @@ def blank_job() -> Job:
     """A job of one cell with the types that every job has."""
     state = blank_state(1)
     limits, none = Limits(1.0, 1.0, 1), np.zeros((0, 4))
-    z = np.zeros
-    work = Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)))
     task = Task(0, limits=limits)
     return Job(
-        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, work, blank_books()
+        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books()
     )  # fmt: skip
 
 
@@ -195,7 +194,8 @@ def run(plane, space, job):
     RUN: steps until a code of kernels.books is returned, with the iterations, the correction and the place of the last
     try.  The states and pushes of the job take turns: which is now, books.counts[PARITY] tells.
     """
-    task, line, sea, ends, moves, old, new, was, now, work, books = job
+    task, line, sea, ends, moves, work, books = job.task, job.line, job.sea, job.ends, job.moves, job.work, job.books
+    old, new, was, now = job.old, job.new, job.was, job.now
     clock, count = books.clock, books.counts
     step, running = task, task.what == RUN
     while True:

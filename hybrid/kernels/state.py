@@ -10,6 +10,8 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.report import REPORT_SIZE
+
 Floats = NDArray[np.float64]
 # Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
 NO_PLANE: Floats = np.full((3, 3), np.nan)
@@ -254,3 +256,9 @@ def no_moves() -> Moves:
         z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
         z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 6)),
     )  # fmt: skip
+
+
+def no_work() -> Work:
+    """A workspace in which nothing can be solved."""
+    z = np.zeros
+    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)))

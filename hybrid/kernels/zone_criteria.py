@@ -21,12 +21,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.binding import reader
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.forces import SEABED
+from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
 from hybrid.kernels.state import Floats, Line, Sea, State, blank_line, blank_state, no_sea
 
@@ -167,11 +167,14 @@ def evaluate_criteria(table):
 
     table: of a CriteriaJob (kernels.binding).  Returns the largest ratio among base cells that are catenary and free.
     """
-    line, sea, tangents, state, past, a, tolerance, torque, kinds, ratios = read(table)
-    EI, w, bent, node, floor, base_of_cell, free, turn, twisting = kinds
+    job = read(table)
+    line, sea, state, past, kinds, ratios = job.line, job.sea, job.state, job.past, job.kinds, job.ratios
+    a, tolerance = job.ahead, job.tolerance
+    EI, w, bent, node, floor = kinds.EI, kinds.w, kinds.bent, kinds.node, kinds.floor
+    base_of_cell, free, turn, twisting = kinds.base_of_cell, kinds.free, kinds.turn, kinds.twisting
     r, e, T, a1 = state.r, state.e, state.T, state.a1
     n = e.shape[0]
-    find_turns(line, tangents, e, a1, torque, turn, twisting)
+    find_turns(line, job.tangents, e, a1, job.torque, turn, twisting)
     whole = 0.0
     for i in range(n + 1):
         whole += turn[i]

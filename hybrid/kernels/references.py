@@ -1,0 +1,166 @@
+"""NamedTuples of arrays in kernels: by reference, as the address of a table of the addresses of their arrays.
+
+numba hands such a tuple from function to function as hundreds of numbers, which is most of what it would compile.  A
+reference is one number; `line.h` reads address and shape of that array where they are needed.  The layout of a table is
+that of kernels.binding.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from llvmlite import ir
+from numba import typeof, types
+from numba.core import cgutils
+from numba.core.imputils import lower_getattr_generic
+from numba.core.typing.templates import AttributeTemplate
+from numba.extending import NativeValue, infer_getattr, intrinsic, models, register_model, typeof_impl, unbox
+
+from hybrid.kernels.state import blank_line, blank_state, no_ends, no_moves, no_sea, no_work
+
+_WORD = ir.IntType(64)
+_fields: dict[type, dict[str, tuple[int, Any]]] = {}  # of a class: where each field begins in its table, and its type
+
+
+class Reference(types.Type):
+    """Type of a NamedTuple of a class that is kept by reference."""
+
+    def __init__(self, of: type) -> None:
+        self.of = of
+        super().__init__(name=f"Reference({of.__module__}.{of.__qualname__})")
+
+
+def by_reference(example: Any) -> Reference:
+    """Keep NamedTuples of a class by reference; all of them have the types of the example."""
+    fields, at = {}, 0
+    for name, value in example._asdict().items():
+        kind = by_reference(value) if _has_arrays(value) else typeof(value)
+        fields[name] = at, kind
+        at += size(kind)
+    found = Reference(type(example))
+    _fields[found.of] = fields
+    typeof_impl.register(found.of)(lambda value, _: _checked(found, value))
+    return found
+
+
+def _has_arrays(value: Any) -> bool:
+    return isinstance(value, tuple) and any(isinstance(x, np.ndarray) or _has_arrays(x) for x in value)
+
+
+def size(kind: Any) -> int:
+    """Numbers of a table that a value of a type takes."""
+    if isinstance(kind, Reference):
+        return sum(size(x) for _, x in _fields[kind.of].values())
+    if isinstance(kind, types.NamedTuple):
+        return sum(size(x) for x in kind.types)
+    return 1 + kind.ndim if isinstance(kind, types.Array) else 1
+
+
+def _checked(kind: Reference, value: Any) -> Reference:
+    for (name, (_, expected)), each in zip(_fields[kind.of].items(), value, strict=True):
+        if isinstance(each, np.ndarray) and typeof(each) != expected:
+            raise TypeError(f"{kind.of.__name__}.{name}: {typeof(each)}, expected {expected}")
+    return kind
+
+
+def reader(example: Any) -> Any:
+    """A function for kernels, read(table) -> a reference to a NamedTuple with the types of `example`."""
+    kind = by_reference(example)
+
+    @intrinsic
+    def read(typingctx: Any, table: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            return context.make_array(signature.args[0])(context, builder, args[0]).data
+
+        return kind(table), generate
+
+    return read
+
+
+for each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no_work()):
+    by_reference(each)
+
+
+@register_model(Reference)
+class _Model(models.PrimitiveModel):
+    def __init__(self, manager: Any, kind: Any) -> None:
+        super().__init__(manager, kind, _WORD.as_pointer())
+
+
+@infer_getattr
+class _Attributes(AttributeTemplate):
+    key = Reference
+
+    def generic_resolve(self, kind: Any, name: str) -> Any:  # type: ignore[override]
+        return _fields[kind.of].get(name, (0, None))[1]
+
+
+@lower_getattr_generic(Reference)
+def _attribute(context: Any, builder: Any, kind: Any, table: Any, name: str) -> Any:
+    at, field = _fields[kind.of][name]
+    return _built(context, builder, field, table, at)[0]
+
+
+def _built(context: Any, builder: Any, kind: Any, table: Any, at: int) -> tuple[Any, int]:
+    """The value of a type from the table's numbers at `at` on, and where the next begins."""
+
+    def number(k: int) -> Any:
+        found = builder.load(cgutils.gep_inbounds(builder, table, k))
+        found.set_metadata("invariant.load", builder.module.add_metadata([]))  # no kernel writes to a table
+        return found
+
+    if isinstance(kind, Reference):
+        return cgutils.gep_inbounds(builder, table, at), at + size(kind)
+    if isinstance(kind, types.NamedTuple):
+        values = []
+        for each in kind.types:
+            value, at = _built(context, builder, each, table, at)
+            values.append(value)
+        return context.make_tuple(builder, kind, values), at
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder)
+        item = context.get_abi_sizeof(context.get_data_type(kind.dtype))
+        shape = [number(at + 1 + k) for k in range(kind.ndim)]
+        strides = [context.get_constant(types.intp, item)]
+        for length in shape[:0:-1]:
+            strides.insert(0, builder.mul(strides[0], length))
+        data = builder.inttoptr(number(at), array.data.type)
+        context.populate_array(array, data=data, shape=shape, strides=strides, itemsize=item, meminfo=None)
+        return array._getvalue(), at + 1 + kind.ndim
+    value = number(at)
+    if isinstance(kind, types.Float):
+        value = builder.bitcast(value, context.get_data_type(types.float64))
+    elif isinstance(kind, types.Boolean):
+        value = builder.icmp_signed("!=", value, value.type(0))
+    return value, at + 1
+
+
+@unbox(Reference)
+def _unboxed(kind: Any, value: Any, c: Any) -> NativeValue:
+    """From Python: the table is made on the stack, for the call."""
+    builder = c.builder
+    table = cgutils.alloca_once(builder, _WORD, size=size(kind))
+    failed = cgutils.alloca_once_value(builder, cgutils.false_bit)
+    for k, (at, field) in enumerate(_fields[kind.of].values()):
+        native = c.unbox(field, c.pyapi.tuple_getitem(value, k))
+        with cgutils.if_unlikely(builder, native.is_error):
+            builder.store(cgutils.true_bit, failed)
+        for j, number in enumerate(_numbers(c.context, builder, field, native.value)):
+            builder.store(number, cgutils.gep_inbounds(builder, table, at + j))
+    # The optimiser must not know that the table was written to: it is read as if that had never been.
+    same = ir.FunctionType(table.type, [table.type])
+    hidden = builder.asm(same, "", "=r,0,~{memory}", [table], side_effect=True)
+    return NativeValue(hidden, is_error=builder.load(failed))
+
+
+def _numbers(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
+    """What a table holds of an array or a number."""
+    if isinstance(kind, types.Array):
+        array = context.make_array(kind)(context, builder, value)
+        return [builder.ptrtoint(array.data, _WORD), *cgutils.unpack_tuple(builder, array.shape)]
+    if isinstance(kind, types.Float):
+        return [builder.bitcast(value, _WORD)]
+    if isinstance(kind, types.Boolean):
+        return [builder.zext(value, _WORD)]
+    return [value]
