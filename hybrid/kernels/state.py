@@ -13,6 +13,8 @@ from numpy.typing import NDArray
 from hybrid.kernels.report import REPORT_SIZE
 
 Floats = NDArray[np.float64]
+# Nodes for which waves are computed at a time: two vectors of eight float64, or four of four.
+LANES = 16
 # Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
 NO_PLANE: Floats = np.full((3, 3), np.nan)
 
@@ -96,7 +98,7 @@ class Moves(NamedTuple):
 class Sea(NamedTuple):
     """What surrounds the line at one moment.  Parameters of what is off are NaN or empty.
 
-    The last five are work arrays: `flow` is filled by `kernels.water.wave_kinematics`, `axis` and `slip` at the start of a
+    The last six are work arrays: `flow` and `lanes` are filled by `kernels.water.wave_kinematics`, `axis` and `slip` at the start of a
     step, `slid` and `bed` by the march.
     """
 
@@ -115,6 +117,7 @@ class Sea(NamedTuple):
     friction: Floats  # (2,) axial and lateral coefficient
     slip_length: float  # m, elastic travel before a touching cable slides
     flow: Floats  # (N+1, 7) velocity and acceleration of the waves at the nodes, and their elevation there
+    lanes: Floats  # (10 + 2 W, LANES) what kernels.water needs for LANES nodes at a time
     axis: Floats  # (N+1, 3) direction of the cable in the plane of the seabed
     slip: Floats  # (N+1, 3) m, elastic travel at the start of the step
     slid: Floats  # (N+1, 3) m, at its end
@@ -216,8 +219,13 @@ def no_sea(n_cells: int) -> Sea:
     return Sea(
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
         np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
-        np.zeros((n_cells + 1, 7)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
+        np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
     )  # fmt: skip
+
+
+def with_waves(sea: Sea, waves: Floats, depth: float) -> Sea:
+    """The same with waves (W, 6) over water of a depth, m."""
+    return sea._replace(waves=waves, depth=depth, lanes=np.zeros((10 + 2 * len(waves), LANES)))
 
 
 def blank_line(n_cells: int) -> Line:

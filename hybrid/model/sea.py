@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from hybrid.kernels.state import Floats, Sea, no_sea
+from hybrid.kernels.state import Floats, Sea, no_sea, with_waves
 from hybrid.model.ends import rise
 from hybrid.model.scales import pressing
 from hybrid.scene.schema import (
@@ -75,7 +75,7 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             sea = sea._replace(surface=float(fluid.surface))
         if fluid.waves is not None:
             depth = scene.environment.depth or math.inf
-            sea = sea._replace(waves=components(fluid.waves, depth, scene.environment.gravity), depth=depth)
+            sea = with_waves(sea, components(fluid.waves, depth, scene.environment.gravity), depth)
             wave_ramp = fluid.waves.ramp
     if bed is not None:
         slope = bed.slope or (0.0, 0.0)
