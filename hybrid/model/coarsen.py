@@ -37,10 +37,10 @@ def coarser(model: Model) -> Model | None:
     new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
     if line.bits & PLANAR:
         new = planar(new, line.plane)
-    start = picked(model.start, at)
+    start = picked(new, model.start, at)
     if start is None:
         return None
-    others = tuple((name, x) for name, state in model.other_starts if (x := picked(state, at)) is not None)
+    others = tuple((name, x) for name, state in model.other_starts if (x := picked(new, state, at)) is not None)
     return replace(model, line=new, sea=model.sea.on(rod.size), start=start, other_starts=others, layout=None)
 
 
@@ -52,28 +52,40 @@ def refined(state: State, coarse: Line, line: Line) -> State:
     middle = 0.5 * (line.s[:-1] + line.s[1:])
     out.T[:] = np.interp(middle, 0.5 * (coarse.s[:-1] + coarse.s[1:]), state.T)
     of = np.clip(np.searchsorted(coarse.s, middle) - 1, 0, coarse.h.size - 1)
-    _directors(out, state.a1[of])
+    _carry_directors(line, state.e[of], state.a1[of], out)
     return out
 
 
-def picked(state: State, at: np.ndarray) -> State | None:
-    """The state at some of its nodes; None: two of them lie at the same place."""
+def picked(line: Line, state: State, at: np.ndarray) -> State | None:
+    """The state at some of its nodes, those of `line`; None: two of them lie at the same place."""
     out = blank_state(at.size - 1)
     out.r[:], out.v[:] = state.r[at], state.v[at]
     out.e[:] = np.add.reduceat(state.e, at[:-1], axis=0)
     if not out.e.any(axis=1).all():
         return None
     out.T[:] = np.add.reduceat(state.T, at[:-1]) / np.diff(at)
-    _directors(out, state.a1[at[:-1]])
+    _carry_directors(line, state.e[at[:-1]], state.a1[at[:-1]], out)
     return out
 
 
-def _directors(state: State, a: Floats) -> None:
-    """First directors: these, made normal to the chords."""
-    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-    a = a - np.einsum("ij,ij->i", a, d)[:, None] * d
-    for i in np.flatnonzero(np.linalg.norm(a, axis=1) < 1e-3):  # along the chord: any will do
-        a[i] = first_director(d[i])
+def _carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> None:
+    """First directors of a state: those (N, 3) of other chords (N, 3), which turn to its chords without spin.
+
+    In a plane they turn about its normal, however far; in space by the smallest rotation.
+    """
+    d, new = (e / np.linalg.norm(e, axis=1)[:, None] for e in (chords, state.e))
+    if line.bits & PLANAR:
+        n = line.plane[2]
+        x, y = a @ n, np.einsum("ij,ij->i", a, np.cross(n, d))
+        state.a1[:] = x[:, None] * n + y[:, None] * np.cross(n, new)
+        return
+    between = 1.0 + np.einsum("ij,ij->i", d, new)
+    folded = between < 1e-6  # turned right back: any will do
+    s = np.einsum("ij,ij->i", a, new) / np.where(folded, 1.0, between)
+    a = a - s[:, None] * (d + new)
+    a -= np.einsum("ij,ij->i", a, new)[:, None] * new
+    for i in np.flatnonzero(folded):
+        a[i] = first_director(new[i])
     state.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
 
 

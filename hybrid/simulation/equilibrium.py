@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.forces import FRICTION, PLANAR
-from hybrid.kernels.state import State
+from hybrid.kernels.state import Line, State
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
@@ -74,10 +74,11 @@ def solve_model(
     """
     sea, ends = model.sea.at(t), model.ends.at(t)
     rest = model.length, model.tension_scale, model.slack_floor
-    in_space = model.plane is None or model.line.bits & PLANAR or leaves_plane(model.plane, start, model.length)
-    if model.plane is not None and not in_space:
-        line, flat = planar(model.line, model.plane), start.copy()
-        untwist(line, model.ends.values, model.cable.held_tangent, flat)
+    if model.line.bits & PLANAR:
+        start, others = _untwisted(model, model.line, start), [(x, _untwisted(model, model.line, y)) for x, y in others]
+    elif model.plane is not None and not leaves_plane(model.plane, start, model.length):
+        line = planar(model.line, model.plane)
+        flat = _untwisted(model, line, start)
         try:
             found = solve_statics(line, sea, ends, flat, *rest, shape=model.start_shape, settle=settle, quick=True)
             judged = line if found.with_friction else line._replace(bits=line.bits & ~FRICTION)
@@ -89,6 +90,13 @@ def solve_model(
         model.line, sea, ends, start, *rest, take_slack=take_slack, shape=model.start_shape, settle=settle,
         others=others, quick=quick,
     )  # fmt: skip
+
+
+def _untwisted(model: Model, line: Line, start: State) -> State:
+    """A start for a planar line: in its plane nothing would turn back the twist of frames about a fold."""
+    out = start.copy()
+    untwist(line, model.ends.values, model.cable.held_tangent, out)
+    return out
 
 
 def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:

@@ -147,7 +147,7 @@ def _equilibrium(model: Model, t: float, start: State, with_friction: bool) -> E
 
 def _on_fewer(state: State, s: Floats, line: Line) -> State:
     """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
-    found = picked(state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
+    found = picked(line, state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
     if found is None:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
     return found

@@ -66,3 +66,17 @@ def test_a_line_that_newton_misses_on_a_fine_mesh():
     result = hybrid.static(hybrid.load_scene(EXAMPLES / "laying.yaml", ["model=rod", "mesh.cells=1200"]))
     assert "the equilibrium with 300 cells" in result.attributes["static_path"]
     assert result.tension[0, -1] == pytest.approx(1521.4, rel=1e-4)
+
+
+@pytest.mark.parametrize("cells", [80, 200, 800])
+def test_a_fold_in_its_plane_is_not_twisted(cells):
+    """Both ends at one place, and a bend far sharper than a cell of the start: plane and space agree in the moment."""
+    section = {"length": 10.0, "mass": 0.6, "diameter": 0.01, "bending_stiffness": 6e-5, "axial_stiffness": 6e6}
+    loop = {
+        "environment": {"gravity": 9.81}, "cable": {"sections": [section | {"max_strain": 1e9}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0, 0, 0]}},
+        "model": "rod", "mesh": {"cells": cells}, "initial": "equilibrium",
+    }  # fmt: skip
+    flat, space = (hybrid.static(loop | {"dimension": n}) for n in (2, 3))
+    assert flat.bending_moment.max() == pytest.approx(space.bending_moment.max(), rel=1e-6)
+    assert flat.curvature.max() == pytest.approx(space.curvature.max(), rel=1e-6)
