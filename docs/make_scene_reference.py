@@ -243,14 +243,15 @@ energy that the changes of a moment put in is in the first of them.
 
 ## Steps and outputs
 
-`output.every` says when something is kept, `time.step` how finely it is computed: the interval from one output to the
+`output.every` says when something is kept, `time.step` how finely it is computed.
+Steps are as long as `time.step`, cut evenly to `duration`; an output within a step is interpolated to second order from
+the states at both its ends.  With `output: {exact: true}` steps end at outputs: the interval from one output to the
 next is cut into the fewest equal steps that are no longer than `time.step`.
-With `every: 0.5` and `step: 0.2` there are three steps of 0.1667 s between outputs; with `every: 0.01` and
-`step: 0.02` the step is 0.01 s, since outputs are always ends of steps.
 The last output is at `duration`, also when `every` does not divide it.
 Without `time.step` steps follow the motion, cells are placed where the cable bends, and both as finely as `accuracy`
 asks (1 % if it is not there): `accuracy: 1%`, `3 cm`, `50 N`, or a table such as
-`accuracy: {position: 3 cm, tension: 1%, curvature: 5%}`, from 0.0001% to 10%.  What the scene fixes (`time.step`,
+`accuracy: {position: 3 cm, tension: 1%, curvature: 5%}`, from 0.0001% to 10%.  In irregular waves extremes and standard
+deviations are judged, unless `accuracy: {instant: 1%}` asks for every instant.  What the scene fixes (`time.step`,
 `mesh`, `model.tolerance`) stays; if it cannot meet what is asked, the event `accuracy missed` says so.
 [accuracy.md](accuracy.md) says where the figures of error come from and what they have been worth.
 Keep 20 outputs or more of the shortest period you want to see; the steps must be as short as the motion needs, at

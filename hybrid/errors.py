@@ -98,6 +98,8 @@ EVENTS_BY_WEIGHT = (
     "accuracy missed",
     "no error figure",
     "error uncertain",
+    "largest force uncertain",
+    "irregular motion",
     "end force between outputs",
     "slack",
     "unstable",

@@ -135,7 +135,7 @@ def errors_facts(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
-        known = not kinds & {"error uncertain", "model error not estimated", "implausible"}
+        known = not kinds & {"error uncertain", "largest force uncertain", "model error not estimated", "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 
@@ -148,22 +148,28 @@ def errors_table(errors: dict[str, Any], result: Result) -> Any:
     most = max((float((x**2).sum(axis=1).max()) ** 0.5 for x in forces), default=0.0)
     table = Table.grid(padding=(0, 2))
     kinds = [kind for kind in ("mesh", "time", "model", "total") if f"{kind}_position" in errors]
+    extremes = "extremes_total_position" in errors
+    of = "extremes_" if extremes else ""
     table.add_row("error by", *({"time": "step"}.get(kind, kind) for kind in kinds), "", style="bold")
     for what, unit, whole in (("position", "m", float(result.s[-1])), ("end_force", "N", most)):
-        total = errors[f"total_{what}"]
+        total = errors[f"{of}total_{what}"]
         share = (
             f"{100 * total / whole:.2g} % of {'the length' if what == 'position' else f'{_short(whole)} N'}"
             if whole
             else ""
         )
-        sizes = (f"{_short(errors[f'{kind}_{what}'], total)} {unit}" for kind in kinds)
-        table.add_row("position" if what == "position" else "end force", *sizes, share)
+        sizes = (f"{_short(errors[f'{of}{kind}_{what}'], total)} {unit}" for kind in kinds)
+        name = "position" if what == "position" else "end force"
+        table.add_row(f"{name}, extremes" if extremes else name, *sizes, share)
+        if extremes:
+            now = errors[f"total_{what}"]
+            table.add_row(f"{name}, at an instant", *[""] * (len(kinds) - 1), f"{_short(now)} {unit}", "")
     if "errors/model/bending_moment" in result or "errors/total/bending_moment" in result:
         names = [f"errors/{kind}/bending_moment" for kind in kinds]
         found = {name: float(result[name].max()) for name in names if name in result}
         most = max(found.values())
         sizes = (f"{_short(found[name], most)} N m" if name in found else "" for name in names)
-        table.add_row("moment", *sizes, _largest_moment(result))
+        table.add_row("moment, at an instant" if extremes else "moment", *sizes, _largest_moment(result))
     asked = result.attributes.get("accuracy_asked")
     if not asked:
         return table

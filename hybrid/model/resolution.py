@@ -11,7 +11,7 @@ from math import sqrt
 from hybrid.model.mesh_grading import Grading
 from hybrid.scene.accuracy import Accuracy, amount
 from hybrid.scene.motion_checks import shortest_period
-from hybrid.scene.schema import AdaptiveModel, Scene, ZonesModel
+from hybrid.scene.schema import AdaptiveModel, JonswapWaves, Scene, ZonesModel
 
 USUAL = "1%"  # of a scene that requests nothing and leaves its steps open
 # Part of the requested error that neglecting bending in catenary zones may use; mesh and time step share the rest.
@@ -42,6 +42,7 @@ class RequestedAccuracy:
     tension: float | None
     of_end_force: float | None
     of_curvature: float | None = None  # a part of the largest
+    instant: bool = False  # at every output, also where a motion is irregular
 
     @property
     def text(self) -> str:
@@ -53,7 +54,7 @@ class RequestedAccuracy:
             parts.append(f"{100 * self.of_end_force:.3g} % of the end forces")
         if self.of_curvature is not None:
             parts.append(f"{100 * self.of_curvature:.3g} % of the curvature")
-        return ", ".join(parts)
+        return ", ".join(parts) + ", at every instant" * self.instant
 
 
 @dataclass(frozen=True)
@@ -111,7 +112,13 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
         what, size = amount(accuracy.tension)
         tension, of_end_force = (None, size) if what == "part" else (size, None)
     of_curvature = amount(accuracy.curvature)[1] if accuracy.curvature is not None else None
-    return RequestedAccuracy(position, tension, of_end_force, of_curvature)
+    return RequestedAccuracy(position, tension, of_end_force, of_curvature, accuracy.instant is not None)
+
+
+def is_irregular(scene: Scene) -> bool:
+    """Whether a scene moves irregularly: its extremes and standard deviations matter, not what is at an instant."""
+    fluid = scene.environment.fluid
+    return scene.time is not None and fluid is not None and isinstance(fluid.waves, JonswapWaves)
 
 
 def wants_errors(scene: Scene) -> bool:

@@ -66,15 +66,20 @@ class Accuracy(Table):
     """How wrong a result may be; step, mesh and the thresholds of zones follow from it, unless the scene gives them."""
 
     position: Amount | None = Field(
-        default=None, description="of every point at every output: a part of the length of the cable, or mm, cm, m"
+        default=None, description="of every output point: a part of the length of the cable, or mm, cm, m"
     )
     tension: Amount | None = Field(
         default=None,
-        description="of the force at both ends at every output: a part of the largest, or N, kN",
+        description="of the force at both ends: a part of the largest, or N, kN",
     )
 
     curvature: Amount | None = Field(
-        default=None, description="of every point at every output: a part of the largest curvature, such as 5%"
+        default=None, description="of every output point: a part of the largest curvature, such as 5%"
+    )
+    instant: Amount | None = Field(
+        default=None,
+        description="as `accuracy: 1%`, of every output also where the motion is irregular (jonswap waves, or values "
+        "that do not converge); absent: extremes and standard deviations are judged there",
     )
 
     @model_validator(mode="after")
@@ -98,10 +103,19 @@ def _units(name: str) -> str:
 
 
 def expand(value: Any) -> Any:
-    """`1%` for {position: 1%, tension: 1%}; `3 cm` and `50 N` for one of them."""
-    if value is None or isinstance(value, Mapping | Accuracy):
+    """`1%` for {position: 1%, tension: 1%}; `3 cm` and `50 N` for one of them; `instant` likewise."""
+    if isinstance(value, Mapping):
+        instant = value.get("instant")
+        if not isinstance(instant, str) or (found := _AMOUNT.fullmatch(instant)) is None or found[2] not in UNITS:
+            return value  # the table complains of it
+        return {**_each(instant), **value}
+    if value is None or isinstance(value, Accuracy):
         return value
-    text = _is_text(value)
+    return _each(_is_text(value))
+
+
+def _each(text: str) -> dict[str, str]:
+    """The quantities that an amount stands for."""
     what, _ = amount(text)
     return {"position": text, "tension": text} if what == "part" else {what: text}
 

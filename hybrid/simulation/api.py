@@ -22,6 +22,7 @@ from hybrid.errors import ResultError, SceneError
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
+    is_irregular,
     mesh_is_free,
     requested_accuracy,
     wants_errors,
@@ -182,7 +183,9 @@ def _compute(
     compute, kept = _replacing(target, first, refinement), False
     case.beside_result = target if isinstance(target, Path) else None
     try:
-        control = ErrorController(requested_accuracy(scene), _free(scene), True, case.sample, compute, case.beside)
+        asked = requested_accuracy(scene)
+        irregular = is_irregular(scene) and not (asked is not None and asked.instant)
+        control = ErrorController(asked, _free(scene), True, case.sample, compute, case.beside, irregular)
         if remaining is not None and remaining.before:
             with refused(source or Path()):
                 control.restore(remaining.before, scene, case.points, source)

@@ -46,7 +46,7 @@ from hybrid.simulation.run_sample import (
     rows_key,
     split_outputs,
 )
-from hybrid.simulation.time_loop import TimeLoop
+from hybrid.simulation.time_loop import FORCE_COLUMNS, TimeLoop
 from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
@@ -59,6 +59,8 @@ from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
 from hybrid.store.writer import Recorder
 
+# Of every step, what extremes of the end forces follow from.
+FORCES = ("t", "end_force_start", "end_force_end")
 ZONES_FIXED = (
     "zones stay rod: in equilibrium, catenary where the criteria allow it is further from the rod than the tolerance; "
     "more mesh.cells, or a larger model.tolerance, let them move"
@@ -233,7 +235,10 @@ class Case:
             model_error = {x.removeprefix(MODEL_ERRORS): y for x, y in found.items() if x not in values}
             unresolved = any(event.kind == "unresolved bend" for event in result.events)
             notes = damped_vibrations(result) if resolution.local is not None else ()
-        return RunSample(resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes)
+            forces = np.column_stack([np.array(result[f"steps/{name}"]) for name in FORCES])
+        return RunSample(
+            resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes, forces=forces,
+        )  # fmt: skip
 
     # --- runs to compare with -------------------------------------------------------------------
 
@@ -261,7 +266,7 @@ class Case:
         loop = self._loop(self.scene, model, resolution, switching, None, points=points)
         numbers = len(loop.run.run.books.outputs) * sum(math.prod(field.shape) for field in loop.observer.fields)
         if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
-            loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)))
+            loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
         found = loop.recorder
         assert isinstance(found, MemoryRecorder)
         try:
@@ -285,6 +290,7 @@ class Case:
             bound,
             notes,
             found.reference() if isinstance(found, RowsRecorder) else {},
+            found.steps,
         )
 
     def survey(self, resolution: Resolution) -> Grading | None:

@@ -22,9 +22,10 @@ from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import COARSER, Errors, Estimate
+from hybrid.simulation.error_statistics import LARGEST, STATISTICS, estimates, statistics_of
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
-from hybrid.simulation.run_sample import RunSample, restored_notes, restored_sample
+from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
 from hybrid.store.named_arrays import Tree, matched
 from hybrid.store.stored_rows import MissingRows
 
@@ -35,6 +36,10 @@ STALLED = 0.8
 MOST_CPU = 600.0
 # Refinements that may follow the first result.
 MOST_REFINEMENTS = 3
+# The same of an irregular motion, and how much finer it may be: chance is soon more than cells and steps are.
+IRREGULAR_REFINEMENTS, IRREGULAR_FINER = 1, 2.0
+# Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
+DIVERGES = 0.85
 
 
 def comparison_resolutions(resolution: Resolution, moves: bool) -> tuple[Resolution, Resolution, Resolution]:
@@ -60,8 +65,9 @@ class ErrorController:
 
     asked: None asks for an error figure alone.  sample: computes a run to compare with; result: computes the result;
     both raise ComputationError.  beside: computes several of the former at the same time (simulation.beside);
-    None: one after the other.  Its `checkpoint` is in the file of every result, so that what was cut off continues
-    with `proceed`.
+    None: one after the other.  irregular: extremes and standard deviations are judged from the start
+    (simulation.error_statistics); else where values at an instant do not converge.  Its `checkpoint` is in the file of
+    every result, so that what was cut off continues with `proceed`.
     """
 
     asked: RequestedAccuracy | None
@@ -70,20 +76,48 @@ class ErrorController:
     sample: Callable[[Resolution], RunSample]
     result: Callable[[Resolution], RunSample]
     beside: Beside | None = None
+    irregular: bool = False
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
     estimate: Estimate | None = None  # of the result as it is
+    statistics: dict[str, Estimate] = field(default_factory=dict)  # of its extremes and deviations; none: nothing moves
+    scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
     _lost: bool = False  # whether the runs to compare with are to be computed again
+    _every: int = 1  # outputs to one of which the statistics are
     _notes: list[tuple[str, str]] = field(default_factory=list)
 
     @property
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
         found = self.estimate
-        return (*self._notes, *((*found.run.notes, *found.notes) if found is not None else ()))
+        own = [*self._notes, *self._irregular_note()]
+        return (*own, *((*found.run.notes, *found.notes) if found is not None else ()))
+
+    def _irregular_note(self) -> list[tuple[str, str]]:
+        """What is judged of an irregular motion, and how far the result may be off in what is not."""
+        if self.asked is None or not self.irregular or not self.statistics or self.estimate is None:
+            return []
+        errors = self.estimate.errors
+        force = max(errors.largest("total", name) for name in END_FORCES.values())
+        position = errors.largest("total", "position")
+        text = (
+            "the motion is irregular: accuracy is that of largest values, mean extremes of windows and standard "
+            f"deviations; at an instant positions may be off by {position:.2g} m, end forces by {force:.2g} N; "
+            "accuracy: {instant: 1%} asks for every instant"
+        )
+        notes = [("irregular motion", text)]
+        if self.scattered:
+            found = self.statistics[LARGEST].errors
+            each = [f"{x.removeprefix('end_force_')} {found.largest('total', x):.2g} N" for x in self.scattered]
+            text = (
+                f"the largest force is that of one snap, and differs from run to run however fine they are (at the "
+                f"{', at the '.join(each)}): it is not judged; the spread over seeds, or a longer run, says more"
+            )
+            notes.append(("largest force uncertain", text))
+        return notes
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
@@ -106,6 +140,10 @@ class ErrorController:
             if self.estimate is not None:
                 stricter = resolution.zones < self.estimate.run.resolution.zones
                 self.estimate.update(result)
+                if self.statistics:
+                    found = statistics_of(result, self._every)
+                    for name, estimate in self.statistics.items():
+                        estimate.update(found[name])
                 if stricter:
                     self._renew_model_errors(self.estimate, resolution)
             elif not self._first_estimate(result):
@@ -114,16 +152,29 @@ class ErrorController:
         assert self.estimate is not None
         errors = self.estimate.errors
         if self.asked is not None:
-            verdict = judge(self.asked, errors, self.estimate.run)
+            verdict = self._verdict(self.asked)
             if verdict.ratio > 1.0:
                 self._note_missed(verdict)
         return self.estimate.run, errors
+
+    def _verdict(self, asked: RequestedAccuracy) -> Verdict:
+        """How the errors compare with what is asked: at every instant, or of extremes and standard deviations."""
+        assert self.estimate is not None
+        if not self.irregular or not self.statistics:
+            return judge(asked, self.estimate.errors, self.estimate.run)
+        verdicts = []
+        for statistic, estimate in self.statistics.items():
+            skip = self.scattered if statistic == LARGEST else ()
+            found = judge(asked, estimate.errors, self.statistics[LARGEST].run, skip)
+            text = found.text.replace(": error", f", {statistic.replace('_', ', ')}: error")
+            verdicts.append(replace(found, text=text, statistic=statistic))
+        return max(verdicts, key=lambda found: found.ratio)
 
     def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
         """The result as it is and its errors, where a finer one did not come to its end."""
         assert self.estimate is not None and self.asked is not None
         run, errors = self.estimate.run, self.estimate.errors
-        verdict = judge(self.asked, errors, run)
+        verdict = self._verdict(self.asked)
         if verdict.ratio > 1.0:
             self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
         return run, errors
@@ -158,6 +209,7 @@ class ErrorController:
             self._notes += result.notes
             return False
         estimate = Estimate(result, *self.comparisons)
+        self._set_statistics(result, *self.comparisons)
         if not estimate.has_mesh:
             text = f"no error figure: {result.cells} cells are so few that there is nothing coarser to compare with"
             self._notes.append(("no error figure", text))
@@ -172,11 +224,24 @@ class ErrorController:
         self.estimate, self.comparisons = estimate, None
         return True
 
+    def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
+        """Estimate the errors of extremes and standard deviations, by the outputs that all runs have."""
+        if not self.moves:
+            return
+        coarse, rough, coarsest = comparisons
+        assert coarse is not None
+        self._every = max(run.every for run in comparisons if run is not None)
+        self.statistics = estimates(result, coarse, rough, coarsest, self._every)
+
     def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
         """Zones have become stricter: what they neglect now."""
         coarser = comparison_resolutions(resolution, self.moves)[0]
         try:
-            estimate.set_model_errors(self._counted(self.sample(replace(coarser, follow=True))))
+            run = self._counted(self.sample(replace(coarser, follow=True)))
+            estimate.set_model_errors(run)
+            found = statistics_of(run, self._every)
+            for name, of_statistic in self.statistics.items():
+                of_statistic.set_model_errors(found[name])
         except ComputationError as error:
             text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
             self._notes.append(("error uncertain", text))
@@ -187,15 +252,38 @@ class ErrorController:
         if self.asked is None:
             return None
         run, before = self.estimate.run, self._ratio
-        verdict = judge(self.asked, self.estimate.errors, run)
+        verdict = self._verdict(self.asked)
+        while verdict.ratio > 1.0 and self._leaves_out(verdict, verdict.ratio / before):
+            verdict, before = self._verdict(self.asked), np.inf
         self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
         self._judged += 1
-        left = MOST_REFINEMENTS + 1 - self._judged
-        hopeless = left == 0 or falls > STALLED or verdict.ratio * falls**left > 1.0
+        left = (IRREGULAR_REFINEMENTS if self.irregular else MOST_REFINEMENTS) + 1 - self._judged
+        hopeless = left <= 0 or falls > STALLED or verdict.ratio * falls**left > 1.0
         met = verdict.ratio <= 1.0 and not (run.unresolved and self.free.mesh)
         if met or hopeless or sum(self.runs) > MOST_CPU:
             return None
+        if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
+            return refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
         return refined(run.resolution, verdict, self.free)
+
+    def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
+        """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""
+        if not self.statistics or self.asked is None or self.asked.instant:
+            return False
+        estimate = self.statistics[LARGEST] if self.irregular else self.estimate
+        assert estimate is not None
+        name = {of: raw for raw, of in END_FORCES.items()}.get(verdict.name, verdict.name)
+        if not (falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES):
+            return False
+        if not self.irregular:
+            self.irregular = True
+            return True
+        if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
+            return False
+        if self.scattered:
+            return False
+        self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
+        return True
 
     def _note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
@@ -217,7 +305,9 @@ class ErrorController:
             "runs": np.array(self.runs), "next": self.next and resolution_tree(self.next),
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
-            "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
+            "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
+            "scattered": self.scattered,
+            "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
     def restore(self, tree: Mapping[str, Any], scene: Scene, points: OutputPoints, source: Path | None = None) -> None:
@@ -226,10 +316,14 @@ class ErrorController:
 
         ResultError or ValueError: it is none of this scene.
         """
-        template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0}
-        saved = matched(tree, template | dict.fromkeys(("next", "coarse", "estimate", "notes")), "error control")
+        template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
+        names = ("next", "coarse", "estimate", "statistics", "scattered", "notes")
+        saved = matched(tree, template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
+        self._every, self.irregular = saved["every"], saved["irregular"]
+        if self._every < 1:
+            raise ValueError("statistics of no outputs")
         self._notes = list(restored_notes(saved["notes"]))
         self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None
         if saved["coarse"] is not None:
@@ -240,5 +334,9 @@ class ErrorController:
                 self._lost = True
         if saved["estimate"] is not None:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
+        if saved["statistics"]:
+            trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
+            self.statistics = {name: Estimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
+        self.scattered = [name for name in END_FORCES.values() if name in list(saved["scattered"])]
         if self.next is None and self.estimate is None:
             raise ValueError("neither a result nor one that is to come")

@@ -30,7 +30,7 @@ from hybrid.store.named_arrays import Tree, matched
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
 # 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
 # is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
-ORDER, ORDERS = 1.5, (1.25, 2.0)
+ORDER, ORDERS, MOST_ORDER = 1.5, (1.25, 2.0), 3.0
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
 # Cells and steps of a coarser run are so many times as long.
@@ -90,14 +90,21 @@ class Estimate:
     """
 
     def __init__(
-        self, result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None
+        self,
+        result: RunSample,
+        coarse: RunSample,
+        rough: RunSample | None,
+        coarsest: RunSample | None,
+        orders: tuple[float, float] = ORDERS,
     ) -> None:
         """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
 
-        None: it failed, or nothing moves.
+        None: it failed, or nothing moves.  orders: bounds of the order of convergence.
         """
-        self.run = result
-        self.order = {name: _order(name, result, coarse, coarsest) for name in result.values if name in coarse.values}
+        self.run, both = result, [name for name in result.values if name in coarse.values]
+        # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
+        self.falls = {name: _falls(name, result, coarse, coarsest) for name in both}
+        self.order = {name: _order(falls, orders) for name, falls in self.falls.items()}
         self.set_model_errors(coarse)
         slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
         self._coarse, self._rough = coarse, rough if slower else None
@@ -222,7 +229,7 @@ class Estimate:
         by_step, by_mesh = self._keep()
         model = {name: _at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
                  for name, x in self._model.items()}  # fmt: skip
-        found = {"order": self.order, "late": by_step, "cells": by_mesh, "model": model}
+        found: Tree = {"order": self.order, "falls": self.falls, "late": by_step, "cells": by_mesh, "model": model}
         return found | {"notes": self.notes, "run": self.run.checkpoint()}
 
     @classmethod
@@ -231,12 +238,13 @@ class Estimate:
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
+        self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
         late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
         self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
-        if not all(ORDERS[0] <= p <= ORDERS[1] for p in self.order.values()):
+        if not all(ORDERS[0] <= p <= MOST_ORDER for p in self.order.values()):
             raise ValueError("orders that no errors have")
         return self
 
@@ -253,10 +261,10 @@ def summary(errors: Errors) -> dict[str, float]:
 # --- parts of the estimate ----------------------------------------------------------------------
 
 
-def _order(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample | None) -> float:
-    """The order with which an output converges, by three runs; bounded, because a ratio of noise is one as well."""
+def _falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample | None) -> float:
+    """Difference of the last two of three runs over that of the first two, over all times; NaN: they do not show it."""
     if coarsest is None or name not in coarsest.values:
-        return ORDER
+        return np.nan
     values, every = coarsest.values[name], coarsest.every
     final, middle = (every_of(len(x.values[name]), every // x.every) for x in (result, coarse))
     rows, later, earlier = max(1, MOST // int(np.prod(values.shape[1:]))), 0.0, 0.0
@@ -264,9 +272,12 @@ def _order(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample 
         between = coarse.some(name, middle[a : a + rows])
         later += _squares(result.some(name, final[a : a + rows]) - between)
         earlier += _squares(between - values[a : a + rows])
-    if not (later > 0.0 and earlier > 0.0):
-        return ORDER
-    return float(np.clip(np.log(np.sqrt(earlier) / np.sqrt(later)) / np.log(COARSER), *ORDERS))
+    return float(np.sqrt(later) / np.sqrt(earlier)) if later > 0.0 and earlier > 0.0 else np.nan
+
+
+def _order(falls: float, bounds: tuple[float, float]) -> float:
+    """The order with which an output converges; bounded, because a ratio of noise is one as well."""
+    return ORDER if np.isnan(falls) else float(np.clip(-np.log(falls) / np.log(COARSER), *bounds))
 
 
 def _squares(x: np.ndarray) -> float:

@@ -61,6 +61,10 @@ def write_errors(
             largest = {name: errors.largest("total", name) for name in total if errors is not None}
             undersampled = undersampled_end_forces(file, largest)
         found = summary(errors) if errors is not None else {}
+        if control.irregular:
+            each = [summary(estimate.errors) for estimate in control.statistics.values()]
+            for name in each[0] if each else ():
+                found[name.replace("error_", "error_extremes_", 1)] = max(x[name] for x in each)
         return attributes | found, [*dict(reversed(control.notes)).items(), *undersampled]
 
     amend(target, fields, blocks(), known_then, done)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from typing import NamedTuple
@@ -41,10 +42,15 @@ class Verdict:
     model: float
     text: str
     reached: str = ""  # what of it is missed, as this run meets it: an accuracy as a scene writes it
+    name: str = ""  # of the quantity
+    statistic: str = ""  # of it, that is judged; empty: every output
 
 
-def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
-    """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met."""
+def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collection[str] = ()) -> Verdict:
+    """How the errors of a run compare with what is asked: at a ratio of 1 or less they are met.
+
+    skip: quantities that are not judged.
+    """
     bounds: list[tuple[str, str, float, float | None]] = []  # quantity, unit, bound; if a part is asked, of what
     if asked.position is not None:
         bounds.append(("position", "m", asked.position, None))
@@ -58,7 +64,7 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
         bounds.append(("curvature", "1/m", asked.of_curvature * sharpest, sharpest))
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
     for name, unit, bound, most in bounds:
-        if bound <= 0.0:
+        if bound <= 0.0 or name in skip:
             continue
         total = errors.largest("total", name)
         key = {"position": "position", "curvature": "curvature"}.get(name, "tension")
@@ -69,7 +75,7 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample) -> Verdict:
             mesh, time = (errors.largest(cause, name) / bound for cause in ("mesh", "time"))
             quantity = name.replace("end_force_", "force at the ")
             text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
-            worst = Verdict(total / bound, mesh, time, model / bound, text)
+            worst = Verdict(total / bound, mesh, time, model / bound, text, name=name)
     return replace(worst, reached=", ".join(text for _, text in reached.values()))
 
 
@@ -84,14 +90,15 @@ def _reached(key: str, unit: str, total: float, most: float | None) -> str:
     return f"{key}: {ceil(amount / digit) * digit:.6g} {unit}".replace(" %", "%")
 
 
-def refined(resolution: Resolution, verdict: Verdict, free: Free) -> Resolution | None:
+def refined(resolution: Resolution, verdict: Verdict, free: Free, most: float = MOST_FINER) -> Resolution | None:
     """What should meet what is asked, by order 2, at least cost; None: nothing that is free would help.
 
-    Errors of mesh and step add, and cost grows with fineness over step: half of what is asked is for each.
+    most: how much finer it may be.  Errors of mesh and step add, and cost grows with fineness over step: half of what
+    is asked is for each.
     """
     zones, model = resolution.zones, verdict.model
     if free.zones and model > MOST_OF_MODEL:
-        zones *= max(OF_MODEL / model, 1.0 / MOST_FINER)
+        zones *= max(OF_MODEL / model, 1.0 / most)
         model = OF_MODEL
     if model >= AIM or (verdict.mesh > 1.0 and not free.mesh) or (verdict.time > 1.0 and not free.steps):
         return None  # what is fixed is wrong by more than is asked
@@ -100,7 +107,7 @@ def refined(resolution: Resolution, verdict: Verdict, free: Free) -> Resolution 
     time = verdict.time if free.steps else 0.0
     goal_mesh = goal - (verdict.time if not free.steps else min(time, 0.5 * goal))
     goal_time = goal - (verdict.mesh if not free.mesh else min(mesh, 0.5 * goal))
-    least = 1.0 / MOST_FINER
+    least = 1.0 / most
     cells = min(max(sqrt(max(goal_mesh, 0.0) / mesh), least), 1.0) if mesh > 0.0 else 1.0
     steps = min(max(sqrt(max(goal_time, 0.0) / time), least), 1.0) if time > 0.0 else 1.0
     if min(cells, steps) > 0.95 and zones == resolution.zones:

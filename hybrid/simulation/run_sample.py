@@ -48,6 +48,7 @@ class RunSample:
     bound: float = 0.0  # m, that the criteria of zones that move let pass; 0 where there are none
     notes: Notes = ()  # that the result should carry
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
+    forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -95,6 +96,8 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
     saved = matched({"rows": {}} | tree, blank | free, "run")  # a checkpoint of 0.6 has no rows
+    if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
+        raise ValueError("forces of steps that no run has")
     resolution = resolution_from(saved["resolution"], scene)
     if saved["rows"] and result is not None:
         found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))

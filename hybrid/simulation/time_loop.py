@@ -11,7 +11,7 @@ from typing import Any, NoReturn
 import numpy as np
 
 from hybrid.errors import ComputationError
-from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
+from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -34,6 +34,9 @@ LOGGED = 100
 
 # Of a step: stops that are so near to each other are one, or a step between them would be round-off.
 SAME_STOP = 1e-6
+
+# Columns of the step log that runs to compare with keep: time, forces at both ends.
+FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force_end")]
 
 
 def apart(stops: Iterable[float], t: float, step: float) -> list[float]:
@@ -62,7 +65,7 @@ class TimeLoop:
         its end.
         """
         self.run, self.observer, self.target = run, observer, target
-        self.recorder: Recorder | MemoryRecorder | DeferredRecorder = MemoryRecorder()
+        self.recorder: Recorder | MemoryRecorder | DeferredRecorder = MemoryRecorder(FORCE_COLUMNS)
         self.diagnostics = Diagnostics(run.model, run.events)
         self._report, self._interrupted = report, interrupted
         self._observed = run.model  # by the observer

@@ -11,9 +11,11 @@ from hybrid.errors import ResultError
 
 
 class MemoryRecorder:
-    """Stands in for a `Recorder` where only arrays are wanted; keeps outputs and events, no step log."""
+    """Stands in for a `Recorder` where only arrays are wanted: outputs, events, and some columns of the step log."""
 
-    def __init__(self) -> None:
+    def __init__(self, columns: Sequence[int] = ()) -> None:
+        """columns: of the step log, that are kept."""
+        self._columns, self._steps = list(columns), list[np.ndarray]()
         self.times: list[float] = []
         self.events: list[tuple[str, str]] = []  # kind, text
         self._kept: dict[str, list[np.ndarray]] = {}  # batches (nb, ...)
@@ -43,10 +45,16 @@ class MemoryRecorder:
             self._kept.setdefault(name, []).append(np.asarray(value, float))
 
     def log(self, values: Mapping[str, float | int]) -> None:
-        """Steps are not kept."""
+        """Single steps are not kept."""
 
     def log_rows(self, rows: np.ndarray) -> None:
-        """Steps are not kept."""
+        """Append steps: rows of the log."""
+        self._steps.append(np.array(rows[:, self._columns], float))
+
+    @property
+    def steps(self) -> np.ndarray:
+        """The columns that are kept, of all steps."""
+        return np.concatenate([np.zeros((0, len(self._columns))), *self._steps])
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
         """Note that something happened at time t (s) from s_a to s_b (m)."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, BinaryIO
 
@@ -69,8 +69,9 @@ class StoredRows:
 class RowsRecorder(MemoryRecorder):
     """A recorder whose outputs go into such a file."""
 
-    def __init__(self, path: Path) -> None:
-        super().__init__()
+    def __init__(self, path: Path, columns: Sequence[int] = ()) -> None:
+        """columns: of the step log, that are kept in memory."""
+        super().__init__(columns)
         self.path, self._file, self._digest = path, self._opened(path), hashlib.blake2b(digest_size=DIGEST)
         self._shapes: dict[str, tuple[int, ...]] = {}
 

@@ -373,6 +373,9 @@ def _errors(result: Result) -> Fact:
         return Fact("errors", title, text, "absent")
     asked = result.attributes.get("accuracy_asked")
     text = f"Position {amount(found['total_position'], 'm', 2)}, end forces {amount(found['total_end_force'], 'N', 2)}"
+    if "extremes_total_position" in found:
+        position, force = (found[f"extremes_total_{x}"] for x in ("position", "end_force"))
+        text += f" at an instant; extremes {amount(position, 'm', 2)} and {amount(force, 'N', 2)}"
     text += f"; asked was {asked}." if asked else "."
     return Fact("errors", title, text, "plain", found | {"asked": asked})
 

@@ -134,7 +134,7 @@ def test_a_reference_that_fails_is_exit_2(call: Call, monkeypatch: pytest.Monkey
 
 
 def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> None:
-    Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 1200.0"))  # runs of a second or more
+    Path("long.yaml").write_text(SAG.replace("duration: 1.0", "duration: 2400.0"))  # runs of some seconds
     arguments = ["trade", "long.yaml", *SHORT, "--json"]
     command = [sys.executable, "-c", "import sys; from hybrid.cli.commands import main; main(sys.argv[1:])", *arguments]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
@@ -147,7 +147,9 @@ def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> 
     assert process.returncode == 130
     assert "interrupted; long.trade keeps the runs that are done; the same command makes the others" in err
     kept = {file.name: file.stat().st_mtime_ns for file in Path("long.trade/runs").glob("*.json")}
-    assert len(kept) == 2 and "2 runs are missing" in Path("long.trade/trade.md").read_text()
+    missing = 4 - len(kept)  # on a busy machine more than one may be done when the signal comes
+    words = "1 run is missing" if missing == 1 else f"{missing} runs are missing"
+    assert 2 <= len(kept) <= 3 and words in Path("long.trade/trade.md").read_text()
     said = call(*arguments)
     assert said.code == 0
     now = {file.name: file.stat().st_mtime_ns for file in Path("long.trade/runs").glob("*.json")}

@@ -26,7 +26,7 @@ ADAPTIVE = (
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
         "force_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
     )
-    + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%}\n"
+    + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%}\n"
 )
 CORRECTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]}

@@ -1,0 +1,115 @@
+"""What converges of an irregular motion: its extremes and standard deviations, of runs that are to be compared.
+
+Where a line snaps or the sea is irregular, runs differ at an instant however fine they are: a snap comes a little
+earlier or later.  Extremes over windows and standard deviations converge, and mostly the largest value of a run.
+docs/accuracy.md
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import replace
+
+import numpy as np
+
+from hybrid.simulation.error_estimate import MOST_ORDER, Estimate
+from hybrid.simulation.run_sample import END_FORCES, RunSample
+
+# Windows of a run, and the outputs of the result that one has at least.
+WINDOWS, LEAST = 50, 20
+# Of windows, the means of their largest and of their smallest values.
+LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST = "largest", "deviation", "windows_largest", "windows_smallest"
+STATISTICS = (LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST)
+# Bounds of the order with which they converge: runs of long steps overshoot snaps, and come back with order 3.
+ORDERS = 1.5, MOST_ORDER
+
+
+def estimates(
+    result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None, every: int
+) -> dict[str, Estimate]:
+    """The errors of each of STATISTICS; arguments as of `Estimate`, every: as of `statistics_of`."""
+    runs = [statistics_of(x, every) if x is not None else {} for x in (result, coarse, rough, coarsest)]
+    return {x: Estimate(runs[0][x], runs[1][x], runs[2].get(x), runs[3].get(x), ORDERS) for x in STATISTICS}
+
+
+def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
+    """The same run with each of STATISTICS in place of its outputs: arrays (1, ...).
+
+    every: outputs of the result to one that counts; forces at the ends count at every step.  Reactions become
+    (magnitude, 0, 0).  Errors of neglected bending are those at the extremes, and their root mean square.
+    """
+    values = {name: _scalar(name, _thinned(np.asarray(x), every // run.every)) for name, x in run.values.items()}
+    count = len(next(iter(values.values()), ()))
+    windows = max(1, min(WINDOWS, count * every // LEAST))
+    found = {name: _statistics(x, windows) for name, x in values.items()}
+    for column, name in enumerate(END_FORCES, start=1):
+        if name in found and len(run.forces) > windows:
+            found[name] = _of_steps(run.forces[:, 0], run.forces[:, column], windows)
+    errors = _model_errors(run, values, every, windows)
+    return {
+        statistic: replace(
+            run, every=1, rows={}, forces=run.forces[:0],
+            values={name: _as_vector(name, x[k]) for name, x in found.items()},
+            model_error={name: x[k] for name, x in errors.items()},
+        )
+        for k, statistic in enumerate(STATISTICS)
+    }  # fmt: skip
+
+
+def _thinned(x: np.ndarray, step: int) -> np.ndarray:
+    return np.asarray(x)[np.unique(np.append(np.arange(0, len(x), step), len(x) - 1))]
+
+
+def _scalar(name: str, x: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(x, axis=-1)) if name in END_FORCES else x
+
+
+def _as_vector(name: str, x: np.ndarray) -> np.ndarray:
+    return np.stack([x, 0.0 * x, 0.0 * x], axis=-1) if name in END_FORCES else x
+
+
+def _windows(x: np.ndarray, windows: int) -> Iterator[np.ndarray]:
+    """The outputs after the first, in windows of about the same length."""
+    later = x[1:] if len(x) > 1 else x
+    return iter(np.array_split(later, min(windows, len(later))))
+
+
+def _statistics(x: np.ndarray, windows: int) -> np.ndarray:
+    """STATISTICS of (nt, ...) over time: (4, 1, ...)."""
+    parts = list(_windows(x, windows))
+    largest, smallest = (np.mean([f(part, axis=0) for part in parts], axis=0) for f in (np.max, np.min))
+    return np.stack([np.max(x, axis=0), np.std(x, axis=0), largest, smallest])[:, None]
+
+
+def _of_steps(t: np.ndarray, x: np.ndarray, windows: int) -> np.ndarray:
+    """STATISTICS of (n,) values at the times (n,) at which steps end: (4, 1)."""
+    dt = np.diff(t, prepend=0.0)
+    mean = np.average(x, weights=dt)
+    deviation = np.sqrt(np.average((x - mean) ** 2, weights=dt))
+    begins = np.searchsorted(t, np.linspace(0.0, t[-1], windows + 1)[:-1], side="right")
+    begins = np.unique(np.minimum(begins, len(t) - 1))
+    largest, smallest = (float(np.mean(f.reduceat(x, begins))) for f in (np.maximum, np.minimum))
+    return np.array([[x.max()], [deviation], [largest], [smallest]])
+
+
+def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, windows: int) -> dict[str, np.ndarray]:
+    """What errors of neglected bending (nt, ...) make of STATISTICS, to first order: (4, 1, ...)."""
+    out = {}
+    named = {END_FORCES.get(name, name): x for name, x in values.items()}
+    for name, field in run.model_error.items():
+        if not len(field):
+            continue
+        error, value = _thinned(np.asarray(field), every // run.every), named.get(name)
+        level = np.sqrt(np.mean(error * error, axis=0))
+        if value is None or value.shape != error.shape:  # of vectors: no extreme of a component
+            out[name] = np.stack([np.max(error, axis=0), level, level, level])[:, None]
+            continue
+        pairs = list(zip(_windows(value, windows), _windows(error, windows), strict=True))
+        most, least = (np.mean([_taken(e, f(x, axis=0)) for x, e in pairs], axis=0) for f in (np.argmax, np.argmin))
+        out[name] = np.stack([_taken(error, value.argmax(axis=0)), level, most, least])[:, None]
+    return out
+
+
+def _taken(x: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """The values of (nt, ...) at the times (...)."""
+    return np.asarray(np.take_along_axis(x, np.asarray(at)[None], axis=0)[0])

@@ -1,0 +1,193 @@
+"""Irregular motion: what of it is compared, when, and what is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.simulation.error_control import ErrorController
+from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, statistics_of
+from hybrid.simulation.refinement import Free
+from hybrid.simulation.run_sample import RunSample
+
+FINENESS = Resolution(1.0, 0.1, 1e-3, 1e-3)
+
+
+def run(force: np.ndarray, cells: int = 100, steps: int = 1000, **more) -> RunSample:
+    """A run with a force along x at its end, and one point that moves with it."""
+    values = {
+        "reaction_end": np.stack([force, 0 * force, 0 * force], axis=-1),
+        "position": np.stack([force, 0 * force, 0 * force], axis=-1)[:, None, :] * 1e-3,
+    }
+    return RunSample(FINENESS, values, cells, steps, 0.0, **more)
+
+
+def noisy(amplitude: float, late: float = 0.0, count: int = 4001) -> np.ndarray:
+    """A sine of about that amplitude over 200 periods, shifted in time by `late`."""
+    t = np.linspace(0.0, 400.0, count)
+    return 5e3 + amplitude * np.sin(np.pi * (t - late)) * (1.0 + 0.1 * np.sin(0.37 * (t - late)))
+
+
+def values(found: dict[str, RunSample], name: str) -> list[float]:
+    """STATISTICS of an output: of its first component, at its first point."""
+    return [float(found[x].values[name].flat[0]) for x in STATISTICS]
+
+
+def test_statistics_of_a_known_signal():
+    x = np.concatenate([[0.0], np.tile(np.linspace(-1.0, 3.0, 41), 100)])
+    found, force = statistics_of(run(x), 1), np.abs(x)  # the magnitude of a reaction
+    assert list(found) == ["largest", "deviation", "windows_largest", "windows_smallest"]
+    assert values(found, "reaction_end") == pytest.approx([3.0, force.std(), 3.0, 0.0], abs=1e-12)
+    assert values(found, "position") == pytest.approx([3e-3, 1e-3 * x.std(), 3e-3, -1e-3], abs=1e-15)
+    assert not found["largest"].values["reaction_end"][:, 1:].any()
+
+
+def test_forces_count_at_every_step():
+    """Steps of unequal length see a peak that no output has; the deviation is weighted with their lengths."""
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.02, 0.2, 4000))
+    force = 10.0 + np.sin(t)
+    force[1234] = 99.0
+    steps = np.column_stack([t, force, force])
+    found = statistics_of(run(np.full(2001, 10.0), forces=steps), 1)
+    largest, deviation, windows, smallest = values(found, "reaction_end")
+    assert largest == 99.0
+    assert windows == pytest.approx(11.0 + 88.0 / WINDOWS, abs=0.01)
+    assert smallest == pytest.approx(9.0, abs=0.01)
+    dt = np.diff(t, prepend=0.0)
+    assert deviation == pytest.approx(
+        np.sqrt(np.sum(dt * (force - np.sum(dt * force) / t[-1]) ** 2) / t[-1]), rel=1e-12
+    )
+
+
+def test_windows_average_what_one_snap_does():
+    """One value that jumps by 1 moves the largest by 1, the mean over windows by a fiftieth."""
+    x = np.ones(2001)
+    x[700] = 2.0
+    largest, _, windows, _ = values(statistics_of(run(x), 1), "reaction_end")
+    assert largest == 2.0
+    assert windows == pytest.approx(1.0 + 1.0 / WINDOWS, rel=1e-12)
+
+
+def test_model_errors_are_those_at_the_extremes():
+    x = np.ones(1001)
+    x[400], error = 3.0, np.full(1001, 0.2)
+    error[400], error[500] = 0.5, 9.0  # where the force is small, a large error does not count as one of the largest
+    found = statistics_of(run(x, model_error={"end_force_end": error}), 1)
+    largest, deviation, windows, _ = (float(found[x].model_error["end_force_end"][0]) for x in STATISTICS)
+    assert largest == 0.5
+    assert deviation == pytest.approx(np.sqrt(np.mean(error**2)), rel=1e-12)
+    assert windows < 0.5
+
+
+def estimated(irregular: bool, instant: bool = False) -> ErrorController:
+    """A controller of runs that agree but for when things happen; a hundredth is asked."""
+    late = {1.0: 0.31, 0.5: 0.72, 0.25: 1.13}  # s, by fineness: no order at all
+
+    def sample(resolution: Resolution) -> RunSample:
+        fine, every = resolution.fineness, resolution.every
+        x = noisy(1e3 * (1.0 + 1e-3 / fine**2), late[fine] + 0.05 * resolution.every)
+        kept = np.unique(np.append(np.arange(0, len(x), every), len(x) - 1))
+        found = run(x[kept], round(100 * fine), 1000 // resolution.every, every=every)
+        return replace(found, resolution=resolution)
+
+    asked = RequestedAccuracy(None, None, 0.01, instant=instant)
+    free = Free(mesh=True, steps=True, zones=False)
+    return ErrorController(asked, free, True, sample, sample, irregular=irregular)
+
+
+def test_values_that_do_not_converge_are_judged_by_statistics():
+    control = estimated(False)
+    control.start(FINENESS)
+    assert control.irregular
+    assert len(control.runs) == 4, "no repetition: extremes meet what is asked"
+    kinds = [kind for kind, _ in control.notes]
+    assert kinds == ["irregular motion"]
+    (text,) = (text for _, text in control.notes)
+    assert "instant" in text and " m, end forces by " in text
+
+
+def test_every_instant_can_be_asked():
+    control = estimated(False, instant=True)
+    with pytest.raises(KeyError):  # a finer run is begun, which these do not know
+        control.start(FINENESS)
+    assert not control.irregular
+
+
+def test_a_largest_force_by_chance_is_not_judged():
+    """All runs agree but for one snap, whose size depends on nothing."""
+    snaps = {(1.0, 1): 9e3, (0.5, 2): 7e3, (0.5, 4): 9.4e3, (0.25, 4): 7.2e3}
+
+    def sample(resolution: Resolution) -> RunSample:
+        force = noisy(1e3 * (1.0 + 1e-3 / resolution.fineness**2))
+        force[2000] = snaps[resolution.fineness, resolution.every]
+        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
+        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
+        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
+        return replace(found, resolution=resolution, forces=steps)
+
+    asked = RequestedAccuracy(None, None, 0.01)
+    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control.start(FINENESS)
+    assert control.scattered == ["end_force_end"]  # the only one there
+    assert [kind for kind, _ in control.notes] == ["irregular motion", "largest force uncertain"]
+    assert len(control.runs) == 4
+
+
+SEA = {
+    "environment": {
+        "fluid": {
+            "density": 1025, "surface": 0,
+            "waves": {"kind": "jonswap", "significant_height": 2, "peak_period": 6, "ramp": 6, "seed": 2},
+        }
+    },
+    "cable": {"sections": [{"length": 30, "mass": 3, "diameter": 0.03, "bending_stiffness": 5, "drag": {"normal": 1.2}}]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -25]},
+        "end": {"kind": "pinned", "position": [18, 0, -4], "motion": {"follow": "waves"}},
+    },
+    "initial": "equilibrium", "model": "rod", "time": {"duration": 30.0}, "output": {"every": 0.1},
+}  # fmt: skip
+
+
+def test_an_irregular_sea(tmp_path):
+    """The file has both figures; the closing lines say which were asked; `instant` asks for the other."""
+    result = hybrid.run(SEA, tmp_path / "sea.h5")
+    found = result.attributes
+    (note,) = [e.text for e in result.events if e.kind == "irregular motion"]
+    assert note.startswith("the motion is irregular")
+    for name in ("position", "end_force"):
+        assert 0.0 < found[f"error_extremes_total_{name}"] < np.inf
+        assert found[f"error_extremes_total_{name}"] < 3.0 * found[f"error_total_{name}"]
+    assert "accuracy missed" not in {e.kind for e in result.events}
+    fine = hybrid.run(SEA | {"mesh": {"cells": 120}, "time": {"duration": 30.0, "step": 0.01}})
+    force = [np.linalg.norm(x["reaction_end"], axis=1) for x in (result, fine)]
+    assert abs(force[0].max() - force[1].max()) <= 0.01 * force[1].max()
+    assert abs(force[0].std() - force[1].std()) <= 0.01 * force[1].max()
+
+
+def test_instant_in_a_scene():
+    asked = hybrid.validate_scene(SEA | {"accuracy": {"instant": "2%"}}).accuracy
+    assert (asked.position, asked.tension, asked.instant) == ("2%", "2%", "2%")
+    asked = hybrid.validate_scene(SEA | {"accuracy": {"position": "3 cm", "instant": "2%"}}).accuracy
+    assert (asked.position, asked.tension) == ("3 cm", "2%")
+    with pytest.raises(hybrid.SceneError, match="instant"):
+        hybrid.validate_scene(SEA | {"accuracy": {"instant": 2}})
+
+
+def test_what_is_judged_survives_a_stop(tmp_path, monkeypatch):
+    """A run that is refined, stopped in its comparisons, its result and its refinement, and resumed: the same bits."""
+    scene = hybrid.validate_scene(SEA | {"time": {"duration": 12.0}, "accuracy": {"tension": "0.05%"}})
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    with hybrid.open(tmp_path / "whole.h5") as whole:
+        assert whole.attributes["effort_runs"] > 4
+    heard = stopping.heard
+    for stop in (heard // 3, heard // 2, heard - 60):
+        assert went_on(scene, tmp_path / "parts.h5", stopping, [stop]) == 1
+        assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
