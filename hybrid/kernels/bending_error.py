@@ -261,7 +261,7 @@ def blank_error_job() -> ErrorJob:
     """A job with the types that every one has."""
     z, node = np.zeros, np.zeros((2, 3))
     arrays = ErrorArrays(node, z((2, 5)), node, node, z((1, 5)), z((1, 5)), z((2, 5)), z((4, 2, 4)), z(REPORT_SIZE))
-    bending, step = Bending(z(2), z(2, np.int8), z(1)), Step(node, z(4))
+    bending, step = Bending(z(2), z(2, np.int8), z(2, np.int8), z(1)), Step(node, z(4))
     error = z((4, 2, 4))
     return ErrorJob(
         blank_line(1), no_sea(1), no_ends(), bending, blank_state(1), step, z(1), z(1), error, error, 1.0, arrays

@@ -37,11 +37,12 @@ class Bending(NamedTuple):
     """What the bending of a line would be if all of it were rod."""
 
     soft: Floats  # (N+1,) 1/(N m), 1/ki, 0 where there is no bending stiffness
+    kinks: NDArray[np.int8]  # (N+1,) 1 where the cable may have one: at point loads, and ends that prescribe a tangent
     tangent: NDArray[np.int8]  # (2,) 1 where an end prescribes one
     floor: Floats  # (N,) N, least tension that counts
 
 
-by_reference(Bending(np.zeros(2), np.zeros(2, np.int8), np.zeros(1)))
+by_reference(Bending(np.zeros(2), np.zeros(2, np.int8), np.zeros(2, np.int8), np.zeros(1)))
 
 
 @inner
@@ -64,6 +65,19 @@ def bending_share(line, soft, i):
     if line.element[i] and soft[i] > 0.0:
         return min(0.5 * (line.kb[i, 0] + line.kb[i, 1]) * soft[i], 1.0)
     return 0.0
+
+
+@inner
+def soft_at_kink(soft, before, after):
+    """1/ki with which the moment at a kink is EI theta / (2 lambda), that between long stretches, at any length of cells.
+
+    before, after: 1/(l T) of the cells beside the node, 0 where there is none.  Between cells of length h a regular 1/ki
+    gives that over sqrt(1 + h^2/(4 lambda^2)); a clamp is one half of it (docs/theory.md, 14, T24).
+    """
+    sides = 2.0 if before > 0.0 and after > 0.0 else 1.0
+    a = (before + after) / sides  # 1/(h T)
+    x = 0.5 * soft / (sides * a)  # h^2/(4 lambda^2), because soft = sides h/(2 EI)
+    return soft - 2.0 * sides * a * math.sqrt(x) * (math.sqrt(1.0 + x) - 1.0)
 
 
 @inner
@@ -135,6 +149,8 @@ def eliminate_moments(line, ends, bending, chords, turned, T, torque, work, dM, 
         if not soft > 0.0:
             free = False
         elif free:
+            if bending.kinks[i] and beta == 0.0:
+                soft = soft_at_kink(soft, a_before, a)
             diagonal, lower = soft + a_before + a, -a_before
             rhs = scale(1.0 - beta, theta)
             if torque != 0.0:  # it turns chords as well

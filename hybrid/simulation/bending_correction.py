@@ -26,7 +26,12 @@ def corrector_for(model: Model) -> Corrector:
     """What follows the error of a model's line; its lengths must be the true ones."""
     line = model.line
     ki, floor = full_bending(model.cable, line.s, np.diff(line.s), model.tension_scale)
-    return Corrector(line, ki, floor, np.array(model.cable.held_tangent), model.length, model.tension_scale)
+    held = np.array(model.cable.held_tangent)
+    kinks = np.zeros(line.s.size, np.int8)
+    kinks[[0, -1]] = held
+    for s in model.attached:
+        kinks[int(np.abs(line.s - s).argmin())] = 1
+    return Corrector(line, ki, floor, held, model.length, model.tension_scale, kinks)
 
 
 class Correction:

@@ -71,15 +71,21 @@ class Corrector:
     N m inertial, of the rod less that of the line; left: (N+1, 3) N m, what of it nodes lack.
     """
 
-    def __init__(self, line: Line, ki: Floats, floor: Floats, tangent: np.ndarray, length: float, scale: float) -> None:
+    def __init__(
+        self, line: Line, ki: Floats, floor: Floats, tangent: np.ndarray, length: float, scale: float,
+        kinks: np.ndarray | None = None,
+    ) -> None:  # fmt: skip
         """ki: (N+1,) N m, bending stiffness of full elements, EI/hn; floor: (N,) N, least tension that counts;
 
-        tangent: (2,) 1 where an end prescribes one; length: m; scale: tension scale, N.
+        tangent: (2,) 1 where an end prescribes one; length: m; scale: tension scale, N; kinks: (N+1,) 1 where the cable
+        may have one, None: nowhere.
         """
         n = line.h.size
         soft = np.divide(1.0, ki, out=np.zeros(n + 1), where=ki > 0.0)
         self.line, self.ki, self.length, self.scale = line, ki, length, scale
-        self.bending = Bending(soft, np.asarray(tangent, np.int8), floor)
+        self.bending = Bending(
+            soft, np.zeros(n + 1, np.int8) if kinks is None else kinks, np.asarray(tangent, np.int8), floor
+        )
         self.error, self._spare = np.zeros((2, 4, n + 1, 4))
         self.slid, self.moment, self.left = np.zeros((3, n + 1, 3))
         self.x, b = np.zeros((2, n + 1, 5))
