@@ -49,7 +49,7 @@ ONLY = {
     "yaml": ("scene",),
     "typer": ("cli",),
     "rich": ("cli",),
-    "filelock": ("store",),
+    "filelock": ("kernels", "store"),
 }  # fmt: skip
 
 

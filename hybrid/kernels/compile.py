@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import gc
 from collections.abc import Callable
+from contextlib import suppress
 from functools import cached_property
 from pathlib import Path
 from types import FunctionType
 from typing import Any
 
 import numba
+from filelock import FileLock, Timeout
 from numba import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
@@ -47,9 +49,37 @@ class _Kernel(CPUDispatcher):
 class _Entry(_Kernel):
     """Called by another kernel it is compiled as a part of that one; as an entry only when Python calls it."""
 
+    def compile(self, sig: Any) -> Any:
+        """Compile, or load from disk; what another process is compiling is waited for."""
+        try:
+            held = self._lock.acquire()
+        except OSError:  # a file system without locks: at worst both compile it
+            return super().compile(sig)
+        with held:
+            return super().compile(sig)
+
+    def compile_unless_busy(self, *args: Any) -> None:
+        """Compile for arguments of the types of these, unless another process is doing it."""
+        with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
+            self.compile(tuple(numba.typeof(x) for x in args))
+
+    @cached_property
+    def _lock(self) -> FileLock:
+        return FileLock(
+            Path(str(self.stats.cache_path)) / f"{self.py_func.__module__}.{self.py_func.__qualname__}.lock"
+        )
+
     @cached_property
     def part(self) -> Any:
         return _for_kernels(self.py_func)
+
+    def address(self, *args: Any) -> int:
+        """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
+        sig = tuple(numba.typeof(x) for x in args)
+        self.compile(sig)
+        made: Any = self.overloads[sig]
+        found: int = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+        return found
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         return self.part.get_call_template(args, kws)

@@ -15,7 +15,7 @@ from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
@@ -180,12 +180,12 @@ def note_element(line, books, i, t):
 
 
 @inner
-def first_strains(plane, space, line, ends, state, books):
+def first_strains(line, ends, state, books):
     """Strains of a state that no step has led to."""
-    if space is not None:
-        sharpest_in_space(line, ends, state.e, state.T, state.a1, books.strains)
-    if plane is not None:
+    if line.bits & PLANAR:
         sharpest_in_plane(line, ends, state.e, state.T, state.a1, books.strains)
+    else:
+        sharpest_in_space(line, ends, state.e, state.T, state.a1, books.strains)
 
 
 @kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation

@@ -82,6 +82,23 @@ for each in (blank_line(1), no_sea(1), no_ends(), no_moves(), blank_state(1), no
     by_reference(each)
 
 
+def caller(returned: Any) -> Any:
+    """A function for kernels, call(address, table) -> what the kernel at that address returns; returned: an example."""
+    result = typeof(returned)
+
+    @intrinsic
+    def call(typingctx: Any, address: Any, table: Any) -> Any:
+        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+            kinds = signature.args[1:]
+            code = context.call_conv.get_function_type(signature.return_type, kinds).as_pointer()
+            called = builder.inttoptr(args[0], code)
+            return context.call_conv.call_function(builder, called, signature.return_type, kinds, args[1:])[1]
+
+        return result(types.int64, table), generate
+
+    return call
+
+
 @register_model(Reference)
 class _Model(models.PrimitiveModel):
     def __init__(self, manager: Any, kind: Any) -> None:

@@ -1,7 +1,8 @@
-"""The one compiled entry to all that needs the march: many steps in a call, a static solve, block rows.
+"""The compiled entries to all that needs the march (a step, a static solve, block rows), and to runs of many steps.
 
-One kernel for each kind of line, so that neither is compiled for a scene that does not have it.  Both get a table of
-addresses (kernels.binding); kernels.entry and solve.stepper have their faces for Python.
+One kernel for each kind of line, so that neither is compiled for a scene that does not have it.  A run calls it by its
+address: what stands around the solver is compiled once for both kinds, and beside them (simulation.first_use).  All get
+a table of addresses (kernels.binding); kernels.entry and solve.run have their faces for Python.
 
 A run goes through phases, BEGIN_STEP - TRY - JUDGE - SAMPLE - END_STEP, and returns where Python has to decide; called
 again it goes on with the phase that follows, as if it had not returned.
@@ -63,9 +64,9 @@ from hybrid.kernels.books import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.extremes import first_strains, note_extremes
-from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
+from hybrid.kernels.newton import RUN, STEP, Limits, Task, solve
 from hybrid.kernels.powers import find_powers
-from hybrid.kernels.references import reader
+from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
 from hybrid.kernels.state import (
@@ -100,6 +101,7 @@ class Job(NamedTuple):
     now: Floats  # (N+1, 4) and after it
     work: Work
     books: Books
+    solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
 
 
 def blank_books(cells: int = 1, rows: int = 1) -> Books:
@@ -151,18 +153,18 @@ def conclude(line, sea, ends, old, new, books, work, pushed):
 
 
 @inner
-def between_steps(plane, space, job, old, new):
+def between_steps(job, old, new):
     """The phases before a try; `new` is the state now.  -1 when one is to be made, else what to return."""
     clock, count = job.books.clock, job.books.counts
     if count[PHASE] == START:
         find_powers(job.line, job.ends, job.books.velocity, new, job.books.report[0], job.books.power[0])
         keep_imposed(job.ends, job.books.imposed)
         if count[NEW_STATE] and job.books.extremes.shape[1] > 0:
-            first_strains(plane, space, job.line, job.ends, new, job.books)
+            first_strains(job.line, job.ends, new, job.books)
             note_extremes(job.line, job.sea, job.ends, new, job.books, clock[NOW])
         count[PHASE] = count[AFTER_START]
     if count[PHASE] == SAMPLE:
-        if not sample_step(plane, space, job.line, job.sea, old, new, job.books):
+        if not sample_step(job.line, job.sea, old, new, job.books):
             return PAUSED
         count[PHASE] = END_STEP
         if count[ASKS] & ASK_SAMPLES:
@@ -188,53 +190,59 @@ def between_steps(plane, space, job, old, new):
 
 
 @inner
-def run(plane, space, job):
-    """Do the task of a job for one kind of line (kernels.configuration); returns as kernels.newton.solve.
+def solve_job(plane, space, job):
+    """Do the task of a job for one kind of line (kernels.configuration); of a run, the step that it tries.
 
-    RUN: steps until a code of kernels.books is returned, with the iterations, the correction and the place of the last
-    try.  The states and pushes of the job take turns: which is now, books.counts[PARITY] tells.
+    Returns as kernels.newton.solve.
     """
-    task, line, sea, ends, moves, work, books = job.task, job.line, job.sea, job.ends, job.moves, job.work, job.books
-    old, new, was, now = job.old, job.new, job.was, job.now
-    clock, count = books.clock, books.counts
-    step, running = task, task.what == RUN
-    while True:
-        if running:
-            old, new, was, now = job.old, job.new, job.was, job.now
-            if count[PARITY]:
-                old, new, was, now = job.new, job.old, job.now, job.was
-            code = between_steps(plane, space, job, new, old)
-            if code >= 0:
-                return code, 0, 0.0, -1
-            if count[PHASE] == SOLVE:
-                end, dt = clock[TRY_END], clock[TRY_END] - clock[NOW]
-                ends_at(end, moves, sea, ends, books.velocity)
-                sea_at(end, sea)
-                clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else dt
-                step = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
-        outcome, it, left, where = OK, 0, 0.0, -1
-        if not running or count[PHASE] == SOLVE:
-            outcome, it, left, where = solve(
-                plane, space, step, line, sea, ends, old, new, was, now, work, books.strains
-            )
-        if not running:
-            return outcome, it, left, where
-        if count[PHASE] == SOLVE:
-            note_try(clock, count, work.report, outcome, it, left, where)
-            count[PHASE] = JUDGE
-            if count[ASKS] & ASK_TRIES:
-                return TRIED, it, left, where
-        code = conclude(line, sea, ends, old, new, books, work, was.shape[0] > 0)
-        if code >= 0:
-            return code, it, left, where
+    task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
+    if task.what == RUN:
+        if job.books.counts[PARITY]:
+            old, new, was, now = job.new, job.old, job.now, job.was
+        dt = clock[TRY_END] - clock[NOW]
+        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
+    return solve(plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains)
 
 
 @kernel
 def in_plane(table):
     job = read(table)
-    return run(job.line.plane, None, job)
+    return solve_job(job.line.plane, None, job)
 
 
 @kernel
 def in_space(table):
-    return run(None, 1, read(table))
+    return solve_job(None, 1, read(table))
+
+
+call_solver = caller((0, 0, 0.0, 0))
+
+
+@kernel
+def run(table):
+    """Steps of a line of either kind until a code of kernels.books is returned.
+
+    The states and pushes of the job take turns: which is now, books.counts[PARITY] tells.
+    """
+    job = read(table)
+    line, sea, ends, moves, books, report = job.line, job.sea, job.ends, job.moves, job.books, job.work.report
+    clock, count = books.clock, books.counts
+    while True:
+        old, new = job.old, job.new
+        if count[PARITY]:
+            old, new = job.new, job.old
+        code = between_steps(job, new, old)
+        if code >= 0:
+            return code
+        if count[PHASE] == SOLVE:
+            ends_at(clock[TRY_END], moves, sea, ends, books.velocity)
+            sea_at(clock[TRY_END], sea)
+            clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
+            outcome, it, left, where = call_solver(job.solver, table)
+            note_try(clock, count, report, outcome, it, left, where)
+            count[PHASE] = JUDGE
+            if count[ASKS] & ASK_TRIES:
+                return TRIED
+        code = conclude(line, sea, ends, old, new, books, job.work, job.was.shape[0] > 0)
+        if code >= 0:
+            return code

@@ -35,6 +35,7 @@ from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import carry_director
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.end_motion import sea_at, turn_by_vector
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import ASSEMBLED, REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, log_rotation, mat_mat, scale, spin_about, sub
@@ -94,18 +95,18 @@ def chord_between(old, new, c, x, dt):
 
 
 @inner
-def director_between(plane, space, old, new, c, x, e):
+def director_between(line, old, new, c, x, e):
     """First director of cell c with the chord e: carried from both ends of the step, and turned by parts."""
-    a = carry_director(plane, space, get3(old.a1, c), get3(old.e, c), e)
-    if space is not None:
-        b = carry_director(plane, space, get3(new.a1, c), get3(new.e, c), e)
-        d, _, _ = chord(e)
-        a = spin_about(a, d, x * math.atan2(dot(cross(a, b), d), dot(a, b)))
-    return a
+    if line.bits & PLANAR:
+        return carry_director(line.plane, None, get3(old.a1, c), get3(old.e, c), e)
+    a = carry_director(None, 1, get3(old.a1, c), get3(old.e, c), e)
+    b = carry_director(None, 1, get3(new.a1, c), get3(new.e, c), e)
+    d, _, _ = chord(e)
+    return spin_about(a, d, x * math.atan2(dot(cross(a, b), d), dot(a, b)))
 
 
 @inner
-def sample_cells(plane, space, line, old, new, x, dt, k, tension, row):
+def sample_cells(line, old, new, x, dt, k, tension, row):
     """Chords, tensions, directors and spins of the cells."""
     n = old.T.shape[0]
     at = HEAD + 9 * (n + 1)
@@ -115,7 +116,7 @@ def sample_cells(plane, space, line, old, new, x, dt, k, tension, row):
             e = chord_between(old, new, c, x, dt)
             T, w = parabola(x, k, tension[1, c], old.T[c], T), (1.0 - x) * old.w[c] + x * w
             if line.spin[c]:
-                a = director_between(plane, space, old, new, c, x, e)
+                a = director_between(line, old, new, c, x, e)
         put3(row, at, c, e)
         row[at + 3 * n + c] = T
         put3(row, at + 4 * n, c, a)
@@ -170,7 +171,7 @@ def sample_head(sea, books, x, dt, k, t, row):
 
 
 @inner
-def sample_step(plane, space, line, sea, old, new, books):
+def sample_step(line, sea, old, new, books):
     """Sample the outputs that fall into the last step; False: the buffer is full before the last of them."""
     clock, count, outputs = books.clock, books.counts, books.outputs
     dt = clock[LAST_DT]
@@ -186,7 +187,7 @@ def sample_step(plane, space, line, sea, old, new, books):
         row, k = books.samples[count[SAMPLES]], clock[EARLIER_DT] / dt if x < 1.0 else 0.0
         sample_head(sea, books, x, dt, k, t, row)
         sample_nodes(old, new, x, dt, row)
-        sample_cells(plane, space, line, old, new, x, dt, k, books.tension, row)
+        sample_cells(line, old, new, x, dt, k, books.tension, row)
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True

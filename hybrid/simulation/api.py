@@ -105,7 +105,7 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
 
         with locked(_path(output)):
             return static_shooting(scene, output, overwrite)
-    compile_beside(scene)
+    compile_beside(scene, static=True)
     case, begin = StaticCase(scene), clock.process_time()
     target, resolution = _target(output, overwrite), first_resolution(scene)
     with locked(_path(output)):

@@ -19,9 +19,10 @@ from hybrid.scene.plane import EXACT, TYPED, plane_of
 from hybrid.scene.read import validate_scene
 from hybrid.scene.schema import Scene
 
-# What each process compiles, by the kernel that stands for it: the last that it compiles.
+# What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.in_plane", "run.in_space")
 OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_rules._plan", "bending_error.advance_error"
+STEPS = "run.run"  # around the solver of either kind
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
 # A cable for the second process to compile with; nothing is computed of it.
@@ -38,7 +39,7 @@ def kernels_of(scene: Scene, static: bool = False) -> list[str]:
     Whether it is computed in a plane follows from the scene; rarely its first shape leaves the plane.
     static: those of its equilibrium, whose stability is judged where there are rods and no end moments.
     """
-    beside = _beside_solver(scene)
+    beside = _beside_solver(scene, static)
     tables = scene.environment, scene.cable, scene.ends, scene.initial
     leaves = plane_of(*tables, TYPED if scene.dimension == 2 else EXACT)[1]
     in_space = scene.dimension == 3 or scene.solver != "elimination" or bool(leaves)
@@ -55,8 +56,9 @@ def _has_rods(scene: Scene) -> bool:
     return isinstance(scene.model, RodModel) or any(isinstance(zone, RodZone) for zone in zones)
 
 
-def _beside_solver(scene: Scene) -> list[str]:
-    needed = [OUTPUTS]
+def _beside_solver(scene: Scene, static: bool) -> list[str]:
+    """In the order in which they are best compiled beside the solver."""
+    needed = [OUTPUTS] if static or scene.time is None else [STEPS, OUTPUTS]
     if scene.time is not None and scene.model.kind == "adaptive":
         needed.append(ZONES)
     if scene.model.kind == "corrected" or (wants_errors(scene) and scene.model.kind != "rod"):
@@ -64,12 +66,16 @@ def _beside_solver(scene: Scene) -> list[str]:
     return needed
 
 
-def compile_beside(scene: Scene) -> None:
+def compile_beside(scene: Scene, static: bool = False) -> None:
     """Let a second process compile what a scene calls besides the solver, which this one compiles meanwhile.
 
-    Does nothing where all is compiled, or where there is one core.
+    Each waits for what the other is compiling (kernels.compile).  Does nothing where all is compiled, or where there is
+    one core.  static: for its equilibrium alone.
     """
-    missing = [name for name in _beside_solver(scene) if not is_warm([name])]
+    needed = _beside_solver(scene, static)
+    if MODEL_ERROR in needed:  # a line in a plane needs both solvers
+        needed.insert(needed.index(OUTPUTS) + 1, SOLVER[1])
+    missing = [name for name in needed if not is_warm([name])]
     frozen = getattr(sys, "frozen", False)  # an application made by PyInstaller would start itself again
     if missing and (os.cpu_count() or 1) > 1 and sys.executable and not frozen:
         command = command_to_compile(missing)
@@ -89,11 +95,18 @@ def command_to_compile(names: Sequence[str]) -> list[str]:
 
 
 def compile_all(names: Sequence[str]) -> None:
-    """Compile kernels other than the solver, in this process."""
+    """Compile kernels in this process, but for what another one is compiling."""
+    from hybrid.kernels.run import in_space, run
+
+    table = np.zeros(0, np.int64)  # of which only the type counts
+    if STEPS in names:
+        run.compile_unless_busy(table)
     scene = validate_scene(SAMPLE)
     model = build(scene)
     if OUTPUTS in names:
         _compile_outputs(model)
+    if SOLVER[1] in names:
+        in_space.compile_unless_busy(table)
     if ZONES in names:
         _compile_zones(scene, model)
     if MODEL_ERROR in names:

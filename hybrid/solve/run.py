@@ -19,7 +19,7 @@ from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
-from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space
+from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Moves, Sea, State, Work
 
 # Steps and samples that a call may take before Python writes them down.
@@ -53,7 +53,6 @@ class CompiledRun:
         self.clock[b.LEAST_PEAK] = np.inf
         self.states: tuple[State, State]
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
-        self._kernel = in_space
 
     # --- what is computed ---------------------------------------------------------------------------
 
@@ -92,7 +91,7 @@ class CompiledRun:
         if self.count[b.PARITY]:
             self.pushes, self.count[b.PARITY] = self.pushes[::-1], 0
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
-        self._kernel = in_plane if line.bits & PLANAR else in_space
+        self._solver, self._address = in_plane if line.bits & PLANAR else in_space, 0
         self.quota = max(1, min(ROWS, CELL_STEPS // cells))
         self.count[b.QUOTA] = self.quota
         old, new = self.states
@@ -125,7 +124,10 @@ class CompiledRun:
 
     def go(self) -> int:
         """Go on until a code of kernels.books."""
-        code: int = self._kernel(self.table.numbers)[0]
+        if not self._address:  # compiled now, where it is needed, if it has not been
+            self._address = self._solver.address(self.table.numbers)
+            self.table.bind(solver=self._address)
+        code: int = run(self.table.numbers)
         if code in (b.PAUSED, b.AT_STOP):
             self.count[b.QUOTA] = self.quota
         return code
