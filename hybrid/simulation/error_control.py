@@ -22,7 +22,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import COARSER, Errors, Estimate
-from hybrid.simulation.error_statistics import LARGEST, STATISTICS, estimates, statistics_of
+from hybrid.simulation.error_statistics import LARGEST, STATISTICS, estimates, snaps, statistics_of
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
@@ -66,8 +66,8 @@ class ErrorController:
     asked: None asks for an error figure alone.  sample: computes a run to compare with; result: computes the result;
     both raise ComputationError.  beside: computes several of the former at the same time (simulation.beside);
     None: one after the other.  irregular: extremes and standard deviations are judged from the start
-    (simulation.error_statistics); else where values at an instant do not converge.  Its `checkpoint` is in the file of
-    every result, so that what was cut off continues with `proceed`.
+    (simulation.error_statistics); else where a line snaps and values at an instant do not converge.  Its `checkpoint`
+    is in the file of every result, so that what was cut off continues with `proceed`.
     """
 
     asked: RequestedAccuracy | None
@@ -276,8 +276,9 @@ class ErrorController:
         if not (falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES):
             return False
         if not self.irregular:
-            self.irregular = True
-            return True
+            assert self.estimate is not None
+            self.irregular = snaps(self.estimate.run)
+            return self.irregular
         if verdict.statistic != LARGEST or verdict.name not in END_FORCES.values():
             return False
         if self.scattered:

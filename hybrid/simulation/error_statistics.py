@@ -20,6 +20,8 @@ WINDOWS, LEAST = 50, 20
 # Of windows, the means of their largest and of their smallest values.
 LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST = "largest", "deviation", "windows_largest", "windows_smallest"
 STATISTICS = (LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST)
+# Part of its largest force to which an end comes back where a line snaps.
+SLACKENS = 0.1
 # Bounds of the order with which they converge: runs of long steps overshoot snaps, and come back with order 3.
 ORDERS = 1.5, MOST_ORDER
 
@@ -54,6 +56,12 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
         )
         for k, statistic in enumerate(STATISTICS)
     }  # fmt: skip
+
+
+def snaps(run: RunSample) -> bool:
+    """Whether the force at an end, of all steps, comes from little to much: a line that slackens and is pulled taut."""
+    forces = run.forces[:, 1:]
+    return bool(forces.size and (forces.min(axis=0) < SLACKENS * forces.max(axis=0)).any())
 
 
 def _thinned(x: np.ndarray, step: int) -> np.ndarray:
