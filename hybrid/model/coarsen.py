@@ -16,6 +16,7 @@ from hybrid.model.plane import planar
 
 FEWER = 4  # cells that become one
 FEWEST = 80  # cells below which a line is coarse enough
+FOLDED = -1.0 + 1e-6  # cosine of the turn of a chord that is turned right back
 
 
 def coarser(model: Model) -> Model | None:
@@ -71,7 +72,8 @@ def picked(line: Line, state: State, at: np.ndarray) -> State | None:
 def _carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> None:
     """First directors of a state: those (N, 3) of other chords (N, 3), which turn to its chords without spin.
 
-    In a plane they turn about its normal, however far; in space by the smallest rotation.
+    In a plane they turn about its normal, however far; in space they are made normal to chords that turn by less than
+    60 degrees, and turned with the others by the smallest rotation: made normal, one would come out on the other side.
     """
     d, new = (e / np.linalg.norm(e, axis=1)[:, None] for e in (chords, state.e))
     if line.bits & PLANAR:
@@ -79,12 +81,13 @@ def _carry_directors(line: Line, chords: Floats, a: Floats, state: State) -> Non
         x, y = a @ n, np.einsum("ij,ij->i", a, np.cross(n, d))
         state.a1[:] = x[:, None] * n + y[:, None] * np.cross(n, new)
         return
-    between = 1.0 + np.einsum("ij,ij->i", d, new)
-    folded = between < 1e-6  # turned right back: any will do
-    s = np.einsum("ij,ij->i", a, new) / np.where(folded, 1.0, between)
-    a = a - s[:, None] * (d + new)
+    cosine = np.einsum("ij,ij->i", d, new)
+    far = (cosine < 0.5) & (cosine > FOLDED)
+    s = np.einsum("ij,ij->i", a[far], new[far]) / (1.0 + cosine[far])
+    a = a.copy()
+    a[far] -= s[:, None] * (d[far] + new[far])
     a -= np.einsum("ij,ij->i", a, new)[:, None] * new
-    for i in np.flatnonzero(folded):
+    for i in np.flatnonzero((np.linalg.norm(a, axis=1) < 1e-3) | (cosine <= FOLDED)):  # any will do
         a[i] = first_director(new[i])
     state.a1[:] = a / np.linalg.norm(a, axis=1)[:, None]
 
