@@ -75,7 +75,7 @@ class Console:
         if is_warm(kernels_of(scene, static)):
             return False
         self.json("compiling")
-        self.note("compiling the kernels for this machine (first use only, 5 to 90 s) ...")
+        self.note("compiling the kernels for this machine (first use only, 5 to 40 s) ...")
         return True
 
     def show(self, content: Callable[[], Any]) -> None:

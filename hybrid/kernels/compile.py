@@ -145,7 +145,8 @@ def _link(code: Any, module: Any) -> None:
 
     collect(code)
     for called in found:
-        code._reload_init.update(called._reload_init)
+        if hasattr(code, "_reload_init"):  # numba 0.62 has none
+            code._reload_init.update(called._reload_init)
         module.link_in(JITCodeLibrary._get_module_for_linking(called), preserve=True)
 
 

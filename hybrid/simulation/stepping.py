@@ -185,10 +185,10 @@ class Simulation:
                 raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
             self._driven[k] = conditions.drive(k)
             self._loop.run.run.move(conditions.moves())
-        here = self._driven[k].at(self.t)[0]
-        there = here if position is None else _vector(position, "position")
+        there = self._driven[k].at(self.t)[0] if position is None else _vector(position, "position")
         speed, turn = _vector(STILL if velocity is None else velocity, "velocity"), None
-        self._check_plane(end, "position", there - here)
+        if self.scene.dimension == 2:
+            self._check_plane(end, "position", there - self._driven[k].at(self.t)[0])
         if frame is not None:
             now = self._driven[k].at(self.t)[2]
             wanted = np.array(frame, float)
