@@ -166,7 +166,7 @@ class ErrorController:
         for statistic, estimate in self.statistics.items():
             skip = self.scattered if statistic == LARGEST else ()
             found = judge(asked, estimate.errors, self.statistics[LARGEST].run, skip)
-            text = found.text.replace(": error", f", {statistic.replace('_', ', ')}: error")
+            text = found.text.replace(": error", f", {STATISTICS[statistic]}: error")
             verdicts.append(replace(found, text=text, statistic=statistic))
         return max(verdicts, key=lambda found: found.ratio)
 
@@ -226,7 +226,7 @@ class ErrorController:
 
     def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
         """Estimate the errors of extremes and standard deviations, by the outputs that all runs have."""
-        if not self.moves:
+        if not self.moves or not (self.irregular or (self.asked is not None and not self.asked.instant)):
             return
         coarse, rough, coarsest = comparisons
         assert coarse is not None
@@ -239,9 +239,10 @@ class ErrorController:
         try:
             run = self._counted(self.sample(replace(coarser, follow=True)))
             estimate.set_model_errors(run)
-            found = statistics_of(run, self._every)
-            for name, of_statistic in self.statistics.items():
-                of_statistic.set_model_errors(found[name])
+            if self.statistics:
+                found = statistics_of(run, self._every)
+                for name, of_statistic in self.statistics.items():
+                    of_statistic.set_model_errors(found[name])
         except ComputationError as error:
             text = f"the effect of neglected bending is that of a run before: {str(error).splitlines()[0]}"
             self._notes.append(("error uncertain", text))

@@ -17,9 +17,12 @@ from hybrid.simulation.run_sample import END_FORCES, RunSample
 
 # Windows of a run, and the outputs of the result that one has at least.
 WINDOWS, LEAST = 50, 20
-# Of windows, the means of their largest and of their smallest values.
-LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST = "largest", "deviation", "windows_largest", "windows_smallest"
-STATISTICS = (LARGEST, DEVIATION, WINDOWS_LARGEST, WINDOWS_SMALLEST)
+# What is judged, in this order, and what it is called.
+LARGEST = "largest"
+STATISTICS = {
+    LARGEST: "largest value", "deviation": "standard deviation", "windows_largest": "mean of the windows' largest",
+    "windows_smallest": "mean of the windows' smallest",
+}  # fmt: skip
 # Part of its largest force to which an end comes back where a line snaps.
 SLACKENS = 0.1
 # Bounds of the order with which they converge: runs of long steps overshoot snaps, and come back with order 3.
