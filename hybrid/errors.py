@@ -190,8 +190,10 @@ class ComputationError(HybridError):
     """
 
     def __init__(
-        self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None
-    ) -> None:
+        self, outcome: Outcome, t: float | None, s: float | None, detail: str = "", snapshot: Path | None = None,
+        first: str = "",
+    ) -> None:  # fmt: skip
+        """first: to try before the remedy of the outcome."""
         self.outcome, self.t, self.s, self.detail, self.snapshot = outcome, t, s, detail, snapshot
         place = [f"{name} = {x:.6g} {unit}" for name, x, unit in (("t", t, "s"), ("s", s, "m")) if x is not None]
         lines = [f"{outcome.cause} ({', '.join(place)})" if place else outcome.cause]
@@ -202,7 +204,7 @@ class ComputationError(HybridError):
             remedy = (
                 "start from another shape (initial.points, initial.direction), or run the motion with damping to rest"
             )
-        lines.append(f"    try:      {remedy}")
+        lines.append(f"    try:      {first + '; else ' if first else ''}{remedy}")
         if snapshot is not None:
             lines.append(f"    snapshot: {snapshot}")
         super().__init__("\n".join(lines))

@@ -34,7 +34,9 @@ from hybrid.kernels.books import (
     SAMPLE,
     SCALED_JUMP,
     SHORTEST,
+    SLACK_CELL,
     SLACK_LIMIT,
+    SLACK_STEP,
     SLACKENED,
     STEPS,
     STIFF,
@@ -45,6 +47,7 @@ from hybrid.kernels.books import (
     TWIST_LIMIT,
     UNTIL,
     WASTED,
+    WAVE_STEP,
     WHERE,
 )
 from hybrid.kernels.compile import inner
@@ -88,10 +91,12 @@ def judge(clock, count, report, dt):
     if count[OUTCOME] == OK:
         if not count[CONTROLLED] or passes(clock, count, dt, report[LOCAL_ERROR]):
             return 1
-    elif count[OUTCOME] == SLACK or 0.5 * clock[TRIED_DT] < clock[SHORTEST]:
-        # A slack catenary is no matter of the step: its answer would be grid noise at any length.
+    elif 0.5 * clock[TRIED_DT] < clock[SHORTEST] or (count[OUTCOME] == SLACK and dt <= clock[WAVE_STEP]):
+        # A catenary that is slack in a step that follows its waves is no matter of the step.
         return -1
     else:
+        if count[OUTCOME] == SLACK:
+            clock[SLACK_STEP], count[SLACK_CELL] = dt, count[WHERE]
         halve(clock, count, dt)
     count[WASTED] += count[TRIES]
     count[REPEATS] += 1

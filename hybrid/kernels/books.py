@@ -44,9 +44,12 @@ from hybrid.kernels.state import Floats
     MOST_TURN,  # rad, through which an end may turn in a step
     CUT_ANGLE, CUT_STEP,  # rad, s: of the last step that was cut because an end turned further; 0: none was
     MUTE_CUTS,  # 1 when an event has told of that
+    WAVE_STEP,  # in which tension waves pass a cell: a longer step that leaves a catenary slack is repeated shorter
+    SLACK_STEP,  # of the last step that was; 0: none was
+    MUTE_SLACK,  # 1 when an event has told of that
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
-) = range(35)  # fmt: skip
-CLOCK_SIZE = 35
+) = range(38)  # fmt: skip
+CLOCK_SIZE = 38
 
 # --- count -----------------------------------------------------------------------------------------
 
@@ -69,8 +72,9 @@ CLOCK_SIZE = 35
     QUOTA,  # steps until the call returns
     MEASURED,  # steps of which `worst` knows
     NEW_STATE,  # 1 where the state of a START counts among the extremes
-) = range(24)  # fmt: skip
-COUNT_SIZE = 24
+    SLACK_CELL,  # of the step of SLACK_STEP
+) = range(25)  # fmt: skip
+COUNT_SIZE = 25
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -79,7 +83,7 @@ ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
 # looked at; its outputs to be looked at; a step that fails however small.
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
 # Bits of FLAGS.
-STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT = 1, 2, 4, 8, 16, 32, 64
+STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
 
 # --- powers and work --------------------------------------------------------------------------------
 

@@ -35,6 +35,7 @@ from hybrid.kernels.books import (
     LAST_DT,
     LOG,
     MUTE_CUTS,
+    MUTE_SLACK,
     NEW_STATE,
     NOW,
     PARITY,
@@ -46,11 +47,13 @@ from hybrid.kernels.books import (
     ROWS,
     SAMPLE,
     SAMPLED,
+    SLACK_STEP,
     SOLVE,
     START,
     STEP_BEFORE,
     STEPPED,
     STEPS_CUT,
+    STEPS_SLACK,
     STOP,
     TRIED,
     TRY,
@@ -145,6 +148,8 @@ def conclude(line, sea, ends, old, new, books, work, pushed):
             count[FLAGS] |= watch_push(clock, work.report)
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
             count[FLAGS] |= STEPS_CUT
+        if clock[SLACK_STEP] > 0.0 and clock[MUTE_SLACK] == 0.0:
+            count[FLAGS] |= STEPS_SLACK
         if books.extremes.shape[1] > 0:
             note_extremes(line, sea, ends, new, books, clock[NOW])
         if count[FLAGS] != 0 or count[ASKS] & ASK_STEPS:

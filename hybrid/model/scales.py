@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from hybrid.kernels.state import Line
 from hybrid.model.sections import attached_weights, attachments_at, bending_stiffness, weight
 from hybrid.scene.ends import SHIFTS
 from hybrid.scene.schema import Scene, Section, Straight
@@ -65,3 +66,14 @@ def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fast
     if scale > 0.0:
         return scale
     return mass / length * (length / scene.time.duration) ** 2 if scene.time else 1.0
+
+
+def wave_step(line: Line, scale: float) -> float:
+    """The shortest time, s, in which a wave passes a catenary cell, 0 without catenaries: of tension, or, where a cell
+
+    does not stretch, across the line under the tension `scale`, N.
+    """
+    cells = line.spin == 0
+    mass = 0.5 * (line.mass[:-1] + line.mass[1:] - line.point_mass[:-1] - line.point_mass[1:])
+    soft = np.where(line.ck > 0.0, line.ck, 1.0 / scale)
+    return float(np.sqrt((soft * mass * line.h)[cells].min())) if cells.any() else 0.0

@@ -41,3 +41,15 @@ def steps_cut_text(angle: float, step: float, most: float) -> str:
         f"an end turns by {angle:.3g} rad in a step of {step:.4g} s: this step and others like it are cut, so that it "
         f"turns by at most {most:g} rad in each and no turn is lost; time.step: {0.3 * step / angle:.2g} follows it"
     )
+
+
+def slack_steps_text(tried: float, taken: float, waves: float) -> str:
+    """Text of the event of a catenary that is slack in a step of `tried`, and not in one of `taken`; waves: the time
+
+    in which a wave passes its shortest cell, s.
+    """
+    return (
+        f"a catenary loses its tension here in a step of {tried:.4g} s, and keeps it in one of {taken:.4g} s: the step "
+        f"is too long for waves, which pass a cell in {waves:.2g} s; this step and others like it are "
+        f"cut; time.step: {taken:.2g} follows them"
+    )

@@ -11,18 +11,22 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Outcome
+from hybrid.kernels import books as b
 from hybrid.scene.read import scene_text
 from hybrid.simulation.diagnostics import stretch_text
 from hybrid.simulation.transient import Transient
 from hybrid.solve.run import Tried
+
+# A step in which waves of tension pass so many cells may itself leave a line slack; and by how much shorter one should
+# be that shows whether it does.
+MOST_PASSED, SHORTER = 4.0, 16.0
 
 
 def explanation(run: Transient, tried: Tried, dt: float) -> str:
     """Why a run cannot go on, beside its cause; tried: the last try, over dt (s)."""
     model = run.model
     if tried.outcome == Outcome.SLACK:
-        tension = run.before.T[failed_node(run, tried)]
-        detail = f"the step that starts at this time ends with a tension of {tension:.3g} N"
+        detail = _slack_detail(run, tried, dt)
         if run.switching is not None:
             detail += "; model.force_catenary keeps it from becoming a rod"
     elif tried.outcome == Outcome.GAINS_ENERGY:
@@ -41,6 +45,35 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
         longest = f"the cable does not stretch beyond {model.length:.6g} m"
         detail += f"; the ends are then {apart:.6g} m apart, and {longest}"
     return detail
+
+
+def _slack_detail(run: Transient, tried: Tried, dt: float) -> str:
+    """Over which steps a catenary was slack, and whether they are short enough for the line to be to blame."""
+    tension, waves = run.before.T[failed_node(run, tried)], float(run.run.clock[b.WAVE_STEP])
+    over = f", tried after longer ones from {_planned(run):.3g} s on," if dt < 0.99 * _planned(run) else ""
+    detail = (
+        f"the step of {dt:.3g} s{over} that starts at this time ends with a tension of {tension:.3g} N; a wave "
+        f"passes a cell in {waves:.2g} s"
+    )
+    return detail if _steps_too_long(run) else f"{detail}: the steps are short enough, the line is slack"
+
+
+def _steps_too_long(run: Transient) -> bool:
+    """Whether waves of tension pass many cells in the step that fails, as it was to be: so they did in those before."""
+    return _planned(run) > MOST_PASSED * float(run.run.clock[b.WAVE_STEP])
+
+
+def _planned(run: Transient) -> float:
+    """Length, s, that the step that fails was to have."""
+    return float(run.run.clock[b.UNTIL] - run.run.clock[b.BEGIN])
+
+
+def first_remedy(run: Transient, tried: Tried) -> str:
+    """What to try before the remedy of an outcome; empty: nothing."""
+    if tried.outcome != Outcome.SLACK or not _steps_too_long(run):
+        return ""
+    step = max(_planned(run) / SHORTER, float(run.run.clock[b.WAVE_STEP]))
+    return f"time.step: {step:.2g} from the start, because the steps before may be to blame, not the line"
 
 
 def failed_node(run: Transient, tried: Tried) -> int:

@@ -17,7 +17,7 @@ from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, Stop
-from hybrid.simulation.failure import explanation, failed_node, snapshot
+from hybrid.simulation.failure import explanation, failed_node, first_remedy, snapshot
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
 from hybrid.simulation.transient import StepFailed, Transient
@@ -260,7 +260,7 @@ class TimeLoop:
         s = float(run.model.line.s[failed_node(run, tried)])
         detail = explanation(run, tried, dt)
         left = snapshot(run, self.target, tried, dt) if self.target is not None else None
-        error = ComputationError(tried.outcome, run.t, s, detail, left)
+        error = ComputationError(tried.outcome, run.t, s, detail, left, first_remedy(run, tried))
         self._log()
         if run.t > self.recorder.last:
             self._record_now()
@@ -296,7 +296,10 @@ class TimeLoop:
     def remembered(self) -> dict[str, Any]:
         """What has been noted so far, to be given to `remember`."""
         noted = {name: getattr(self.diagnostics, name) for name in REMEMBERED}
-        return {"diagnostics": noted, "run": {name: getattr(self.run, name) for name in ("turned", "beyond")}}
+        return {
+            "diagnostics": noted,
+            "run": {name: getattr(self.run, name) for name in ("turned", "slackened", "beyond")},
+        }
 
     def remember(self, noted: Mapping[str, Any]) -> None:
         """Forget what has been noted since `remembered`."""

@@ -24,11 +24,12 @@ from hybrid.model.build import Model, build
 from hybrid.model.plan import parts
 from hybrid.model.plane import in_space, planar
 from hybrid.model.resolution import Resolution
+from hybrid.model.scales import wave_step
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marks_of
-from hybrid.simulation.events import EventLog, steps_cut_text
+from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.run import CompiledRun, Tried
@@ -76,7 +77,7 @@ class Transient:
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
-        self.turned = False  # whether an event has told of steps cut by the turn of an end
+        self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
         self._leaves, self._rescues = False, 0
         self.run.books.loaded[:] = model.loaded_ends
@@ -303,6 +304,8 @@ class Transient:
             self._correct(self.correction, end, dt)
         if flags & b.STEPS_CUT:
             self._note_cut()
+        if flags & b.STEPS_SLACK:
+            self._note_slack()
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:
@@ -325,6 +328,13 @@ class Transient:
             text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
             self.events.event(float(clock[b.PREVIOUS]), 0.0, self.model.length, "steps cut", text)
         self.turned, clock[b.MUTE_CUTS] = True, 1.0
+
+    def _note_slack(self) -> None:
+        """A catenary was slack in a step too long for its waves, and is not in shorter ones: an event for the first."""
+        clock, cell = self.run.clock, int(self.run.count[b.SLACK_CELL])
+        text = slack_steps_text(float(clock[b.SLACK_STEP]), float(clock[b.LAST_DT]), float(clock[b.WAVE_STEP]))
+        self._note(cell, "steps cut", text)
+        self.slackened, clock[b.MUTE_SLACK] = True, 1.0
 
     def _correct(self, correction: Correction, end: float, dt: float) -> None:
         """Follow the error of neglecting bending through the step just taken; an event where it cannot be estimated."""
@@ -424,6 +434,7 @@ class Transient:
             self.switching.model = model
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=self.correction is not None)
         first = np.arange(model.line.s.size) if model.layout is None else model.layout.first
+        self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
             self.stepper.limits, state, 1.0 + borne_strain(model), first,

@@ -28,7 +28,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
     parts_: dict[str, Any] = {"ends": model.ends, "zoning": run.switching, "correction": run.correction}
     return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
         "t": run.t, "dt": float(clock[b.LAST_DT]), "steps": run.steps, "iterations": int(count[b.ITERATIONS]),
-        "changes": run.changes, "_turned": run.turned, "_beyond": run.beyond,
+        "changes": run.changes, "_turned": run.turned, "_slackened": run.slackened, "_beyond": run.beyond,
         "leg": [float(clock[b.LEG_BEGIN]), int(count[b.LEG_PART])],
         "_stored": float(clock[b.STORED]),
         "floor": float(clock[b.FLOOR]), "work": books.work[0].copy(), "power": books.power[0].copy(),
@@ -54,14 +54,15 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     free = dict.fromkeys(("mesh", "plane", "envelope"))
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
-    older |= {"envelope": None}
+    older |= {"envelope": None, "_slackened": False}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
     clock[b.LAST_DT], clock[b.STORED], clock[b.FLOOR] = saved["dt"], saved["_stored"], saved["floor"]
     count[b.STEPS], count[b.ITERATIONS] = saved["steps"], saved["iterations"]
-    run.changes, run.beyond, run.turned = saved["changes"], saved["_beyond"], saved["_turned"]
-    clock[b.MUTE_CUTS] = float(run.turned)
+    run.changes, run.beyond = saved["changes"], saved["_beyond"]
+    run.turned, run.slackened = saved["_turned"], saved["_slackened"]
+    clock[b.MUTE_CUTS], clock[b.MUTE_SLACK] = float(run.turned), float(run.slackened)
     clock[b.LEG_BEGIN], count[b.LEG_PART] = saved["leg"] if complete else (saved["t"], 0)
     books.work[0], books.power[0], books.report[:2] = saved["work"], saved["power"], saved["report"]
     books.tension[0] = saved["tension"]

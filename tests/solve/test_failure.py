@@ -48,6 +48,59 @@ def test_a_slack_catenary_stops_the_run(tmp_path):
         assert hybrid.parse_scene(str(snapshot["scene"])) == scene()
 
 
+def heaving(step, heave=2.0, model="catenary", **time):
+    """A tether of 200 m with 10 N at its lower end, whose upper end heaves by so much (m) in 6 s."""
+    section = {"length": 200, "mass": 1.0, "diameter": 0.03, "axial_stiffness": 2e6, "bending_stiffness": 20}
+    water = {"drag": {"normal": 1.2, "tangential": 0.01}, "added_mass": {"normal": 1.0}}
+    motion = {"heave": {"amplitude": heave, "period": 6.0}, "ramp": 6.0}
+    return {
+        "cable": {"sections": [section | water]},
+        "environment": {"fluid": {"density": 1025}},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0], "motion": motion},
+            "end": {"kind": "free", "force": [0, 0, -10]},
+        },
+        "initial": "equilibrium",
+        "model": model,
+        "mesh": {"cells": 40},
+        "time": {"duration": 12.0, "step": step} | time,
+    }
+
+
+def test_a_step_too_long_for_waves_is_cut():
+    """In steps of 0.2 s the tether would be slack; it keeps 5.8 N as a rod in short ones."""
+    fine = hybrid.run(heaving(0.005, model="rod"))
+    result = hybrid.run(heaving(0.2))
+    cut = [e for e in result.events if e.kind == "steps cut"]
+    assert len(cut) == 1 and 8.0 < cut[0].t < 8.5
+    assert "0.2 s" in cut[0].text and "time.step: 0.1 " in cut[0].text
+    assert 60 < len(result["steps/t"]) < 80  # few steps are cut
+    lowest = float(fine.envelope["tension_min"].min())
+    assert lowest == pytest.approx(5.85, abs=0.1)
+    assert float(result.envelope["tension_min"].min()) > 0.0
+
+
+@pytest.mark.parametrize(("step", "blamed"), [(0.05, True), (0.005, False), (0.002, False)])
+def test_small_steps_are_tried_before_the_line_is_blamed(step, blamed):
+    """It is slack in steps of any length: shorter ones are tried first, and the message says when that proves it."""
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(heaving(step, heave=3.0))
+    error = stop.value
+    assert error.outcome is hybrid.Outcome.SLACK and error.t == pytest.approx(2.76, abs=0.02)
+    assert ("the line is slack" in error.detail) is not blamed
+    assert ("time.step: 0.0031 from the start" in str(error)) is blamed
+    assert ("tried after longer ones" in error.detail) is (step > 0.0031)
+    assert "rod zone" in str(error) and "passes a cell in 0.0031 s" in error.detail
+
+
+def test_controlled_steps_are_cut_as_well():
+    """The first that leaves the line slack is repeated; the line is slack in the end."""
+    with pytest.raises(hybrid.ComputationError) as stop:
+        hybrid.run(heaving(None, heave=3.0, tolerance=1.0))
+    assert stop.value.outcome is hybrid.Outcome.SLACK
+    assert "tried after longer ones" in stop.value.detail
+
+
 def test_slack_can_be_asked_to_warn():
     result = hybrid.run(scene({"kind": "catenary", "slack": "warn"}, time={"duration": 0.8, "step": 0.01}))
     assert "slack" in {e.kind for e in result.events}
