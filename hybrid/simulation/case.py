@@ -36,7 +36,7 @@ from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, 
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
 from hybrid.simulation.result_checks import damped_vibrations
-from hybrid.simulation.result_file import STEP_FIELDS, result_recorder
+from hybrid.simulation.result_file import STEP_FIELDS, mesh_fields, result_recorder
 from hybrid.simulation.run_sample import (
     COMPARED,
     MODEL_ERRORS,
@@ -154,7 +154,7 @@ class Case:
             assert loop.run.envelope is not None
             loop.recorder = recorder = Recorder.again(
                 file, target, loop.observer.fields, STEP_FIELDS, point, self._texts, before or {},
-                loop.run.envelope.fixed(),
+                [*loop.run.envelope.fixed(), *mesh_fields(model)],
             )  # fmt: skip
         recorder.files = self._files
         with recorder:

@@ -58,7 +58,7 @@ def result_recorder(
     }  # fmt: skip
     if found is not None:
         attributes |= {"static_path": found.summary, "static_residual": found.residual}
-    fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed()]
+    fixed = [*_surroundings(model), *_limits(scene, observer), *envelope.fixed(), *mesh_fields(model)]
     if scene.output.history:
         points = np.array(scene.output.history)
         fixed.append(
@@ -132,6 +132,19 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
             name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
             out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))
     return out
+
+
+def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
+    """All nodes that the mesh may have, and which are there in rods alone: with the zones, the mesh of any time."""
+    nodes, always = model.line.s, np.ones(model.line.s.size, np.int64)
+    if model.layout is not None:
+        nodes = model.layout._replace(rod=np.ones_like(model.layout.rod)).nodes
+        always = np.isin(nodes, model.layout.base).astype(np.int64)
+    text = "1 where the node is always there, 0 where only while it lies in a rod zone"
+    return [
+        (Field("mesh/s", "m", "arc lengths of all nodes that there may be", nodes.shape, ("mesh/s",)), nodes),
+        (Field("mesh/always", "", text, nodes.shape, ("mesh/s",), dtype="int64"), always),
+    ]
 
 
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:

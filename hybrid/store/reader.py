@@ -15,6 +15,7 @@ Layout, format 1 (`record` writes it)::
     /events/{criterion,value,threshold,energy}
     /envelope/{s,<field>_min,<field>_max,<field>_t_min,<field>_t_max,begin,end}
                                     extremes of all accepted steps from begin to end, over nodes (`envelope`)
+    /mesh/{s,always}                nodes that there may be, and whether they are there outside of rod zones as well
     /scene                          the scene, as YAML text
     /changes                        scenes that held from some time on, as JSON; only where there are any
     /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
@@ -42,7 +43,7 @@ from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
-from hybrid.store.records import Attributes, Columns, Event, UnknownName, Zone, ZoneHistory, joined
+from hybrid.store.records import Attributes, Columns, Event, MeshHistory, UnknownName, Zone, ZoneHistory, joined
 
 if TYPE_CHECKING:
     import xarray
@@ -285,6 +286,11 @@ class Result:
             e._replace(kind=OLD_EVENTS.get(e.kind, e.kind), criterion=OLD_EVENTS.get(e.criterion, e.criterion))
             for e in events
         ]
+
+    @property
+    def mesh(self) -> MeshHistory:
+        """`mesh[i]`: the cells at output i, their nodes s (N+1,) m and kinds (N,); fields are on the output grid."""
+        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones)
 
     @property
     def scene_text(self) -> str:

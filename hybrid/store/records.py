@@ -25,6 +25,18 @@ class Zone(NamedTuple):
         return f"{self.kind} {self.s_a:.6g}-{self.s_b:.6g} m"
 
 
+class Mesh(NamedTuple):
+    """Cells of the cable: nodes s (N+1,) m, unstretched, and kinds (N,) of the cells between them, as of zones."""
+
+    s: np.ndarray
+    kinds: np.ndarray
+
+    def __repr__(self) -> str:
+        count = ", ".join(f"{n} {kind}" for kind, n in zip(*np.unique(self.kinds, return_counts=True), strict=True))
+        h = np.diff(self.s)
+        return f"<mesh of {h.size} cells of {h.min():.4g} to {h.max():.4g} m: {count}>"
+
+
 class Event(NamedTuple):
     """Something that happened at time t (s) on s_a <= s <= s_b (m), and why.
 
@@ -109,6 +121,27 @@ class ZoneHistory(Sequence[list[Zone]]):
     def __repr__(self) -> str:
         sets = [f"from output {i}: {joined(list(map(str, z)))}" for i, z in zip(self._first, self._sets, strict=True)]
         return f"<zones at {self._count} outputs; {joined(sets, '; ')}>"
+
+
+class MeshHistory(Sequence[Mesh]):
+    """`mesh[i]`: the cells at output i, in the order of s."""
+
+    def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory) -> None:
+        """s, always: (K,) nodes that there may be, m, and whether they are there outside of rods as well."""
+        self._s, self._always, self._zones = s, always.astype(bool), zones
+
+    def __len__(self) -> int:
+        return len(self._zones)
+
+    def __getitem__(self, i: Any) -> Any:
+        if isinstance(i, slice):
+            return [self[k] for k in range(*i.indices(len(self)))]
+        zones, s = self._zones[i], self._s
+        bounds = np.array([zone.s_b for zone in zones[:-1]])
+        names = np.array([zone.kind for zone in zones])
+        rod = names[np.searchsorted(bounds, s)] == "rod"  # of a bound, the zone before it
+        nodes = s[self._always | rod]
+        return Mesh(nodes, names[np.searchsorted(bounds, 0.5 * (nodes[1:] + nodes[:-1]))])
 
 
 def joined(texts: list[str], by: str = ", ") -> str:
