@@ -170,12 +170,12 @@ class Case:
         """Whether a file holds a run of this case, with this resolution, that was cut off."""
         if not is_result(source):
             return False
-        with open_result(source) as result:
-            if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
-                return False
-            if not np.array_equal(result["s"], self.points.s):
-                return False
         try:
+            with open_result(source) as result:
+                if {"scene": result.scene_text, "changes": result.changes_text} != self._texts:
+                    return False
+                if not np.array_equal(result["s"], self.points.s):
+                    return False
             with opened(source) as file:
                 point = read_checkpoint(file)
         except ResultError:

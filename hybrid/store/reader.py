@@ -36,14 +36,24 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5o
+from h5py import h5a, h5d, h5ds, h5g, h5o
 
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
-from hybrid.store.records import Attributes, Columns, Event, MeshHistory, UnknownName, Zone, ZoneHistory, joined
+from hybrid.store.records import (
+    Attributes,
+    Columns,
+    Event,
+    Looked,
+    MeshHistory,
+    UnknownName,
+    Zone,
+    ZoneHistory,
+    joined,
+)
 
 if TYPE_CHECKING:
     import xarray
@@ -75,32 +85,30 @@ class Result:
 
     def _scan(self) -> None:
         self._cache: dict[str, np.ndarray] = {}
-        self._dims: dict[str, tuple[str, ...]] = {}
         self._stored: dict[str, str] = {}  # names in the file, where another version wrote it
-        self.units: dict[str, str] = {}
+        data: dict[str, Any] = {}
         groups: set[str] = set()
 
-        def visit(path: bytes, info: Any) -> None:  # HDF5's own interface: objects of h5py take four times as long
+        def visit(path: bytes) -> None:  # HDF5's own interface: objects of h5py take four times as long
             name = path.decode()
-            if name.split("/")[0] in HIDDEN:
+            if name.split("/")[0] in HIDDEN or name in TEXTS:
                 return
-            if info.type == h5o.TYPE_DATASET and name not in TEXTS:
+            found = h5o.open(self._file.id, path)
+            if isinstance(found, h5d.DatasetID):
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
                     name = OLD_NAMES[name]
-                data = h5d.open(self._file.id, path)
-                self._dims[name] = tuple(plain_text(h5ds.get_label(data, k)) for k in range(data.rank))
-                self.units[name] = _units(data)
-            elif info.type == h5o.TYPE_GROUP:
+                data[name] = found
+            elif isinstance(found, h5g.GroupID):
                 groups.add(name)
 
-        h5o.visit(self._file.id, visit, info=True)
-        self.names = tuple(self._dims)
-        self.units |= {alias: self.units[name] for alias, name in ALIASES.items() if name in self.units}
+        self._file.id.links.visit(visit)
+        self.names = tuple(data)
+        self._dims, self.units = Looked(data, _dims), Looked(data, _units, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
-        scales = sorted((n for n, dims in self._dims.items() if dims == (n,)), key=lambda n: n != "t")
-        self._rows = {n: self._dataset(n).shape[0] for n in scales}
+        scales = [n for n, each in data.items() if h5ds.is_scale(each) and self._dims[n] == (n,)]
+        self._rows = {n: self._dataset(n).shape[0] for n in sorted(scales, key=lambda n: n != "t")}
         self._groups = sorted(groups)
         self.attributes: dict[str, Any] = Attributes(
             {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._file.attrs.items()}
@@ -154,7 +162,7 @@ class Result:
         if name not in self._cache:
             if not self._file:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
-            dims = self._dims[name]
+            dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
             with readable(self._source):
                 data = self._dataset(name)
                 array = data[: self._rows[dims[0]]] if dims and dims[0] in self._rows else data[()]
@@ -383,6 +391,11 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
 def _current(name: str) -> str:
     """The name a dataset has now, from an alias or from the name an older version gave it."""
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
+
+
+def _dims(data: Any) -> tuple[str, ...]:
+    """Names of the dimensions of a dataset of HDF5's own interface."""
+    return tuple(plain_text(h5ds.get_label(data, k)) for k in range(data.rank))
 
 
 def _units(data: Any) -> str:

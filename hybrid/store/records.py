@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -66,6 +66,35 @@ class Attributes(dict[str, Any]):
         if name in OLD_ATTRIBUTES:
             return self[OLD_ATTRIBUTES[name]]
         raise KeyError(name)
+
+
+class Looked(Mapping[str, Any]):
+    """What datasets say of themselves, by name; each is looked up when it is asked for, once, while the file is open."""
+
+    def __init__(
+        self, data: Mapping[str, Any], look: Callable[[Any], Any], aliases: Mapping[str, str] | None = None
+    ) -> None:
+        """data: by name, of HDF5's own interface; aliases: other names of some of them."""
+        self._data, self._look, self._found = data, look, dict[str, Any]()
+        self._aliases = {alias: name for alias, name in (aliases or {}).items() if name in data}
+
+    def __getitem__(self, name: str) -> Any:
+        name = self._aliases.get(name, name)
+        if name not in self._found:
+            data = self._data[name]
+            if not data.valid:
+                raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
+            self._found[name] = self._look(data)
+        return self._found[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._data or name in self._aliases
+
+    def __iter__(self) -> Iterator[str]:
+        yield from (*self._data, *self._aliases)
+
+    def __len__(self) -> int:
+        return len(self._data) + len(self._aliases)
 
 
 class Columns(Mapping[str, np.ndarray]):
