@@ -18,8 +18,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.block_elimination import solve_again
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO, STEP_BEFORE, UNKNOWN_ERROR
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
@@ -31,19 +33,28 @@ from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+from hybrid.kernels.zone_criteria import end_turn
+
+# Torque of the whole line as far as its rods do not carry it: N m, given; rad/(N m), by which it follows from the turn of
+# the ends against each other, infinite where it does not; rad, that turn without torque; rad, that turn, counted on.
+GIVEN, COMPLIANCE, FREE_TURN, TURN = range(4)
+# What is found: which of two errors is now; nodes clipped in the last step; the node that was furthest in it; whether
+# the error was finite.
+CURRENT, CLIPPED, FURTHEST, FINITE = range(4)
 
 
-class Step(NamedTuple):
-    """The step whose error is sought."""
-
-    u: Floats  # (N+1, 3) m, displacement of the nodes in it
-    numbers: Floats  # (4,) length, s, 0 for an equilibrium; that of the step before it; spectral radius at infinity of
-    # the time scheme; torque, N m, of the whole line as far as its rods do not carry it
+def sampled_size(cells: int) -> int:
+    """Numbers of what an output takes of the error: position and velocity with the spins (2, N+1, 4), tension (N),
+    moments (N+1, 3), and what of it the two nodes at either end lack (4, 3)."""
+    return 12 * cells + 23
 
 
 class ErrorArrays(NamedTuple):
     """What `advance_error` writes beside the error of the nodes."""
 
+    found: NDArray[np.int64]  # (4,) as named above
+    torque: Floats  # (4,) likewise
+    sampled: Floats  # (2, sampled_size(N)) after the step and before it
     slid: Floats  # (N+1, 3) m, error of friction's travel, before and after
     x: Floats  # (N+1, 5)
     dM: Floats  # (N+1, 3) N m
@@ -247,59 +258,75 @@ class ErrorJob(NamedTuple):
     sea: Sea
     ends: Ends
     bending: Bending
-    state: State  # after the step
-    step: Step
+    even: State  # two states that take turns: the one after the step if counts[PARITY] is even
+    odd: State  # else
+    u: Floats  # (N+1, 3) m, displacement of the nodes in the step
+    clock: Floats  # of the run (kernels.books); the last step is 0 s long for an equilibrium
+    counts: NDArray[np.int64]
     X: Floats  # of the march whose matrix was factored last
     W: Floats
-    old: Floats  # (4, N+1, 4) error of r, v, a, vd before the step
-    new: Floats  # and after it
+    errors: Floats  # (2, 4, N+1, 4) error of r, v, a, vd, which take turns
     most: float  # m, beyond which an error is no longer one: it is clipped
     arrays: ErrorArrays
 
 
 def blank_error_job() -> ErrorJob:
     """A job with the types that every one has."""
-    z, node = np.zeros, np.zeros((2, 3))
-    arrays = ErrorArrays(node, z((2, 5)), node, node, z((1, 5)), z((1, 5)), z((2, 5)), z((4, 2, 4)), z(REPORT_SIZE))
-    bending, step = Bending(z(2), z(2, np.int8), z(2, np.int8), z(1)), Step(node, z(4))
-    error = z((4, 2, 4))
+    state, bending = blank_state(1), Bending(np.zeros(2), np.zeros(2, np.int8), np.zeros(2, np.int8), np.zeros(1))
+    clock, counts, none = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros(1)
     return ErrorJob(
-        blank_line(1), no_sea(1), no_ends(), bending, blank_state(1), step, z(1), z(1), error, error, 1.0, arrays
+        blank_line(1), no_sea(1), no_ends(), bending, state, state, np.zeros((2, 3)), clock, counts, none, none,
+        np.zeros((2, 4, 2, 4)), 1.0, error_arrays(1),
+    )  # fmt: skip
+
+
+def error_arrays(cells: int) -> ErrorArrays:
+    """Those of a line of so many cells that has no error and carries no torque."""
+    z, n = np.zeros, cells + 1
+    return ErrorArrays(
+        np.array([0, 0, -1, 1]), np.array([0.0, np.inf, 0.0, 0.0]), z((2, sampled_size(cells))), z((n, 3)), z((n, 5)),
+        z((n, 3)), z((n, 3)), z((cells, 5)), z((cells, 5)), z((n, 5)), z((4, n, 4)), z(REPORT_SIZE),
     )  # fmt: skip
 
 
 read = reader(blank_error_job())
 
 
-@kernel
-def advance_error(table):
-    """The error at the end of a step from that before it; table: of an ErrorJob (kernels.binding).
+@inner
+def whole_torque(torque, ends, e):
+    """Torque of the whole line as far as its rods do not carry it, N m; a turn of the ends is counted on."""
+    if not torque[COMPLIANCE] < math.inf:
+        return torque[GIVEN]
+    turn = end_turn(e, ends.frame) - torque[TURN] + math.pi
+    torque[TURN] += turn - 2.0 * math.pi * math.floor(turn / (2.0 * math.pi)) - math.pi
+    return (torque[TURN] - torque[FREE_TURN]) / torque[COMPLIANCE]
 
-    Returns whether it is finite, how many nodes were clipped, and the node that was furthest.
-    """
-    job = read(table)
-    line, sea, ends, bending, state, step = job.line, job.sea, job.ends, job.bending, job.state, job.step
-    old, new, most, arrays = job.old, job.new, job.most, job.arrays
-    n, work = state.e.shape[0], arrays.work
-    dt, dt_before, rho, torque = step.numbers[0], step.numbers[1], step.numbers[2], step.numbers[3]
-    chords, x, dM, M = arrays.chords, arrays.x, arrays.dM, arrays.M
+
+@inner
+def solve_error(job, state, old, history, s, moving):
+    """Solve for the unknowns `x` of the error; whether they are finite."""
+    line, ends, bending, arrays = job.line, job.ends, job.bending, job.arrays
+    chords, dM, M, work = arrays.chords, arrays.dM, arrays.M, arrays.work
+    torque = whole_torque(arrays.torque, ends, state.e)
     tabulate_chords(state.e, chords)
     neglected_moments(line, ends, bending, chords, chords, state.T, 0.0, work[0], dM, M)
     if torque != 0.0:
         turn_chords(chords, state.T, bending.floor, dM, arrays.turned)
         neglected_moments(line, ends, bending, chords, arrays.turned, state.T, torque, work[0], dM, M)
-    moving = dt > 0.0
-    s = scheme(rho, dt_before, dt) if moving else Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
-    history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     if moving:
         predict_error(old, s, history)
-    right_hand_side(line, sea, ends, chords, state, step.u, M, moving, history, arrays.b)
-    if not solve_again(job.X, job.W, arrays.b, x):
-        return False, 0, -1
+    right_hand_side(line, job.sea, ends, chords, state, job.u, M, moving, history, arrays.b)
+    return solve_again(job.X, job.W, arrays.b, arrays.x)
+
+
+@inner
+def put_error(job, old, new, history, s, dt, moving):
+    """The error `new` after the step from its unknowns; how many nodes were clipped, and the node that was furthest."""
+    arrays, x = job.arrays, job.arrays.x
     clipped, where, far = 0, -1, 0.0
-    for i in range(n + 1):
-        size, part = shortened(x, i, most)
-        if size > most:
+    for i in range(x.shape[0]):
+        size, part = shortened(x, i, job.most)
+        if size > job.most:
             clipped += 1
         if size > far:
             far, where = size, i
@@ -313,6 +340,66 @@ def advance_error(table):
                 new[3, i, k] = part * (s.ca * xi + history.z[i, k])
             else:
                 new[1, i, k], new[2, i, k], new[3, i, k] = 0.0, 0.0, 0.0
-        if moving and line.bits & FRICTION:
-            carry_travel(sea, arrays.slid, history.travel, old, new, i)
-    return True, clipped, where
+        if moving and job.line.bits & FRICTION:
+            carry_travel(job.sea, arrays.slid, history.travel, old, new, i)
+    return clipped, where
+
+
+@inner
+def put_sampled(error, arrays):
+    """What an output takes of the error now, and what it would have taken before."""
+    row, before, n, at = arrays.sampled[0], arrays.sampled[1], error.shape[1], 0
+    for j in range(row.shape[0]):
+        before[j] = row[j]
+    for m in range(2):
+        for i in range(n):
+            for k in range(4):
+                row[at] = error[m, i, k]
+                at += 1
+    for c in range(1, n):
+        row[at] = arrays.x[c, 0]
+        at += 1
+    for i in range(n):
+        for k in range(3):
+            row[at] = arrays.dM[i, k]
+            at += 1
+    for i in (0, 1, n - 2, n - 1):
+        for k in range(3):
+            row[at] = arrays.M[i, k]
+            at += 1
+
+
+@kernel
+def advance_error(table):
+    """The error at the end of a step from that before it; table: of an ErrorJob (kernels.binding).
+
+    Returns UNKNOWN_ERROR where it is not finite (it begins anew from nothing) or where nodes were clipped, else 0.
+    """
+    job = read(table)
+    arrays, found, counts, clock = job.arrays, job.arrays.found, job.counts, job.clock
+    state = job.even
+    if counts[PARITY]:
+        state = job.odd
+    old, new = job.errors[found[CURRENT]], job.errors[1 - found[CURRENT]]
+    dt = clock[LAST_DT]
+    moving = dt > 0.0
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+    if moving:
+        s = scheme(clock[RHO], clock[STEP_BEFORE], dt)
+    work = arrays.work
+    history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
+    found[FINITE], found[CLIPPED] = 1, 0
+    if solve_error(job, state, old, history, s, moving):
+        found[CLIPPED], found[FURTHEST] = put_error(job, old, new, history, s, dt, moving)
+        found[CURRENT] = 1 - found[CURRENT]
+    else:
+        found[FINITE], found[FURTHEST] = 0, -1
+        for i in range(old.shape[1]):
+            for k in range(4):
+                old[0, i, k], old[1, i, k], old[2, i, k], old[3, i, k] = 0.0, 0.0, 0.0, 0.0
+            for k in range(5):
+                arrays.x[i, k] = 0.0
+            for k in range(3):
+                arrays.slid[i, k] = 0.0
+    put_sampled(job.errors[found[CURRENT]], arrays)
+    return UNKNOWN_ERROR if found[CLIPPED] > 0 or found[FINITE] == 0 else 0

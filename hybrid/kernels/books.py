@@ -84,6 +84,7 @@ ASK_BEFORE, ASK_TRIES, ASK_STEPS, ASK_SAMPLES = 1, 2, 4, 8
 AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
 # Bits of FLAGS.
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
+UNKNOWN_ERROR = 256
 
 # --- powers and work --------------------------------------------------------------------------------
 
@@ -122,7 +123,8 @@ class Books(NamedTuple):
     borne: Floats  # (N,) length over unstretched length that each cell bears
     worst: Floats  # (WORST, 4)
     log: Floats  # (rows, len(LOG))
-    samples: Floats  # (rows, sample_size(N))
+    samples: Floats  # (rows, sample_size(N) + K)
+    model_error: Floats  # (2, K) what samples take of the model error now and before the last step; K = 0: not followed
     strains: Floats  # (N+1, 3) of elements: curvature (1/m), bending moment (N m), torque (N m); empty: not wanted
     start: Floats  # (N+1, 3) m, positions from which displacements count
     marks: NDArray[np.int8]  # (N+1,)
@@ -131,7 +133,7 @@ class Books(NamedTuple):
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
-# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N).
+# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); of the model error, where it is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,
@@ -146,5 +148,5 @@ HEAD = SAMPLE_WORK + WORKS
 
 
 def sample_size(cells: int) -> int:
-    """Numbers of a sample of a line of so many cells."""
+    """Numbers of a sample of a line of so many cells, but for the model error."""
     return HEAD + 9 * (cells + 1) + 8 * cells

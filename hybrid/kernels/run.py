@@ -13,6 +13,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.accept import accept, end_step, judge, keep_imposed, note_try, watch, watch_push
 from hybrid.kernels.books import (
@@ -104,7 +105,9 @@ class Job(NamedTuple):
     now: Floats  # (N+1, 4) and after it
     work: Work
     books: Books
+    following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.bending_error)
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
+    follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
 
 def blank_books(cells: int = 1, rows: int = 1) -> Books:
@@ -114,7 +117,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
         clock=z(CLOCK_SIZE), counts=z(COUNT_SIZE, np.int64), outputs=z(0), power=z((2, RATES)), work=z((2, WORKS)),
         report=z((3, REPORT_SIZE)), tension=z((2, cells)), velocity=z((2, 3)), imposed=z((2, 2, 21)), loaded=z(2, np.int8), base=z(0, np.int64), placed=z((0, 3)),
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
-        samples=z((rows, sample_size(cells))), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
+        samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),
         extremes=z((4, 0, nodes)),
     )  # fmt: skip
@@ -126,16 +129,20 @@ def blank_job() -> Job:
     limits, none = Limits(1.0, 1.0, 1), np.zeros((0, 4))
     task = Task(0, limits=limits)
     return Job(
-        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books()
+        task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
+        np.zeros(1, np.int64),
     )  # fmt: skip
 
 
 read = reader(blank_job())
+call_solver = caller((0, 0, 0.0, 0))
+call_follower = caller(0)
 
 
 @inner
-def conclude(line, sea, ends, old, new, books, work, pushed):
+def conclude(job, old, new):
     """After a try: -1, or what to return.  Where the step is accepted its books are kept, and it is looked at."""
+    line, ends, books, work = job.line, job.ends, job.books, job.work
     clock, count = books.clock, books.counts
     dt = clock[TRY_END] - clock[NOW]
     verdict = judge(clock, count, work.report, dt)
@@ -144,14 +151,16 @@ def conclude(line, sea, ends, old, new, books, work, pushed):
     if verdict > 0:
         accept(line, ends, old, new, books, work, clock[TRY_END], dt)
         count[FLAGS] = watch(line, old, new, books, work.report, clock[NOW], dt)
-        if pushed:
+        if job.was.shape[0] > 0:
             count[FLAGS] |= watch_push(clock, work.report)
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
             count[FLAGS] |= STEPS_CUT
         if clock[SLACK_STEP] > 0.0 and clock[MUTE_SLACK] == 0.0:
             count[FLAGS] |= STEPS_SLACK
+        if job.follower != 0:
+            count[FLAGS] |= call_follower(job.follower, job.following)
         if books.extremes.shape[1] > 0:
-            note_extremes(line, sea, ends, new, books, clock[NOW])
+            note_extremes(line, job.sea, ends, new, books, clock[NOW])
         if count[FLAGS] != 0 or count[ASKS] & ASK_STEPS:
             return STEPPED
     return -1
@@ -220,9 +229,6 @@ def in_space(table):
     return solve_job(None, 1, read(table))
 
 
-call_solver = caller((0, 0, 0.0, 0))
-
-
 @kernel
 def run(table):
     """Steps of a line of either kind until a code of kernels.books is returned.
@@ -230,7 +236,7 @@ def run(table):
     The states and pushes of the job take turns: which is now, books.counts[PARITY] tells.
     """
     job = read(table)
-    line, sea, ends, moves, books, report = job.line, job.sea, job.ends, job.moves, job.books, job.work.report
+    sea, moves, books, report = job.sea, job.moves, job.books, job.work.report
     clock, count = books.clock, books.counts
     while True:
         old, new = job.old, job.new
@@ -240,7 +246,7 @@ def run(table):
         if code >= 0:
             return code
         if count[PHASE] == SOLVE:
-            ends_at(clock[TRY_END], moves, sea, ends, books.velocity)
+            ends_at(clock[TRY_END], moves, sea, job.ends, books.velocity)
             sea_at(clock[TRY_END], sea)
             clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
             outcome, it, left, where = call_solver(job.solver, table)
@@ -248,6 +254,6 @@ def run(table):
             count[PHASE] = JUDGE
             if count[ASKS] & ASK_TRIES:
                 return TRIED
-        code = conclude(line, sea, ends, old, new, books, job.work, job.was.shape[0] > 0)
+        code = conclude(job, old, new)
         if code >= 0:
             return code

@@ -171,6 +171,15 @@ def sample_head(sea, books, x, dt, k, t, row):
 
 
 @inner
+def sample_model_error(model_error, x, row, at):
+    """The error of neglected bending, which changes evenly in a step."""
+    for j in range(model_error.shape[1]):
+        row[at + j] = model_error[0, j]
+        if x < 1.0:
+            row[at + j] = x * model_error[0, j] + (1.0 - x) * model_error[1, j]
+
+
+@inner
 def sample_step(line, sea, old, new, books):
     """Sample the outputs that fall into the last step; False: the buffer is full before the last of them."""
     clock, count, outputs = books.clock, books.counts, books.outputs
@@ -188,6 +197,7 @@ def sample_step(line, sea, old, new, books):
         sample_head(sea, books, x, dt, k, t, row)
         sample_nodes(old, new, x, dt, row)
         sample_cells(line, old, new, x, dt, k, books.tension, row)
+        sample_model_error(books.model_error, x, row, HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0])
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True

@@ -329,7 +329,7 @@ class Case:
     ) -> TimeLoop:
         """The loop of a run, as yet without a state; scene: the one that holds at present."""
         if correction is None and model.follows_error:
-            correction = Correction(model, switching)
+            correction = Correction(model, switching.torque if switching is not None else None)
         times = output_times(self.scene)
         if target is None and resolution.every > 1:
             times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]

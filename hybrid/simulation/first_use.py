@@ -133,11 +133,6 @@ def _compile_zones(scene: Scene, model: Model) -> None:
 
 
 def _compile_model_error(model: Model) -> None:
-    from hybrid.kernels.bending_error import Step
-    from hybrid.kernels.entry import workspace
     from hybrid.simulation.bending_correction import corrector_for
 
-    work = workspace(model.cells, keep=True)
-    step = Step(work.u, np.zeros(4))
-    with np.errstate(all="ignore"):
-        corrector_for(model).follow(model.line, model.sea.values, model.ends.values, model.start, step, work)
+    corrector_for(model).address()

@@ -176,4 +176,5 @@ def restored_parts(
         manager.loaded = bool(manager.moments.any())
         manager.set_layout(model.layout)
         switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
-    return model, switching, Correction(model, switching) if model.follows_error else None
+    torque = switching.torque if switching is not None else None
+    return model, switching, Correction(model, torque) if model.follows_error else None

@@ -102,12 +102,11 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
         model.sea.at(np.inf)
         correction = Correction(model)
         correction.begin(ends, found.state, at_rest=True, with_friction=found.with_friction)
-        correction.sample()
     report = found.report.copy()
     if model.line.bits & SEABED:
         report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
-    shift = correction.shift(batch) if correction is not None else None
+    shift = correction.corrector.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
     return {name: x[0] for name, x in observer.values_of(batch, shift=shift).items()}
 
 

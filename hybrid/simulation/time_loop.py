@@ -200,7 +200,7 @@ class TimeLoop:
         if everything or batch is not None or run.run.count[ROWS] > LOGGED:
             self._log()
         if batch is not None:
-            self._record(batch)
+            self._record(batch, run.run.sampled_errors)
 
     def _log(self) -> None:
         """Log the steps, their processor time spread evenly over them."""
@@ -211,8 +211,8 @@ class TimeLoop:
         if len(rows):
             self.recorder.log_rows(np.column_stack([rows, cpu]))
 
-    def _record(self, batch: Batch) -> None:
-        """Record outputs, and look at them."""
+    def _record(self, batch: Batch, errors: np.ndarray) -> None:
+        """Record outputs, and look at them; errors: of the model, as sampled with them."""
         run, diagnostics = self.run, self.diagnostics
         model, switching = run.model, run.switching
         if model is not self._observed:
@@ -221,7 +221,7 @@ class TimeLoop:
         if observer.writes_criteria:
             self._keep_ratios(count)
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
-        shift = run.correction.shift(batch) if run.correction is not None else None
+        shift = run.correction.corrector.shift(errors, batch) if run.correction is not None else None
         values = observer.values_of(batch, ratios, shift)
         self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
         if self.target is None:
@@ -245,9 +245,8 @@ class TimeLoop:
         run, model = self.run, self.run.model
         books = run.run.books
         ends = model.ends.at(run.t)
-        if run.correction is not None:
-            run.correction.sample()
-        self._record(batch_of_one(run.t, ends, run.state, books.report[0], books.work[0], model.sea.at(run.t)))
+        batch = batch_of_one(run.t, ends, run.state, books.report[0], books.work[0], model.sea.at(run.t))
+        self._record(batch, books.model_error[:1])
 
     def _stop_if(self, stop: Stop) -> None:
         """Stop where going on would make no sense."""

@@ -17,7 +17,6 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.report import SEABED_ENERGY
-from hybrid.kernels.sampling import SAME_TIME
 from hybrid.kernels.state import State
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model, build
@@ -71,7 +70,6 @@ class Transient:
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
-        self._followed = (0.0, 0.0)  # s, begin and end of the step through which the model error was followed last
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self._set_control(resolution)
@@ -139,7 +137,7 @@ class Transient:
     @property
     def unchanging(self) -> bool:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
-        changes = self._pending is not None or self._leaves or self.correction is not None
+        changes = self._pending is not None or self._leaves
         return not (changes or (self.switching is not None and self.switching.prepares))
 
     # --- the start ------------------------------------------------------------------------------
@@ -233,8 +231,6 @@ class Transient:
         while True:
             self._choose_asks()
             code = run.go()
-            if self.correction is not None:
-                self._sample_error(self.correction)
             if code == b.TRYING:
                 assert self.switching is not None
                 end = float(clock[b.TRY_END])
@@ -265,9 +261,10 @@ class Transient:
         self.run.clock[b.LEG_BEGIN], self.run.count[b.LEG_PART] = self.t, 0
 
     def _choose_asks(self) -> None:
-        """When the compiled run has to ask: for zones, for what follows the model error, for a plane that is left."""
-        count, switching = self.run.count, self.switching
-        asks = b.ASK_STEPS if self.correction is not None else 0
+        """When the compiled run has to ask: for zones, for a plane that is left."""
+        count, switching, asks = self.run.count, self.switching, 0
+        if self.correction is not None:
+            self.correction.set_torque()
         if switching is not None or self._leaves:
             asks |= b.ASK_STEPS | b.ASK_SAMPLES
         if switching is not None:
@@ -297,11 +294,11 @@ class Transient:
         return change
 
     def _after_step(self) -> None:
-        """A step is accepted: what zones put in is booked, the model error followed, and what is to change decided."""
+        """A step is accepted: what zones put in is booked, and what is to change decided."""
         run, model = self.run, self.model
         flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
-        if self.correction is not None:
-            self._correct(self.correction, end, dt)
+        if flags & b.UNKNOWN_ERROR:
+            self._note_unknown_error()
         if flags & b.STEPS_CUT:
             self._note_cut()
         if flags & b.STEPS_SLACK:
@@ -336,24 +333,13 @@ class Transient:
         self._note(cell, "steps cut", text)
         self.slackened, clock[b.MUTE_SLACK] = True, 1.0
 
-    def _correct(self, correction: Correction, end: float, dt: float) -> None:
-        """Follow the error of neglecting bending through the step just taken; an event where it cannot be estimated."""
-        before = float(self.run.clock[b.STEP_BEFORE])
-        correction.step(self.stepper, self.model.ends.values, self.state, dt, before, self.rho)
-        self._followed = end - dt, end
-        beyond = correction.beyond
-        if beyond and end > self.beyond:  # once in a while that it takes the whole line to move
-            s = float(self.model.line.s[max(correction.corrector.where, 0)])
-            self.events.event(end, s, s, "model error not estimated", beyond)
-            self.beyond = end + self.model.time_scale
-
-    def _sample_error(self, correction: Correction) -> None:
-        """The model error at outputs that were sampled since the last call: they lie in the step followed last."""
-        samples, (begin, end) = self.run.books.samples, self._followed
-        near = SAME_TIME * (end - begin)
-        for k in range(correction.kept, int(self.run.count[b.SAMPLES])):
-            t = float(samples[k, 0])
-            correction.sample((t - begin) / (end - begin) if t < end - near else 1.0)
+    def _note_unknown_error(self) -> None:
+        """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
+        assert self.correction is not None
+        if self.t > self.beyond:
+            s = float(self.model.line.s[max(self.correction.corrector.furthest, 0)])
+            self.events.event(self.t, s, s, "model error not estimated", self.correction.beyond)
+            self.beyond = self.t + self.model.time_scale  # that it takes the whole line to move
 
     def _adapt(self) -> None:
         """After the outputs of a step: zones change where criteria ask for it, and the plane is left where it must."""
@@ -390,8 +376,6 @@ class Transient:
                 criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
             )  # fmt: skip
         self.set_model(model, state)
-        if self.correction is not None:
-            self.correction.switch(model)
         self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
             run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
@@ -413,8 +397,6 @@ class Transient:
             model = monitor.leave(replace(model, plane=old.plane), self.run, state)
         else:
             model = replace(model, line=in_space(model.line), plane=None)
-        if self.correction is not None:
-            self.correction.switch(model)
         self.set_model(model, state)
         if self.switching is not None:
             self.switching.manager.moments = model.ends.moments
@@ -432,13 +414,15 @@ class Transient:
         self.model = model
         if self.switching is not None:
             self.switching.model = model
+        if self.correction is not None and self.correction.model is not model:
+            self.correction.switch(model)
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=self.correction is not None)
         first = np.arange(model.line.s.size) if model.layout is None else model.layout.first
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
             self.stepper.limits, state, 1.0 + borne_strain(model), first,
-            marks_of(self.scene, model),
+            marks_of(self.scene, model), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)

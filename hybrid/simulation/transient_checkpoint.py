@@ -55,6 +55,9 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
     older |= {"envelope": None, "_slackened": False}
+    if run.correction is not None and isinstance(saved.get("correction"), dict):
+        older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
+        saved = {name: x for name, x in saved.items() if name != "correction"}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]

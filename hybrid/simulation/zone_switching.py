@@ -77,7 +77,7 @@ class ZoneSwitching:
         self.strain = NO_STRAIN  # of the last step, while bending is being blended
         self.joints = Joints(model.line) if loaded else None
 
-    def torque(self, ends: Ends, state: State) -> float:
+    def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
         return self.manager.torque
 

@@ -5,23 +5,30 @@ One way only: nothing of it goes back into the line.  docs/theory.md, 14; the ke
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from hybrid.kernels import entry
-from hybrid.kernels.bending_error import ErrorArrays, Step, advance_error, blank_error_job
+from hybrid.kernels.bending_error import (
+    CLIPPED,
+    CURRENT,
+    FINITE,
+    FURTHEST,
+    advance_error,
+    blank_error_job,
+    error_arrays,
+    sampled_size,
+)
 from hybrid.kernels.binding import Table
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
 from hybrid.kernels.energies import observe
 from hybrid.kernels.entry import workspace
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
-from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.seabed import contact
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
 from hybrid.kernels.step import friction_axes
-from hybrid.solve.stepper import Stepper
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
 MOST = 0.1
@@ -29,16 +36,6 @@ MOST = 0.1
 SMALL = 1e-4
 # dvd'/dr' of an equilibrium, over tension scale / (mass x length): holds what would drift freely, as in solve.statics.
 ANCHOR = 1e-12
-
-
-class Sample(NamedTuple):
-    """The error at an output: (2, N+1, 4) of position (m) and velocity with the spins; tension (N,) N; moment (N+1, 3)
-    N m, inertial; left (4, 3) N m, what of it the two nodes at either end lack."""
-
-    error: Floats
-    tension: Floats
-    moment: Floats
-    left: Floats
 
 
 class Shift(NamedTuple):
@@ -64,11 +61,10 @@ def _dot(a: Floats, b: Floats) -> Floats:
 
 
 class Corrector:
-    """Follows the error of one line, step by step; owns the work arrays and the error, not the state.
+    """The error of one line: its arrays, which the compiled run advances (`bind`), and what it makes of outputs.
 
-    error: (4, N+1, 4) of position (m), velocity, algorithmic and true acceleration, and of the spin of the cell after
-    a node in the last column; x: (N+1, 5) the same with the tension (N) of the cell before in front; moment: (N+1, 3)
-    N m inertial, of the rod less that of the line; left: (N+1, 3) N m, what of it nodes lack.
+    arrays, errors: as kernels.bending_error has them; sampled: (2, K) what an output takes of the error after the last
+    step and before it; torque: (4,) of the whole line, as named there.
     """
 
     def __init__(
@@ -86,27 +82,18 @@ class Corrector:
         self.bending = Bending(
             soft, np.zeros(n + 1, np.int8) if kinks is None else kinks, np.asarray(tangent, np.int8), floor
         )
-        self.error, self._spare = np.zeros((2, 4, n + 1, 4))
-        self.slid, self.moment, self.left = np.zeros((3, n + 1, 3))
-        self.x, b = np.zeros((2, n + 1, 5))
-        chords, turned = np.zeros((2, n, 5))
-        self._arrays = ErrorArrays(
-            self.slid,
-            self.x,
-            self.moment,
-            self.left,
-            chords,
-            turned,
-            b,
-            np.zeros((4, n + 1, 4)),
-            np.zeros(REPORT_SIZE),
-        )
-        self._before = (self.x.copy(), self.moment.copy(), self.left.copy())  # before the last step, as is `_spare`
-        self.clipped, self.where, self.finite = 0, -1, True
-        self.sea = no_sea(n)  # of the last step
-        self._ends = [0, 1, n - 1, n]  # nodes
-        self._step: Step | None = None
+        self.arrays, self.errors = error_arrays(n), np.zeros((2, 4, n + 1, 4))
+        self.sampled, self.torque = self.arrays.sampled, self.arrays.torque
+        self.sea = no_sea(n)  # of the run
         self._table = Table(blank_error_job())
+
+    @property
+    def error(self) -> Floats:
+        """(4, N+1, 4) of position (m), velocity, algorithmic and true acceleration, and in the last column of the spin
+
+        of the cell after a node.
+        """
+        return np.asarray(self.errors[self.arrays.found[CURRENT]])
 
     @property
     def position(self) -> Floats:
@@ -114,46 +101,59 @@ class Corrector:
         return self.error[0, :, :3]
 
     @property
-    def tension(self) -> Floats:
-        """Error (N,) N of the cells' tension."""
-        return self.x[1:, 0]
-
-    @property
     def most(self) -> float:
         """Error, m, beyond which it is clipped."""
         return MOST * self.length
 
+    @property
+    def finite(self) -> bool:
+        """Whether the error of the last step was."""
+        return bool(self.arrays.found[FINITE])
+
+    @property
+    def clipped(self) -> int:
+        """Nodes at which it was clipped."""
+        return int(self.arrays.found[CLIPPED])
+
+    @property
+    def furthest(self) -> int:
+        """The node with the largest error; -1: unknown."""
+        return int(self.arrays.found[FURTHEST])
+
     def taking_over(self, old: Corrector) -> Corrector:
         """The error of another line of the same length, between its nodes; spins that it does not have are gone."""
         s, then, now = self.line.s, old.line.s, self.line
-        for mine, its in ((self.error, old.error), (self.slid[None], old.slid[None])):
+        for mine, its in ((self.error, old.error), (self.arrays.slid[None], old.arrays.slid[None])):
             for k in range(its.shape[0]):
                 for j in range(its.shape[2]):
                     mine[k, :, j] = np.interp(s, then, its[k, :, j])
         self.error[:, :-1, 3] *= now.spin
         self.error[:, -1, 3] = 0.0
-        for mine, its in ((self.moment, old.moment), (self.left, old.left)):
-            for j in range(3):
-                mine[:, j] = np.interp(s, then, its[:, j])
-        self.x[:, 1:] = self.error[0]
-        self.x[1:, 0] = np.interp(0.5 * (s[1:] + s[:-1]), 0.5 * (then[1:] + then[:-1]), old.x[1:, 0])
+        error, tension, moment, left = self._parts(self.sampled[:1])
+        _, old_tension, old_moment, old_left = old._parts(old.sampled[:1])
+        error[0], left[0] = self.error[:2], old_left[0]
+        tension[0] = np.interp(0.5 * (s[1:] + s[:-1]), 0.5 * (then[1:] + then[:-1]), old_tension[0])
+        for j in range(3):
+            moment[0, :, j] = np.interp(s, then, old_moment[0, :, j])
+        self.torque[:], self.sea = old.torque, old.sea
         return self
 
-    def sample(self, part: float = 1.0) -> Sample:
-        """The error at a part of the last step: between that before it and that after it."""
-        now = self._of(self.error, self.x, self.moment, self.left)
-        if part >= 1.0:
-            return Sample(*(x.copy() for x in now))
-        before = self._of(self._spare, *self._before)
-        return Sample(*(part * a + (1.0 - part) * b for a, b in zip(now, before, strict=True)))
+    def _parts(self, sampled: Floats) -> tuple[Floats, Floats, Floats, Floats]:
+        """Of rows of samples: error of position and velocity (nb, 2, N+1, 4), of tension (nb, N), moment (nb, N+1, 3)
 
-    def _of(self, error: Floats, x: Floats, moment: Floats, left: Floats) -> Sample:
-        """What a sample takes of these."""
-        return Sample(error[:2], x[1:, 0], moment, left[self._ends])
+        N m of the rod less that of the line, and what of it the two nodes at either end lack (nb, 4, 3), as views.
+        """
+        n, nb = self.line.h.size, len(sampled)
+        a, b, c = 8 * (n + 1), 9 * n + 8, 12 * n + 11
+        assert sampled.shape[1] == c + 12 == sampled_size(n)
+        return (
+            sampled[:, :a].reshape(nb, 2, n + 1, 4), sampled[:, a:b], sampled[:, b:c].reshape(nb, n + 1, 3),
+            sampled[:, c:].reshape(nb, 4, 3),
+        )  # fmt: skip
 
-    def shift(self, samples: Sequence[Sample], batch: Batch) -> Shift:
-        """What the errors at the outputs of a batch make of them."""
-        error, tension, moment, left = (np.stack(x) for x in zip(*samples, strict=True))
+    def shift(self, sampled: Floats, batch: Batch) -> Shift:
+        """What the errors at the outputs of a batch, rows of samples, make of them."""
+        error, tension, moment, left = self._parts(sampled)
         now = self._end_forces(batch, error, tension, left, 0.0)
         more = self._end_forces(batch, error, tension, left, SMALL)
         forces = (more - now) / SMALL * batch.held[:, :, None]
@@ -171,7 +171,7 @@ class Corrector:
             found, strain = np.zeros((2, n + 1, 3))
             for k in range(len(e)):
                 observe(line, ends_in(batch, k), e[k], batch.v[k], a[k], batch.w[k], found, strain, np.zeros(4))
-                M[k] += found[self._ends]
+                M[k] += found[[0, 1, n - 1, n]]
         out = np.zeros((len(batch.t), 2, 3))
         for k, c, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):
             e = batch.e[:, c] + (shift[:, c + 1] - shift[:, c])
@@ -203,7 +203,7 @@ class Corrector:
             out[i] = contact(*p, *q, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0] * normal
         return out
 
-    def rest(self, sea: Sea, ends: Ends, state: State, torque: float = 0.0, with_friction: bool = False) -> None:
+    def rest(self, sea: Sea, ends: Ends, state: State, with_friction: bool = False) -> None:
         """The error of an equilibrium; with_friction: friction took part in it, so that a shift is felt as friction."""
         line = self.line._replace(bits=self.line.bits & ~(WAVES if with_friction else FRICTION | WAVES))
         if line.bits & FRICTION:
@@ -212,31 +212,33 @@ class Corrector:
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)
         entry.assembly(line, sea, ends, state._replace(v=still, vd=still, w=no_spin, wd=no_spin), 0.0, ca, work)
-        self.slid[:] = 0.0
-        self.follow(line, sea, ends, state, Step(still, np.array([0.0, 0.0, 0.0, torque])), work)
+        self.arrays.slid[:] = 0.0
+        clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        table = Table(blank_error_job())
+        self._fill(table, line, sea, ends, (state, state), clock, counts, work._replace(u=still))
+        advance_error(table.numbers)
 
-    def step(
-        self, stepper: Stepper, sea: Sea, ends: Ends, state: State, dt: float, before: float, rho: float,
-        torque: float = 0.0,
-    ) -> None:  # fmt: skip
-        """The error after the step of dt that `stepper` has just taken to `state`; torque: N m, that no rod carries."""
-        work = stepper.work
-        if self._step is None or self._step.u is not work.u:
-            self._step = Step(work.u, np.zeros(4))
-        self._step.numbers[:] = dt, before, rho, torque
-        self.follow(self.line, sea, ends, state, self._step, work)
+    def bind(
+        self, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Floats, counts: np.ndarray,
+        work: Work,
+    ) -> np.ndarray:  # fmt: skip
+        """The table by which `advance_error` follows the steps of a run.
 
-    def follow(self, line: Line, sea: Sea, ends: Ends, state: State, step: Step, work: Work) -> None:
-        """The error after `step`, with the factors of the matrix that stand in `work`."""
+        states: which take turns; clock, counts: of the run; work: where the factors of its last matrix are kept.
+        """
         self.sea = sea
-        for mine, its in zip(self._before, (self.x, self.moment, self.left), strict=True):
-            mine[:] = its
-        self._table.bind(
-            line=line, sea=sea, ends=ends, bending=self.bending, state=state, step=step, X=work.X, W=work.W,
-            old=self.error, new=self._spare, most=self.most, arrays=self._arrays,
+        self._fill(self._table, line, sea, ends, states, clock, counts, work)
+        return self._table.numbers
+
+    def address(self) -> int:
+        """Where the machine code of `advance_error` is."""
+        return int(advance_error.address(self._table.numbers))
+
+    def _fill(
+        self, table: Table, line: Line, sea: Sea, ends: Ends, states: tuple[State, State], clock: Floats,
+        counts: np.ndarray, work: Work,
+    ) -> None:  # fmt: skip
+        table.bind(
+            line=line, sea=sea, ends=ends, bending=self.bending, even=states[0], odd=states[1], u=work.u, clock=clock,
+            counts=counts, X=work.X, W=work.W, errors=self.errors, most=self.most, arrays=self.arrays,
         )  # fmt: skip
-        self.finite, self.clipped, self.where = advance_error(self._table.numbers)
-        if self.finite:
-            self.error, self._spare = self._spare, self.error
-        else:
-            self.error[:], self.x[:], self.slid[:] = 0.0, 0.0, 0.0

@@ -21,6 +21,7 @@ from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Moves, Sea, State, Work
+from hybrid.solve.bending_corrector import Corrector
 
 # Steps and samples that a call may take before Python writes them down.
 ROWS = 256
@@ -53,21 +54,23 @@ class CompiledRun:
         self.clock[b.LEAST_PEAK] = np.inf
         self.states: tuple[State, State]
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
+        self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
 
     # --- what is computed ---------------------------------------------------------------------------
 
     def attach(
         self, line: Line, sea: Sea, ends: Ends, moves: Moves, work: Work, limits: Limits, state: State, borne: Floats,
-        first: np.ndarray, marks: np.ndarray,
+        first: np.ndarray, marks: np.ndarray, corrector: Corrector | None = None,
     ) -> None:  # fmt: skip
         """Go on with a line (as at the start, after a change of zones, in space after a plane) from `state`.
 
         borne: (N,) length over unstretched length that cells bear; first: nodes of the base mesh; marks: (N+1,) of
-        kernels.books, what nodes have.  Extremes are kept anew; displacements count
-        from `books.start`, which the caller fills.
+        kernels.books, what nodes have; corrector: of the model error, if it is followed.  Extremes are kept anew;
+        displacements count from `books.start`, which the caller fills.
         """
         cells = line.h.size
-        size = sample_size(cells)
+        followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
+        size = sample_size(cells) + followed.shape[1]
         if not self._room.size:
             self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
         rows = max(1, min(ROWS, self._room.size // size))
@@ -77,7 +80,7 @@ class CompiledRun:
         right[marked] = nodes + np.arange(marked.size)
         books = self.books._replace(
             borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 3) if some else (0, 3)), marks=marks,
-            right=right, start=np.zeros((nodes, 3)),
+            right=right, start=np.zeros((nodes, 3)), model_error=followed,
             extremes=no_extremes(nodes + marked.size) if some else np.zeros((4, 0, nodes)),
         )  # fmt: skip
         if books.samples.shape != (rows, size):  # in the same room, which a new one of some MB would cost a ms
@@ -98,8 +101,11 @@ class CompiledRun:
         was, now = self.pushes
         self.table.bind(
             task=Task(RUN, limits=limits), line=line, sea=sea, ends=ends, moves=moves, old=old, new=new, was=was,
-            now=now, work=work, books=books,
+            now=now, work=work, books=books, follower=0,
         )  # fmt: skip
+        if corrector is not None:
+            following = corrector.bind(line, sea, ends, self.states, self.clock, self.count, work)
+            self.table.bind(following=following, follower=corrector.address())
 
     def place(self, placed: Floats) -> None:
         """Where base nodes were at the start (n, 3) m."""
@@ -145,7 +151,8 @@ class CompiledRun:
             mine[:] = its
 
     def _changing(self) -> Iterator[Floats]:
-        skipped = ("outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right")
+        skipped = {"outputs", "log", "samples", "borne", "base", "placed", "loaded", "start", "marks", "right"}
+        skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
         yield from (x for state in self.states for x in state)
         yield from self.pushes
         yield from (x for name, x in self.books._asdict().items() if name not in skipped)
@@ -191,6 +198,7 @@ class CompiledRun:
     def samples(self, ends: Ends) -> Batch | None:
         """The outputs since the last call of this, as views that the next steps overwrite; None: there are none.
 
+        What they take of the model error is then in `sampled_errors` (nb, K).
         ends: of the line, of which `held` is taken.
         """
         count, cells = int(self.count[b.SAMPLES]), self.state.T.size
@@ -209,6 +217,7 @@ class CompiledRun:
         r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
         held = np.repeat(ends.held[None], count, axis=0)
+        self.sampled_errors = rows[:, at:]
         return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea)
 
 

@@ -69,7 +69,7 @@ class Attributes(dict[str, Any]):
 
 
 class Looked(Mapping[str, Any]):
-    """What datasets say of themselves, by name; each is looked up when it is asked for, once, while the file is open."""
+    """What datasets say of themselves, by name, looked up when it is asked for, once, while the file is open."""
 
     def __init__(
         self, data: Mapping[str, Any], look: Callable[[Any], Any], aliases: Mapping[str, str] | None = None

@@ -128,7 +128,7 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
         compare(found, {field: x * (part if field.startswith("errors/") else 1.0) for field, x in expected.items()})
         checked.update(found.keys() & expected.keys())
         copied = Batch(*(np.array(x) for x in batch))  # the next steps overwrite it
-        past.setdefault(self, []).append((copied, ratios, shift, found))
+        past.setdefault(self, []).append((copied, ratios, shift and Shift(*(np.array(x) for x in shift)), found))
         return found
 
     monkeypatch.setattr(Observer, "values_of", watched)
