@@ -53,11 +53,11 @@ def test_the_mesh_of_zones_that_move(monkeypatch, tmp_path):
             loop = super()._loop(*args)
             record = loop._record
 
-            def recorded(batch):
+            def recorded(batch, errors):
                 line = loop.run.model.line
                 for t in batch.t.tolist():
                     seen[t] = line.s.copy(), line.spin.astype(bool).copy()
-                return record(batch)
+                return record(batch, errors)
 
             loop._record = recorded
             return loop
