@@ -15,32 +15,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
+from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
-from hybrid.kernels.criteria import CLAMP, CRITERIA, GIVEN, SLACK, TORSION
+from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import advance, shares
-from hybrid.kernels.zone_criteria import (
-    LOAD,
-    MOST,
-    SMOOTH,
-    STEP,
-    TWISTED,
-    NodeKinds,
-    blank_criteria_job,
-    end_turn,
-    evaluate_criteria,
-    twist_of_rods,
-)
+from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds
+from hybrid.kernels.zone_step import REJECT_RATIO, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.model.layout import Layout, edges
 from hybrid.model.material import Material, tension_floor
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
 # it is weight that straightens a cable.
 BUFFER = 2.0
-# How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
-LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
-REVIEWS, SAMPLES = 4, 16  # per ramp time: reviews without a cell above threshold; samples of the tension
-REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, and repeated with more rod
+REVIEWS = 4  # without a cell above threshold, per ramp time
 FAST_RAMP = 16.0  # factor by which stiffness is ramped up faster where tension is lost
 RETURN_WINDOW = 4.0  # hold times: a catenary that lasts less costs more than its two switches save
 LOST_TENSION, WEIGHTLESS = (
@@ -100,6 +88,24 @@ class Change(NamedTuple):
     stiff: np.ndarray  # rods that get their full stiffness at once
 
 
+def _number(k: int, text: str) -> Any:
+    """A number of the clock of zones."""
+    return property(
+        lambda self: float(self.zones.clock[k]), lambda self, x: self.zones.clock.__setitem__(k, x), doc=text
+    )
+
+
+def _flag(k: int, text: str) -> Any:
+    """A flag of zones."""
+    return property(
+        lambda self: bool(self.zones.counts[k]), lambda self, x: self.zones.counts.__setitem__(k, x), doc=text
+    )
+
+
+# Arrays of `Zones` that are the same for every layout.
+OF_BASE = ("clock", "counts", "clamped", "tangents", "moments", "ratios", "rod", "leaving", "grown", "haste")
+
+
 class DomainManager:
     """Watches one line.  lengths in m, times in s."""
 
@@ -121,53 +127,94 @@ class DomainManager:
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell).
         """
         n = layout.rod.size
-        self.cable, self.layout, self.tolerance, self.dwell, self.given = cable, layout, tolerance, dwell, given
-        self.pace, self.held = pace or dwell, False
-        self.left = left
+        self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
+        self.pace, self.held, self.left = pace or dwell, False, left
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
-        self.ratios, self.seen = np.zeros((2, len(CRITERIA), n))  # since the last review, and since the last output
-        self.grown, self.leaving, self.haste = np.ones(n), np.zeros(n, bool), np.ones(n)
+        self.zones = blank_zones(1, n)  # what the compiled run knows of them
+        self.tolerance = tolerance
+        self.zones.clock[z.PACE] = self.pace
+        self.zones.clamped[:] = cable.held_tangent
+        self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
         self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
-        self.loudest, self.going, self.coming, self.next_review = 0.0, False, False, 0.0
-        self.clamped = np.array(cable.held_tangent, float)[:, None]
-        self._table, self._tangents = Table(blank_criteria_job()), np.zeros((2, 3))
+        self._table = Table(blank_zone_job())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
-        self.moments, self.loaded = np.zeros((2, 3)), False  # N m, given at the ends
-        self.twisted = all(cable.held_twist) and all(cable.held_tangent)
-        self.total_twist = self.torque = 0.0  # rad; N m, that a rod from end to end would carry, where there is none
+        self.zones.counts[z.HOLDS_TWIST] = all(cable.held_twist) and all(cable.held_tangent)
         self.set_layout(layout)
+
+    # --- what the compiled run knows ----------------------------------------------------------------
+
+    tolerance = property(
+        lambda self: self._tolerance, lambda self, x: self._set_tolerance(x), doc="Error of position, m."
+    )
+    next_review = _number(z.NEXT_REVIEW, "When the next review is due, s.")
+    loudest = _number(z.LOUDEST, "Largest ratio among catenaries at the last evaluation.")
+    torque = _number(z.TORQUE, "Torque, N m, that a rod from end to end would carry, where there is none.")
+    total_twist = _number(z.TOTAL_TWIST, "Turn of the ends against each other, rad.")
+    compliance = _number(z.COMPLIANCE, "Turn per torque of all the line, rad per N m.")
+    age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
+    going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
+    twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
+
+    def _set_tolerance(self, tolerance: float) -> None:
+        self._tolerance, self.zones.clock[z.TOLERANCE] = tolerance, tolerance / self.left
+
+    @property
+    def ratios(self) -> Floats:
+        """(criteria, n), largest since the last review."""
+        return self.zones.ratios
+
+    @property
+    def grown(self) -> Floats:
+        """(n,) part of its stiffness that each rod has."""
+        return self.zones.grown
+
+    @property
+    def leaving(self) -> np.ndarray:
+        """(n,) bool: rods whose stiffness is ramped down."""
+        return self.zones.leaving
+
+    @property
+    def past(self) -> Floats:
+        """(N,) N, tensions some time ago; none: not known."""
+        return self.zones.past if self.zones.counts[z.KNOWN] else np.zeros(0)
+
+    def load(self, moments: Floats) -> None:
+        """Moments (2, 3) N m are given at the ends."""
+        self.zones.moments[:] = moments
+        self.zones.counts[z.LOADED] = moments.any()
 
     def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
         self.layout = layout
-        s = layout.nodes
-        middle = 0.5 * (s[:-1] + s[1:])
-        cable = self.cable
-        of = cable.piece(middle)
+        s, cable = layout.nodes, self.cable
+        of = cable.piece(0.5 * (s[:-1] + s[1:]))
         pad = np.concatenate([[of[0]], of, [of[-1]]])
         EI, weight = cable.mean_bending, np.abs(cable.submerged_weight)
         self.s, self.EI = s, np.maximum(EI[pad[:-1]], EI[pad[1:]])
         self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
-        self.node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, SMOOTH).astype(np.int8)
-        self.node[cable.point_nodes(s)] = LOAD
+        node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, SMOOTH).astype(np.int8)
+        node[cable.point_nodes(s)] = LOAD
         self.floor = tension_floor(self.EI, self.w, self.scale)
         self.weightless = bool((self.floor < WEIGHTLESS * self.scale).any())
         self.base_of_cell = layout.base_of_cell
         bent = np.linalg.norm(cable.kappa[of, :2], axis=1)
-        self.bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
-        self.turn, self.twisting, self.share = np.zeros((3, s.size))
-        self._kinds = NodeKinds(
-            self.EI, self.w, self.bent, self.node, self.floor, self.base_of_cell.astype(np.int64), self.free, self.turn,
-            self.twisting,
+        bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
+        kinds = NodeKinds(
+            self.EI, self.w, bent, node, self.floor, self.base_of_cell.astype(np.int64), self.free, np.zeros(s.size),
+            np.zeros(s.size),
         )  # fmt: skip
-        self.compliance = float(np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300)))
-        self.free_twist = float(np.diff(s) @ cable.kappa[of, 2])
+        kept = {name: getattr(self.zones, name) for name in OF_BASE}
+        self.zones = blank_zones(s.size - 1, layout.rod.size)._replace(kinds=kinds, **kept)
+        self.zones.rod[:] = layout.rod
+        clock, flags = self.zones.clock, self.zones.counts
+        clock[z.COMPLIANCE] = np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300))
+        clock[z.FREE_TWIST] = np.diff(s) @ cable.kappa[of, 2]
+        clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
+        flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
         self._update_ramping()
-        self.past = self.recent = np.zeros(0)
-        self.age = self.recent_age = 0.0
 
     def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
@@ -180,24 +227,34 @@ class DomainManager:
         self.released[gone] = t
         self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
-        self.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
+        self.zones.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
         self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
         self.set_layout(new)
 
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
-        return {name: getattr(self, name) for name in CHECKPOINTED}
+        zones = self.zones
+        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "haste")}
+        known = {name: getattr(zones, name) if self.past.size else np.zeros(0) for name in ("past", "recent")}
+        return {name: getattr(self, name) for name in CHECKPOINTED if name not in of_zones | known} | of_zones | known
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Restore a checkpoint; ValueError: it is invalid."""
-        allowed, cells = self.tolerance, self.base_of_cell.size
-        vars(self).update(saved)
-        good = 0.0 < self.tolerance <= allowed and self.past.shape == self.recent.shape in ((0,), (cells,))
-        loudest = self.calmed[0]
+        allowed, cells, zones = self.tolerance, self.base_of_cell.size, self.zones
+        good = 0.0 < saved["tolerance"] <= allowed and saved["past"].shape == saved["recent"].shape in ((0,), (cells,))
+        loudest, grown = saved["calmed"][0], saved["grown"]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
-        if not (0.0 <= self.grown.min() <= self.grown.max() <= 1.0 and min(self.age, self.recent_age) >= 0.0):
+        if not (0.0 <= grown.min() <= grown.max() <= 1.0 and min(saved["age"], saved["recent_age"]) >= 0.0):
             raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time")
+        for name in CHECKPOINTED:
+            if name in ("past", "recent"):
+                getattr(zones, name)[: saved[name].size] = saved[name]
+            elif name in OF_BASE:
+                getattr(zones, name)[:] = saved[name]
+            else:
+                setattr(self, name, saved[name])
+        zones.counts[z.KNOWN] = saved["past"].size > 0
         self._update_ramping()
 
     # --- watching ------------------------------------------------------------------------------
@@ -207,62 +264,17 @@ class DomainManager:
 
         dt = 0: there was none, or it was on other nodes.
         """
-        if self.past.size != state.T.size or dt == 0.0:
-            self.past = self.recent = state.T.copy()
-            self.age = self.recent_age = 0.0
-        self.age, self.recent_age = self.age + dt, self.recent_age + dt
-        ahead = min(LOOKAHEAD * self.pace / self.age, LONGEST_LOOKAHEAD) if self.age > 0.0 else 0.0
-        self.torque = self._torque(line, ends, state) if self.twisted else 0.0
-        np.multiply(ends.frame[:, 2::3], self.clamped, out=self._tangents)
-        self._table.bind(
-            line=line, sea=sea, tangents=self._tangents, state=state, past=self.past, ahead=ahead,
-            tolerance=self.tolerance / self.left, torque=self.torque, kinds=self._kinds, ratios=self.ratios,
-        )  # fmt: skip
-        self.loudest = evaluate_criteria(self._table.numbers)
-        if self.loaded:
-            self._evaluate_moments(state)
+        self.zones.clock[z.DT] = dt
+        self._table.bind(line=line, sea=sea, ends=ends, new=state, zones=self.zones)
+        evaluate_criteria(self._table.numbers)
         if self.user is not None:
-            self._ask_user(line, state, t)
-        return self.loudest
+            self.ask_user(line, state, t)
+        return float(self.loudest)
 
-    def _evaluate_moments(self, state: State) -> None:
-        """A moment M given at an end holds the cable off its catenary by M/T, as a clamp does; of its full size.
-
-        What of it turns about the cable is a torque, whether rods feel it already or not.
-        """
-        for k, node in ((0, 0), (-1, -1)):
-            moment = float(np.linalg.norm(self.moments[k]))
-            T = max(float(state.T[k]), float(self.floor[node]), 1e-300)
-            ratio = self.ratios[CLAMP]
-            ratio[k] = max(ratio[k], min(moment * self.left / (T * self.tolerance), MOST))
-            along = float(self.moments[k] @ state.e[k] / np.linalg.norm(state.e[k]))
-            loosest = max(float(state.T.min()), float(self.floor.min()), 1e-300)
-            twisting = along**2 / (2.0 * float(self.EI.min()) * TWISTED)
-            torsion = max(twisting, abs(along) * self.left * float(self.turn.sum()) / self.tolerance) / (2.0 * loosest)
-            np.maximum(self.ratios[TORSION], min(torsion, MOST), out=self.ratios[TORSION])
-        quiet = self.layout.rod | (self.given < 0)
-        asked = self.ratios[[CLAMP, TORSION]].max(axis=0)
-        self.loudest = max(self.loudest, float(np.max(asked, where=~quiet, initial=0.0)))
-
-    def store_past(self, state: State) -> None:
-        """The evaluated state is accepted: store its tensions for extrapolation."""
-        if self.recent_age * SAMPLES >= self.pace:
-            self.past, self.age = self.recent, self.recent_age
-            self.recent, self.recent_age = state.T.copy(), 0.0
-
-    def _torque(self, line: Line, ends: Ends, state: State) -> float:
-        """Torque, N m, of the turn of one end against the other, as if all the line were rod; 0 if it is: rods know."""
-        whole = bool(self.layout.rod.all())
-        if whole:
-            self.total_twist = float(twist_of_rods(line, ends.frame, state.e, state.a1))
-            return 0.0
-        turn = end_turn(state.e, ends.frame)
-        self.total_twist += (turn - self.total_twist + math.pi) % (2.0 * math.pi) - math.pi
-        return (self.total_twist - self.free_twist) / self.compliance
-
-    def _ask_user(self, line: Line, state: State, t: float) -> None:
+    def ask_user(self, line: Line, state: State, t: float) -> None:
+        """Raise the ratios to those of the user's criterion."""
         assert self.user is not None
-        look = NodeState(t, self.s, state.r, state.v, state.T, self.turn / line.hn, self.EI)
+        look = NodeState(t, self.s, state.r, state.v, state.T, self.zones.kinds.turn / line.hn, self.EI)
         for x in look[1:]:
             x.flags.writeable = False
         try:
@@ -313,7 +325,8 @@ class DomainManager:
             self.ratios, rod, self.calm_since, t, self.layout.base, rules, self.leaving, self.patience
         )
         next_ = (next_ | (rod & self.held)) & (self.given >= 0)
-        back, before, self.leaving = self.going, self.leaving, rod & ~next_
+        back, before = self.going, self.leaving.copy()
+        self.leaving[:] = rod & ~next_
         self.going = bool(self.leaving.any())
         if back or self.going:
             self._update_ramping()  # perhaps one that was on its way out
@@ -356,7 +369,7 @@ class DomainManager:
 
     def _losing_tension(self, state: State) -> np.ndarray:
         """Base cells (n,) without weight, hence without a floor, that lose most of their tension within a pace."""
-        if not (self.weightless and self.age > 0.0):
+        if not (self.weightless and self.age > 0.0 and self.past.size):
             return np.zeros(self.layout.rod.size, bool)
         T = state.T + self.pace / self.age * (state.T - self.past)
         falls = (T < LOST_TENSION * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
@@ -364,13 +377,14 @@ class DomainManager:
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
-        reach(state.T, self.base_of_cell, self.EI, self.w, self.floor, BUFFER, 1e-9 * self.scale, self.buffer)
+        of, least = self.zones.kinds.base_of_cell, 1e-9 * self.scale
+        reach(state.T, of, self.EI, self.w, self.floor, BUFFER, least, self.buffer)
         return Rules(self.buffer, self.shortest, self.dwell)
 
     def _add_global_ratios(self) -> None:
         """Ratios that are not local: forced rods, and torque, which needs rods from end to end."""
         self.ratios[GIVEN, self.given > 0] = FORCED_RATIO
-        if self.twisted or self.loaded:
+        if self.twisted or self.zones.counts[z.LOADED]:
             self.ratios[TORSION] = self.ratios[TORSION].max()
 
     def _reset_ratios(self) -> None:
@@ -432,12 +446,13 @@ class DomainManager:
         Over a pace: within sqrt(m EI)/T, which is enough for a wave of bending, axial waves would ring.  Where
         tension goes there is less time, and nothing that could ring.
         """
-        shares(self.grown, self.leaving, self.haste, dt / self.pace, self.base_of_cell, self.share)
-        return self.share
+        zones = self.zones
+        shares(self.grown, self.leaving, zones.haste, dt / self.pace, zones.kinds.base_of_cell, zones.share)
+        return zones.share
 
     def advance_ramp(self, dt: float) -> None:
         """Advance the ramps of stiffness by dt."""
-        advance(self.grown, self.leaving, self.haste, dt / self.pace)
+        advance(self.grown, self.leaving, self.zones.haste, dt / self.pace)
         self._update_ramping()
 
     def _update_ramping(self) -> None:

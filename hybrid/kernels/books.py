@@ -73,8 +73,9 @@ CLOCK_SIZE = 38
     MEASURED,  # steps of which `worst` knows
     NEW_STATE,  # 1 where the state of a START counts among the extremes
     SLACK_CELL,  # of the step of SLACK_STEP
-) = range(25)  # fmt: skip
-COUNT_SIZE = 25
+    VARIES,  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
+) = range(26)  # fmt: skip
+COUNT_SIZE = 26
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -133,7 +134,8 @@ class Books(NamedTuple):
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
-# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); of the model error, where it is followed, K numbers.
+# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); of the model
+# error, where it is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,
@@ -147,6 +149,9 @@ SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
 HEAD = SAMPLE_WORK + WORKS
 
 
-def sample_size(cells: int) -> int:
-    """Numbers of a sample of a line of so many cells, but for the model error."""
-    return HEAD + 9 * (cells + 1) + 8 * cells
+def sample_size(cells: int, varies: bool = False) -> int:
+    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness.
+
+    What is sampled of the model error comes behind them.
+    """
+    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1))

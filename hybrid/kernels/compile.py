@@ -70,16 +70,21 @@ class _Entry(_Kernel):
         )
 
     @cached_property
+    def _addresses(self) -> dict[Any, int]:
+        return {}
+
+    @cached_property
     def part(self) -> Any:
         return _for_kernels(self.py_func)
 
     def address(self, *args: Any) -> int:
         """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
         sig = tuple(numba.typeof(x) for x in args)
-        self.compile(sig)
-        made: Any = self.overloads[sig]
-        found: int = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
-        return found
+        if sig not in self._addresses:
+            self.compile(sig)
+            made: Any = self.overloads[sig]
+            self._addresses[sig] = made.library.get_pointer_to_function(made.fndesc.llvm_func_name)
+        return self._addresses[sig]
 
     def get_call_template(self, args: Any, kws: Any) -> Any:
         return self.part.get_call_template(args, kws)

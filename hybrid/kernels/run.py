@@ -39,6 +39,7 @@ from hybrid.kernels.books import (
     MUTE_SLACK,
     NEW_STATE,
     NOW,
+    OUTCOME,
     PARITY,
     PAUSED,
     PHASE,
@@ -68,7 +69,7 @@ from hybrid.kernels.books import (
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.end_motion import ends_at, sea_at
 from hybrid.kernels.extremes import first_strains, note_extremes
-from hybrid.kernels.newton import RUN, STEP, Limits, Task, solve
+from hybrid.kernels.newton import OK, RUN, STEP, Limits, Task, solve
 from hybrid.kernels.powers import find_powers
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
@@ -106,6 +107,8 @@ class Job(NamedTuple):
     work: Work
     books: Books
     following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.bending_error)
+    zone_table: NDArray[np.int64]  # of a kernels.zone_step.ZoneJob, of a run whose zones move
+    zones: int = 0  # address of kernels.zone_step.follow_zones; 0: zones stay, or Python follows them
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
@@ -130,20 +133,19 @@ def blank_job() -> Job:
     task = Task(0, limits=limits)
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(1, np.int64),
+        np.zeros(1, np.int64), np.zeros(0, np.int64),
     )  # fmt: skip
 
 
 read = reader(blank_job())
-call_solver = caller((0, 0, 0.0, 0))
-call_follower = caller(0)
+call_solver, call_follower, call_zones = caller((0, 0, 0.0, 0)), caller(0), caller(0)
 
 
 @inner
 def conclude(job, old, new):
     """After a try: -1, or what to return.  Where the step is accepted its books are kept, and it is looked at."""
-    line, ends, books, work = job.line, job.ends, job.books, job.work
-    clock, count = books.clock, books.counts
+    line, sea, ends, books, work = job.line, job.sea, job.ends, job.books, job.work
+    clock, count, asks = books.clock, books.counts, job.books.counts[ASKS] & ASK_STEPS
     dt = clock[TRY_END] - clock[NOW]
     verdict = judge(clock, count, work.report, dt)
     if verdict < 0:
@@ -160,8 +162,10 @@ def conclude(job, old, new):
         if job.follower != 0:
             count[FLAGS] |= call_follower(job.follower, job.following)
         if books.extremes.shape[1] > 0:
-            note_extremes(line, job.sea, ends, new, books, clock[NOW])
-        if count[FLAGS] != 0 or count[ASKS] & ASK_STEPS:
+            note_extremes(line, sea, ends, new, books, clock[NOW])
+        if job.zones != 0:
+            asks |= call_zones(job.zones, job.zone_table)
+        if count[FLAGS] != 0 or asks:
             return STEPPED
     return -1
 
@@ -248,10 +252,14 @@ def run(table):
         if count[PHASE] == SOLVE:
             ends_at(clock[TRY_END], moves, sea, job.ends, books.velocity)
             sea_at(clock[TRY_END], sea)
+            if job.zones != 0:
+                call_zones(job.zones, job.zone_table)
             clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
             outcome, it, left, where = call_solver(job.solver, table)
             note_try(clock, count, report, outcome, it, left, where)
             count[PHASE] = JUDGE
+            if job.zones != 0 and (count[OUTCOME] != OK or call_zones(job.zones, job.zone_table) != 0):
+                return TRIED
             if count[ASKS] & ASK_TRIES:
                 return TRIED
         code = conclude(job, old, new)

@@ -28,6 +28,7 @@ from hybrid.kernels.books import (
     SAMPLE_SPIN,
     SAMPLE_WORK,
     SAMPLES,
+    VARIES,
     WORKS,
 )
 from hybrid.kernels.cell import chord
@@ -124,6 +125,17 @@ def sample_cells(line, old, new, x, dt, k, tension, row):
 
 
 @inner
+def sample_line(line, row):
+    """Lengths of cells and stiffness of elements as they are at the end of the step."""
+    n = line.h.shape[0]
+    at = HEAD + 9 * (n + 1) + 8 * n
+    for c in range(n):
+        row[at + c] = line.h[c]
+    for i in range(n + 1):
+        put3(row, at + n, i, get3(line.kb, i))
+
+
+@inner
 def end_frame(imposed, m, k):
     """Frame of end k, now (m = 0) or before the last step (m = 1)."""
     f = imposed[m, k]
@@ -197,7 +209,11 @@ def sample_step(line, sea, old, new, books):
         sample_head(sea, books, x, dt, k, t, row)
         sample_nodes(old, new, x, dt, row)
         sample_cells(line, old, new, x, dt, k, books.tension, row)
-        sample_model_error(books.model_error, x, row, HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0])
+        at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
+        if count[VARIES]:
+            sample_line(line, row)
+            at += line.h.shape[0] + line.kb.size
+        sample_model_error(books.model_error, x, row, at)
         count[SAMPLES] += 1
         count[OUTPUT] += 1
     return True

@@ -17,6 +17,7 @@ Floats = NDArray[np.float64]
 LANES = 16
 # Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
 NO_PLANE: Floats = np.full((3, 3), np.nan)
+NOT_VARYING: Floats = np.zeros(0)
 
 
 class Line(NamedTuple):
@@ -167,6 +168,16 @@ class Batch(NamedTuple):
     report: Floats  # (nb, REPORT_SIZE) as named in kernels.report
     work: Floats  # (nb, number of powers) J, since the start
     sea_now: Floats  # (nb, 4) as `Sea.now`
+    h: Floats = NOT_VARYING  # (nb, N) m, lengths of cells where they change in a run; else empty: those of the line
+    kb: Floats = NOT_VARYING  # (nb, N+1, 3) N m, stiffness of elements, likewise
+
+    def line(self, k: int, line: Line) -> Line:
+        """The line at output k, from the one of all outputs."""
+        return line._replace(h=self.h[k], kb=self.kb[k]) if self.h.size else line
+
+    def stiffness(self, node: int, line: Line) -> Floats:
+        """Stiffness (1 or nb, 3) N m of the element at a node."""
+        return self.kb[:, node] if self.kb.size else line.kb[None, node]
 
 
 def batch_of_one(t: float, ends: Ends, state: State, report: Floats, work: Floats, sea: Sea) -> Batch:

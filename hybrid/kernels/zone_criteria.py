@@ -1,4 +1,4 @@
-"""When a stretch must be a rod: the kernel that weighs every criterion of the table at every step.
+"""When a stretch must be a rod: every criterion of the table, as a ratio, at every step.
 
 Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
 rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
@@ -23,12 +23,11 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, POINT, SLACK, TORSION
+from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.forces import SEABED
-from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
-from hybrid.kernels.state import Floats, Line, Sea, State, blank_line, blank_state, no_sea
+from hybrid.kernels.state import Floats
 
 # What a ratio is where there is no tension, or no number: large, and finite.
 MOST = 1e6
@@ -134,47 +133,19 @@ class NodeKinds(NamedTuple):
     twisting: Floats  # (N+1,) N m, torques of nodes (written)
 
 
-class CriteriaJob(NamedTuple):
-    """Arguments of `evaluate_criteria`."""
-
-    line: Line
-    sea: Sea
-    tangents: Floats  # (2, 3) of clamped ends, zero where there is none
-    state: State
-    past: Floats  # (N,) N, tensions some time ago
-    ahead: float  # how far their change since then goes on
-    tolerance: float  # m
-    torque: float  # N m, of the whole line as far as its rods do not know it
-    kinds: NodeKinds
-    ratios: Floats  # (criteria, n) of base cells (raised)
-
-
-def blank_criteria_job() -> CriteriaJob:
-    """A job with the types that every one has."""
-    z = np.zeros
-    kinds = NodeKinds(z(2), z(2), z(2), z(2, np.int8), z(2), z(1, np.int64), z(1, np.int8), z(2), z(2))
-    return CriteriaJob(
-        blank_line(1), no_sea(1), z((2, 3)), blank_state(1), z(1), 0.0, 1.0, 0.0, kinds, z((len(CRITERIA), 1))
-    )  # fmt: skip
-
-
-read = reader(blank_criteria_job())
-
-
-@kernel
-def evaluate_criteria(table):
+@inner
+def raise_ratios(line, sea, tangents, state, past, ahead, tolerance, torque, kinds, ratios):
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
-    table: of a CriteriaJob (kernels.binding).  Returns the largest ratio among base cells that are catenary and free.
+    tangents: (2, 3) of clamped ends, zero where there is none; past: (N,) N, tensions some time ago; ahead: how far
+    their change since then goes on; tolerance: m; torque: N m, of all the line as far as its rods do not know it.
     """
-    job = read(table)
-    line, sea, state, past, kinds, ratios = job.line, job.sea, job.state, job.past, job.kinds, job.ratios
-    a, tolerance = job.ahead, job.tolerance
+    a = ahead
     EI, w, bent, node, floor = kinds.EI, kinds.w, kinds.bent, kinds.node, kinds.floor
-    base_of_cell, free, turn, twisting = kinds.base_of_cell, kinds.free, kinds.turn, kinds.twisting
+    base_of_cell, turn, twisting = kinds.base_of_cell, kinds.turn, kinds.twisting
     r, e, T, a1 = state.r, state.e, state.T, state.a1
     n = e.shape[0]
-    find_turns(line, job.tangents, e, a1, job.torque, turn, twisting)
+    find_turns(line, tangents, e, a1, torque, turn, twisting)
     whole = 0.0
     for i in range(n + 1):
         whole += turn[i]
@@ -203,10 +174,15 @@ def evaluate_criteria(table):
             p = depth(sea, r, i) > 0.0
             if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
                 raise_ratio(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+
+
+@inner
+def largest_ratio(line, kinds, ratios):
+    """The largest ratio among base cells that are catenary and free."""
     loudest = 0.0
-    for i in range(n):
-        j = base_of_cell[i]
-        if not line.spin[i] and free[j]:
+    for i in range(line.spin.shape[0]):
+        j = kinds.base_of_cell[i]
+        if not line.spin[i] and kinds.free[j]:
             for c in range(ratios.shape[0]):
                 loudest = max(loudest, ratios[c, j])
     return loudest

@@ -127,8 +127,8 @@ class Observation:
         nb, n = b.T.shape
         M, strain, energy = np.zeros((nb, n + 1, 3)), np.zeros((nb, n + 1, 3)), np.zeros((nb, 4))
         ends = map(Ends, b.held, b.position, b.frame, b.spin, b.force, b.moment)
-        for row in zip(ends, b.e, b.v, b.a1, b.w, M, strain, energy, strict=True):
-            observe(line, *row)
+        for k, row in enumerate(zip(ends, b.e, b.v, b.a1, b.w, M, strain, energy, strict=True)):
+            observe(b.line(k, line), *row)
         if not (line.element.any() or line.spin.any()):  # a catenary has neither
             M = strain = np.broadcast_to(np.zeros(1), M.shape)
         return last(M), last(strain), last(energy)
@@ -256,11 +256,11 @@ class Observation:
         inner = cell + 1 if cell == node else cell
         if not line.element[inner]:
             return np.zeros((2, self.batch.t.size))
-        B = (line.kb[inner] * line.hn[inner])[:, None]
+        B = self.batch.stiffness(inner, line).T * line.hn[inner]
         k0 = (line.k0[inner] / line.hn[inner])[:, None]
         a1, d, M = self.batch.a1[:, cell].T[None], self.d[cell : cell + 1], self.node_moment[node : node + 1]
         body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M)])
-        k = k0 + np.divide(body, B, out=np.zeros_like(body), where=B > 0)
+        k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
         return np.stack([np.hypot(k[0], k[1]), k[2]])
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
@@ -295,7 +295,7 @@ class Observation:
     def _end_tension(self, k: int) -> Floats:
         """Tension (nb,) N of the cable at end k, extrapolated from its last cells."""
         first, second = (0, 1) if k == 0 else (-1, -2)
-        T, h = self.T, self.line.h
+        T, h = self.T, self.batch.h.T if self.batch.h.size else self.line.h
         return T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0]
 
     # ---- seabed and energies, of what was computed --------------------------------------------

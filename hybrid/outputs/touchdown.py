@@ -47,11 +47,12 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
     outputs = np.arange(p.shape[1])
     cells = np.stack([touching.argmax(axis=0), line.h.size - 1 - touching[::-1].argmax(axis=0)])
     x = np.stack([x0[cells[0], outputs], x1[cells[1], outputs]])
-    edges = line.s[cells] + x * line.h[cells]
+    h = np.diff(line.s)
+    edges = line.s[cells] + x * h[cells]
     # (2, nb, 3), because numpy puts what is indexed by arrays first
     near, far = r[cells, :, outputs], r[cells + 1, :, outputs]
     places = np.moveaxis(near + x[:, :, None] * (far - near), -1, 1)
-    grounded = sum_down(line.h[:, None] * np.where(touching, x1 - x0, 0.0))
+    grounded = sum_down(h[:, None] * np.where(touching, x1 - x0, 0.0))
     lies = touching.any(axis=0)
     return Touchdown(np.where(lies, edges, np.nan), np.where(lies, places, np.nan), grounded)
 

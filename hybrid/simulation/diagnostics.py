@@ -332,7 +332,7 @@ class Diagnostics:
             beside = [i for i in (node - 1, node + 1) if 0 < i < last and line.element[i]]
             if not line.element[node] or not beside:
                 continue
-            cell, stiffness = min(node, last - 1), float(line.kb[node, :2].max() * line.hn[node])
+            cell, stiffness = min(node, last - 1), batch.stiffness(node, line)[:, :2].max(axis=1) * line.hn[node]
             thin = batch.T[:, cell] * line.h[cell] ** 2 > stiffness
             angle = np.linalg.norm(after - before, axis=1) - float(np.linalg.norm(line.k0[node, :2]))
             smooth = np.max([np.linalg.norm(d[:, i] - d[:, i - 1], axis=1) / line.hn[i] for i in beside], axis=0)
@@ -392,8 +392,9 @@ class Diagnostics:
         if self._rested or not rod.any():
             return
         elastic = sum(values[f"energy/{x}"] for x in ("stretch", "bending", "torsion"))
-        bending = float((line.kb[:, :2] * line.hn[:, None])[line.element == 1].min(initial=np.inf))
-        least = PRESSED * bending / model.length if np.isfinite(bending) else 0.0  # J
+        kb = (batch.kb if batch.kb.size else line.kb[None])[:, line.element == 1, :2]
+        bending = (kb * line.hn[line.element == 1, None]).min(axis=(1, 2), initial=np.inf)
+        least = np.where(np.isfinite(bending), PRESSED * bending / model.length, 0.0)  # J
         twisted, lowest_ = values["energy/torsion"] > least, batch.T[:, rod].min(axis=1)
         pressed = (lowest_ * model.length < -least) | twisted
         calm = (values["energy/kinetic"] <= AT_REST * elastic) | ~batch.v.any(axis=(1, 2))

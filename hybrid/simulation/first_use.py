@@ -21,7 +21,7 @@ from hybrid.scene.schema import Scene
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.in_plane", "run.in_space")
-OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_rules._plan", "bending_error.advance_error"
+OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_step.follow_zones", "bending_error.advance_error"
 STEPS = "run.run"  # around the solver of either kind
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
@@ -123,13 +123,14 @@ def _compile_outputs(model: Model) -> None:
 
 
 def _compile_zones(scene: Scene, model: Model) -> None:
+    from hybrid.kernels.zone_step import follow_zones
     from hybrid.simulation.initial_zones import manager_for
 
     manager = manager_for(scene, model, first_resolution(scene), None)
     manager.evaluate_criteria(model.line, model.sea.values, model.ends.values, model.start, 0.0)
     manager.initial_rods(model.start)
-    manager.store_past(model.start)
     manager.review(0.0, model.start)
+    follow_zones.compile_unless_busy(np.zeros(0, np.int64))
 
 
 def _compile_model_error(model: Model) -> None:

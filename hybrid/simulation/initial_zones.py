@@ -55,8 +55,7 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
         model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
         LEFT if model.corrected else 1.0,
     )  # fmt: skip
-    manager.moments = model.ends.moments
-    manager.loaded = bool(manager.moments.any())
+    manager.load(model.ends.moments)
     return manager
 
 

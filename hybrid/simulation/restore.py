@@ -172,8 +172,7 @@ def restored_parts(
         # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
         start = first if not changes else build(scenes[0], resolution, first.layout)
         manager = manager_for(scene, start, resolution, criterion)
-        manager.moments = model.ends.moments
-        manager.loaded = bool(manager.moments.any())
+        manager.load(model.ends.moments)
         manager.set_layout(model.layout)
         switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")
     torque = switching.torque if switching is not None else None

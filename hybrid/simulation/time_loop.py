@@ -72,6 +72,7 @@ class TimeLoop:
         self._cpu = clock.process_time()  # at the start of the run
         self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
+        run.asks_samples = run.switching is not None and observer.writes_criteria
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
         self._logged = 0.0  # s of processor time since then, at the last row of the log
 

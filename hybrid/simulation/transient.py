@@ -15,7 +15,6 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
-from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.state import State
 from hybrid.kernels.step_law import FIRST
@@ -35,8 +34,6 @@ from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
 
-LONGEST_IN_PACE = 0.1  # of the time in which bending comes and goes: a step may not be longer meanwhile
-READY = STEEPEST  # times as long may it be before: a change must not shorten it by more than the scheme's weights carry
 WHOLE_STEPS = 1e-6  # of a step: a time so near to a number of steps is one
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
@@ -70,14 +67,15 @@ class Transient:
         assert scene.time is not None
         self.scene, self.model, self.resolution, self.events = scene, model, resolution, events
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
-        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes)
+        self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
+        self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
-        self._leaves, self._rescues = False, 0
+        self._leaves, self._rescues = False, (0, 0)  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
@@ -137,8 +135,8 @@ class Transient:
     @property
     def unchanging(self) -> bool:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
-        changes = self._pending is not None or self._leaves
-        return not (changes or (self.switching is not None and self.switching.prepares))
+        joints = self.switching is not None and self.switching.joints is not None
+        return not (self._pending is not None or self._leaves or joints)
 
     # --- the start ------------------------------------------------------------------------------
 
@@ -233,8 +231,7 @@ class Transient:
             code = run.go()
             if code == b.TRYING:
                 assert self.switching is not None
-                end = float(clock[b.TRY_END])
-                self.switching.prepare_step(end, end - self.t, self.state)
+                self.switching.prepare_step(float(clock[b.TRY_END]) - self.t, self.state)
             elif code == b.TRIED:
                 self._pending = self._review_try()
                 if self._pending is not None:
@@ -263,18 +260,16 @@ class Transient:
     def _choose_asks(self) -> None:
         """When the compiled run has to ask: for zones, for a plane that is left."""
         count, switching, asks = self.run.count, self.switching, 0
+        if self._leaves:
+            asks |= b.ASK_STEPS
+        if self._leaves or self._pending is not None or self.asks_samples:
+            asks |= b.ASK_SAMPLES
+        if switching is not None and not switching.compiled:
+            asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
         if self.correction is not None:
             self.correction.set_torque()
-        if switching is not None or self._leaves:
-            asks |= b.ASK_STEPS | b.ASK_SAMPLES
-        if switching is not None:
-            asks |= b.ASK_TRIES
-            if switching.prepares:
-                asks |= b.ASK_BEFORE
-            blending = switching.manager.ramping
-            self.run.clock[b.ALLOWED] = (
-                LONGEST_IN_PACE * switching.manager.pace * self.resolution.every * (1.0 if blending else READY)
-            )
+            if switching is not None and switching.manager.twisted:
+                asks |= b.ASK_STEPS  # the torque is another one after every step
         count[b.ASKS] = asks
 
     def _review_try(self) -> Change | None:
@@ -283,9 +278,10 @@ class Transient:
         assert switching is not None
         clock, count, tried = run.clock, run.count, run.tried
         end, dt = float(clock[b.TRY_END]), float(clock[b.TRY_END] - clock[b.NOW])
-        change = switching.rescue(tried, end, dt, run.before, self._rescues)
+        rescues = self._rescues[1] if self._rescues[0] == self.steps else 0
+        change = switching.rescue(tried, end, dt, run.before, rescues)
         if change is not None:
-            self._rescues += 1
+            self._rescues = self.steps, rescues + 1
         elif tried.outcome != Outcome.OK and 0.5 * clock[b.TRIED_DT] < clock[b.SHORTEST]:
             change = switching.all_rod(tried)
             clock[b.TRIED_DT] = clock[b.UNTIL] - clock[b.NOW] if change is not None else clock[b.TRIED_DT]
@@ -295,7 +291,7 @@ class Transient:
 
     def _after_step(self) -> None:
         """A step is accepted: what zones put in is booked, and what is to change decided."""
-        run, model = self.run, self.model
+        run = self.run
         flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
         if flags & b.UNKNOWN_ERROR:
             self._note_unknown_error()
@@ -308,9 +304,8 @@ class Transient:
         if flags & b.LEAVES_PLANE:
             self._leaves = self.plane_monitor.must_leave(run, self._note)
         if self.switching is not None:
-            booked, self._pending = self.switching.book_step(end, dt, model.ends.values, run.before, run.state)
+            booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
-            self._rescues = 0
         changes = self._pending is not None or self._leaves
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
@@ -399,8 +394,7 @@ class Transient:
             model = replace(model, line=in_space(model.line), plane=None)
         self.set_model(model, state)
         if self.switching is not None:
-            self.switching.manager.moments = model.ends.moments
-            self.switching.manager.loaded = bool(model.ends.moments.any())
+            self.switching.manager.load(model.ends.moments)
         text = (
             f"from t = {self.t:.6g} s on other loads act, or the ends move otherwise, as `hybrid resume` was asked to"
         )
@@ -427,6 +421,8 @@ class Transient:
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)
         self.plane_monitor.attach(self.run, model.line)
+        if self.switching is not None:
+            self.switching.attach(self.run, self.resolution.every)
 
     def _note(self, node: int, kind: str, text: str) -> None:
         s = float(self.model.line.s[node])

@@ -21,6 +21,7 @@ from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Moves, Sea, State, Work
+from hybrid.kernels.zone_step import follow_zones
 from hybrid.solve.bending_corrector import Corrector
 
 # Steps and samples that a call may take before Python writes them down.
@@ -44,14 +45,18 @@ class Tried(NamedTuple):
 class CompiledRun:
     """Steps of one line, many in a call.  Its state is states[parity]; the other one is that before the last step."""
 
-    def __init__(self, rho: float, outputs: Floats, extremes: bool) -> None:
-        """rho: spectral radius of the scheme; outputs: s, times of samples; extremes: whether they are kept."""
+    def __init__(self, rho: float, outputs: Floats, extremes: bool, varies: bool = False) -> None:
+        """rho: spectral radius of the scheme; outputs: s, times of samples; extremes: whether they are kept; varies:
+
+        whether lengths and stiffness change, and samples have them.
+        """
         self.table = Table(blank_job())
         self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
         self.clock, self.count = self.books.clock, self.books.counts
         self.keeps_extremes, self._room = extremes, np.zeros(0)
         self.clock[b.RHO], self.clock[b.ALLOWED] = rho, np.inf
         self.clock[b.LEAST_PEAK] = np.inf
+        self.count[b.VARIES] = varies
         self.states: tuple[State, State]
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
         self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
@@ -70,7 +75,7 @@ class CompiledRun:
         """
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
-        size = sample_size(cells) + followed.shape[1]
+        size = sample_size(cells, bool(self.count[b.VARIES])) + followed.shape[1]
         if not self._room.size:
             self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
         rows = max(1, min(ROWS, self._room.size // size))
@@ -117,6 +122,10 @@ class CompiledRun:
         self.pushes = pushes[::-1] if self.count[b.PARITY] else pushes
         self.table.bind(was=self.pushes[0], now=self.pushes[1])
         self.clock[b.PUSH_START] = 0.0
+
+    def follow(self, zones: Table, compiled: bool) -> None:
+        """Zones move from now on (kernels.zone_step); compiled: every step asks them, not Python."""
+        self.table.bind(zones=follow_zones.address(zones.numbers) if compiled else 0, zone_table=zones.numbers)
 
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""
@@ -216,9 +225,10 @@ class CompiledRun:
         spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
         r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
+        varies = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else ()
         held = np.repeat(ends.held[None], count, axis=0)
         self.sampled_errors = rows[:, at:]
-        return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea)
+        return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, *varies)
 
 
 def no_extremes(columns: int) -> Floats:

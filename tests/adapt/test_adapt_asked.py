@@ -24,10 +24,11 @@ from adapt_scenes import (
 from problems import Scene, clamped, pinned, scene
 
 import hybrid
-from hybrid.adapt.manager import REJECT_RATIO, DomainManager
+from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.kernels.criteria import BEND, CRITERIA
 from hybrid.kernels.state import no_sea
+from hybrid.kernels.zone_step import REJECT_RATIO
 
 STEP = 0.02
 

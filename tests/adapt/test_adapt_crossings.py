@@ -46,8 +46,9 @@ from adapt_scenes import (
 from problems import Scene
 
 import hybrid
-from hybrid.adapt.manager import BUFFER, LOOKAHEAD
+from hybrid.adapt.manager import BUFFER
 from hybrid.adapt.zone_rules import spread
+from hybrid.kernels.zone_step import LOOKAHEAD
 
 Floats = np.ndarray
 DT = 0.02
