@@ -254,7 +254,7 @@ def plain_values(
     x = batch
     state = blank_state(x.T.shape[1])._replace(r=x.r[i], v=x.v[i], e=x.e[i], T=x.T[i], a1=x.a1[i], w=x.w[i])
     ends = Ends(x.held[i], x.position[i], x.frame[i], x.spin[i], x.force[i], x.moment[i])
-    computed = Plain(observer.line, observer.sea, observer.zones, ends, state, grid, x.report[i])
+    computed = Plain(x.line(i, observer.line), observer.sea, observer.zones, ends, state, grid, x.report[i])
     shifted = computed.corrected(shift) if shift is not None else computed
     v = shifted if corrected else computed
     t = v.tangent
