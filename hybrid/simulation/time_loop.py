@@ -261,7 +261,7 @@ class TimeLoop:
         detail = explanation(run, tried, dt)
         left = snapshot(run, self.target, tried, dt) if self.target is not None else None
         error = ComputationError(tried.outcome, run.t, s, detail, left, first_remedy(run, tried))
-        self._log()
+        self.write_down(everything=True)  # outputs that wait
         if run.t > self.recorder.last:
             self._record_now()
         self.write_envelope()
