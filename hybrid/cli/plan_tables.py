@@ -60,6 +60,9 @@ def _count(n: int, what: str) -> str:
 
 def _model(plan: Plan) -> str:
     """Kinds of zones; the first four of many."""
+    if plan.choice:
+        each = ", ".join(f"{kind} {span(seconds)}" for kind, seconds in plan.choice)
+        return f"the cheapest, by a pre-run: {each}"
     if plan.base_cells is not None:
         return "adaptive: rod where a criterion asks for it, catenary elsewhere"
     if len(plan.zones) == 1:

@@ -9,8 +9,10 @@ from math import ceil
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import build
 from hybrid.model.contents import Entry
+from hybrid.model.material import material
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import first_resolution
+from hybrid.model.model_costs import structural, with_model
+from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.run_time import processor_time
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
@@ -28,6 +30,8 @@ class Plan:
     steps: int
     step: float  # s, of most steps
     seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
+    # The same of every model that a pre-run chooses from; none: the scene names its model.  The rest is as for rods.
+    choice: tuple[tuple[str, float], ...] = ()
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
@@ -90,6 +94,16 @@ def plan(scene: SceneLike) -> Plan:
     scene = as_scene(scene)
     if scene.time:
         refuse_too_much(scene)
+    if not model_is_free(scene):
+        return _plan(scene)
+    rods = _plan(with_model(scene, "rod"))
+    kinds = ["adaptive"] if structural(scene, material(scene)) else ["catenary", "adaptive"]
+    others = tuple((kind, _plan(with_model(scene, kind)).seconds) for kind in kinds)
+    return replace(rods, choice=(("rod", rods.seconds), *others))
+
+
+def _plan(scene: Scene) -> Plan:
+    """The same of a scene that names its model."""
     model = build(scene)
     middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
     cells = tuple(int(((middle > z.s_a) & (middle < z.s_b)).sum()) for z in model.zones)

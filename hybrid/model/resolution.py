@@ -139,6 +139,16 @@ def zones_are_free(scene: Scene) -> bool:
     return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
 
 
+def model_is_free(scene: Scene) -> bool:
+    """Whether the program chooses the model by a pre-run: of a cable that bends, in motion, whose scene names no model.
+
+    Where the scene gives steps and asks for no accuracy, places the cells, or wants criteria as fields, zones move.
+    """
+    named = "model" in scene.model_fields_set or not isinstance(scene.model, AdaptiveModel)
+    wants = scene.time is not None and requested_accuracy(scene) is not None and mesh_is_free(scene)
+    return wants and not named and not scene.output.criteria and scene.solver == "elimination"
+
+
 def first_resolution(scene: Scene) -> Resolution:
     """The resolution for a scene's accuracy, before anything is known of its errors."""
     want = requested_accuracy(scene)

@@ -13,7 +13,7 @@ from hybrid.model.resolution import requested_accuracy, wants_errors
 from hybrid.scene.schema import JonswapWaves, Scene
 
 # s per cell and Newton iteration, in space and in a plane.
-COST = {"rod": (0.6e-6, 0.25e-6), "catenary": (0.2e-6, 0.15e-6)}
+COST = {"rod": (0.4e-6, 0.18e-6), "catenary": (0.1e-6, 0.09e-6)}
 # What optional forces add to that; those that are not here add nothing measurable.
 MORE = {
     DRAG: (0.045e-6, 0.010e-6), ADDED_MASS: (0.045e-6, 0.013e-6), STIFFNESS_DAMPING: (0.05e-6, 0.0),
@@ -23,7 +23,7 @@ MORE = {
 # s per node, step and wave: sines and exponentials.
 COST_WAVE = 30e-9
 # s of a run, a step, a step of zones that move, an output.
-COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.01, 32e-6, 100e-6, 0.33e-3
+COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 60e-6, 0.1e-3
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
@@ -34,24 +34,33 @@ COST_ERRORS, COST_ACCURACY = 2.1, 2.6
 COST_CORRECTOR = 0.3  # of the line's own, where the error of leaving bending out is followed
 
 
+def step_time(
+    scene: Scene, model: Model, rods: float, catenaries: float, moves: bool = False, followed: bool = False
+) -> float:
+    """Processor time, s, of a step of a line of so many cells of either kind.
+
+    model: of the scene, with whatever cells; moves: zones move; followed: the error of leaving bending out is followed.
+    """
+    flat, total = model.plane is not None, rods + catenaries
+    each = COST["rod"][flat] * rods + COST["catenary"][flat] * catenaries
+    each += total * sum(cost[flat] for bit, cost in MORE.items() if model.line.bits & bit)
+    each *= USUAL_ITERATIONS * (1.0 + COST_CORRECTOR * followed)
+    waves = scene.environment.waves
+    if waves is not None:
+        each += COST_WAVE * total * (waves.components if isinstance(waves, JonswapWaves) else 1)
+    return each + COST_STEP + COST_MANAGER * moves
+
+
 def processor_time(scene: Scene, model: Model, cells: Sequence[int], steps: int, outputs: float) -> float:
     """Processor time, s, of a run with so many steps at least; cells: of each zone of the model, if all is rod."""
     if scene.time is None:
         return 0.0
-    flat = model.plane is not None
     counts = {"rod": 0.0, "catenary": 0.0}
     for zone, count in zip(model.zones, cells, strict=True):
         counts[zone.kind] += count
     if model.layout is not None:
         counts = {"rod": ROD_SHARE * model.cells, "catenary": (1.0 - ROD_SHARE) * model.layout.rod.size}
-    total = sum(counts.values())
-    each = sum(COST[kind][flat] * count for kind, count in counts.items())
-    each += total * sum(cost[flat] for bit, cost in MORE.items() if model.line.bits & bit)
-    each *= USUAL_ITERATIONS * (1.0 + COST_CORRECTOR * model.follows_error)
-    waves = scene.environment.waves
-    if waves is not None:
-        each += COST_WAVE * total * (waves.components if isinstance(waves, JonswapWaves) else 1)
-    step = each + COST_STEP + COST_MANAGER * (model.layout is not None)
+    step = step_time(scene, model, counts["rod"], counts["catenary"], model.layout is not None, model.follows_error)
     one = COST_RUN + steps * (MORE_STEPS if scene.time.controlled else 1.0) * step + outputs * COST_OUTPUT
     if not wants_errors(scene):
         return one

@@ -72,8 +72,9 @@ class Scene(Table):
     initial: Initial = Field(description="where the cable is at t = 0")
     model: Model = Field(
         default_factory=lambda data: usual_model(data.get("cable")),
-        description="where the cable is a rod and where a catenary; absent: adaptive for a cable with bending "
-        "stiffness (rod, if it bends differently in two directions or has a rotary_inertia), else catenary",
+        description="where the cable is a rod and where a catenary; absent: of a cable with bending stiffness that of "
+        "rod, catenary and adaptive which costs least by a pre-run, where an accuracy is asked and no mesh given, else "
+        "adaptive (rod, if it bends differently in two directions or has a rotary_inertia); of others catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")

@@ -15,15 +15,18 @@ import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 from hybrid.adapt.manager import UserCriterion
-from hybrid.errors import ResultError, SceneError
+from hybrid.errors import ComputationError, ResultError, SceneError
+from hybrid.model.model_costs import NAMED, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
     is_irregular,
     mesh_is_free,
+    model_is_free,
     requested_accuracy,
     wants_errors,
     zones_are_free,
@@ -36,6 +39,7 @@ from hybrid.simulation.error_control import ErrorController, comparison_resoluti
 from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
+from hybrid.simulation.model_choice import choose_model, rods_instead
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import RemainingRun, remaining_run
@@ -84,7 +88,8 @@ def run(
             return run_shooting(scene, output, overwrite)
     if criterion is not None and not isinstance(scene.model, AdaptiveModel):
         raise TypeError("a criterion is for zones that move: the scene's model is not adaptive")
-    compile_beside(scene)
+    chosen = criterion is None and model_is_free(scene)  # most often rods, which need least to be compiled
+    compile_beside(with_model(scene, "rod") if chosen else scene)
     case, target = Case(scene, criterion), _target(output, overwrite)
     with locked(_path(output)), _supervised(case, progress):
         if isinstance(target, Path):
@@ -160,7 +165,7 @@ def _compute(
     case: Case, target: Path | io.BytesIO, source: Path | None = None, remaining: RemainingRun | None = None
 ) -> None:
     """Compute a result, and its errors if they are wanted; source, remaining: what to continue."""
-    scene, begin = case.scene, clock.process_time()
+    begin = clock.process_time()
     control: ErrorController | None = None
 
     def first(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
@@ -173,41 +178,79 @@ def _compute(
             return case.resume(to, to, found())
         return case.record(resolution, to, found())
 
+    def anew(resolution: Resolution, to: Path | io.BytesIO) -> RunSample:
+        return case.record(resolution, to, found())
+
     def found() -> Tree:
         return control.checkpoint() if control is not None else {}
 
-    resolution = first_resolution(scene) if remaining is None else remaining.resolution
-    if not wants_errors(scene):
+    resolution = first_resolution(case.scene) if remaining is None else remaining.resolution
+    if not wants_errors(case.scene):
         first(resolution, target)
         return
-    compute, kept = _replacing(target, first, refinement), False
+    kept = False
     case.beside_result = target if isinstance(target, Path) else None
     try:
-        asked = requested_accuracy(scene)
-        irregular = is_irregular(scene) and not (asked is not None and asked.instant)
-        control = ErrorController(asked, _free(scene), True, case.sample, compute, case.beside, irregular)
         if remaining is not None and remaining.before:
+            control = _controller(case, _replacing(target, first, refinement))
             with refused(source or Path()):
-                control.restore(remaining.before, scene, case.points, source)
-            result, errors = control.proceed()
+                control.restore(remaining.before, case.scene, case.points, source)
+            go_on = control.proceed
         else:
-            surveys = remaining is None and requested_accuracy(scene) is not None
-            _expect(case, resolution, surveys and mesh_is_free(scene))
-            if surveys:
-                resolution = replace(resolution, grading=case.survey(resolution))
+            choice, resolution = _surveyed(case, resolution) if remaining is None else (NAMED, resolution)
+            control = _controller(case, _replacing(target, first, refinement), choice)
+            go_on = partial(control.start, resolution)
+        try:
+            result, errors = go_on()
+            failed = control.model_misses
+        except ComputationError as error:
+            if control.choice.kind != "catenary":
+                raise
+            failed = str(error).splitlines()[0]
+        if control.choice.kind == "catenary" and failed:
+            _emptied(target)
+            choice, resolution = rods_instead(case, first_resolution(case.scene), failed)
+            control = _controller(case, _replacing(target, anew, refinement), choice)
             result, errors = control.start(resolution)
     except KeyboardInterrupt:
         if control is not None and control.estimate is not None:  # the result before the finer run stands
             result, errors = control.without_refinement("a finer run was stopped from outside")
-            write_errors(target, scene, control, result, errors, clock.process_time() - begin, done=False)
+            write_errors(target, case.scene, control, result, errors, clock.process_time() - begin, done=False)
         begun = control is not None and (control.comparisons or control.estimate) is not None
         kept = begun and isinstance(target, Path) and target.exists()  # it can be resumed
         raise
     else:
-        write_errors(target, scene, control, result, errors, clock.process_time() - begin)
+        write_errors(target, case.scene, control, result, errors, clock.process_time() - begin)
     finally:
         if isinstance(target, Path) and not kept:
             remove_rows(target)
+
+
+def _emptied(target: Path | io.BytesIO) -> None:
+    """Drop what a run has left that failed and is made again with another model."""
+    if isinstance(target, io.BytesIO):
+        target.seek(0)
+        target.truncate()
+        return
+    for left in (target, target.with_suffix(".snapshot.npz")):
+        left.unlink(missing_ok=True)
+
+
+def _controller(case: Case, compute: Callable[[Resolution], RunSample], choice: ModelChoice = NAMED) -> ErrorController:
+    """What chooses how finely a case is computed."""
+    asked = requested_accuracy(case.scene)
+    irregular = is_irregular(case.scene) and not (asked is not None and asked.instant)
+    return ErrorController(asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice)
+
+
+def _surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
+    """The model, if the scene names none, and cells by a pre-run, if an accuracy is asked for."""
+    surveys = requested_accuracy(case.scene) is not None and mesh_is_free(case.scene)
+    _expect(case, resolution, surveys)
+    if surveys and case.criterion is None and model_is_free(case.scene):
+        choice, grading = choose_model(case, resolution)
+        return choice, replace(resolution, grading=grading)
+    return NAMED, replace(resolution, grading=case.grading(resolution)) if surveys else resolution
 
 
 def _free(scene: Scene) -> Free:

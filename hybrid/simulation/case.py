@@ -31,7 +31,7 @@ from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
-from hybrid.simulation.mesh_survey import POINTS, survey_grading, survey_resolution
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
@@ -293,10 +293,8 @@ class Case:
             found.steps,
         )
 
-    def survey(self, resolution: Resolution) -> Grading | None:
-        """Where cells should be short; None: a coarse run to see that failed, or the scene says where they go."""
-        if not mesh_is_free(self.scene):
-            return None
+    def survey(self, resolution: Resolution) -> Survey | None:
+        """A coarse run that shows where cells should be short; None: it failed."""
         coarse = survey_resolution(resolution)
         model = build(self.scene, coarse)
         s = np.linspace(0.0, model.length, POINTS)
@@ -304,8 +302,16 @@ class Case:
             found = self.sample(coarse, s).values
         except ComputationError:
             return None
-        bend = rod_cells(self.scene, model.cable, s) if model.layout is not None else None
-        return survey_grading(model, s, {name: np.asarray(x) for name, x in found.items()}, bend)
+        return Survey.of(model, s, {name: np.asarray(x) for name, x in found.items()})
+
+    def grading(self, resolution: Resolution) -> Grading | None:
+        """Where cells should be short; None: the pre-run that would show it failed, or the scene says where they go."""
+        found = self.survey(resolution) if mesh_is_free(self.scene) else None
+        if found is None:
+            return None
+        if found.model.layout is None:
+            return found.grading()
+        return found.grading_of_moving_zones(rod_cells(self.scene, found.model.cable, found.demand.s))
 
     # --- parts of a run -------------------------------------------------------------------------
 

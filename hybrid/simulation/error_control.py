@@ -17,13 +17,14 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import ComputationError
+from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import COARSER, Errors, Estimate
 from hybrid.simulation.error_statistics import LARGEST, STATISTICS, estimates, snaps, statistics_of
-from hybrid.simulation.refinement import Free, Verdict, judge, refined
+from hybrid.simulation.refinement import MOST_OF_MODEL, Free, Verdict, judge, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
 from hybrid.store.named_arrays import Tree, matched
@@ -77,6 +78,7 @@ class ErrorController:
     result: Callable[[Resolution], RunSample]
     beside: Beside | None = None
     irregular: bool = False
+    choice: ModelChoice = NAMED  # of a scene that names no model
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
@@ -93,7 +95,7 @@ class ErrorController:
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
         found = self.estimate
-        own = [*self._notes, *self._irregular_note()]
+        own = [*self.choice.notes, *self._notes, *self._irregular_note()]
         return (*own, *((*found.run.notes, *found.notes) if found is not None else ()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
@@ -169,6 +171,15 @@ class ErrorController:
             text = found.text.replace(": error", f", {STATISTICS[statistic]}: error")
             verdicts.append(replace(found, text=text, statistic=statistic))
         return max(verdicts, key=lambda found: found.ratio)
+
+    @property
+    def model_misses(self) -> str:
+        """Where leaving bending out makes more of the error than is asked allows, how much; else empty."""
+        if self.asked is None or self.estimate is None:
+            return ""
+        found = self._verdict(self.asked)
+        misses = found.ratio > 1.0 and found.model > MOST_OF_MODEL
+        return f"leaving bending out makes {100 * found.model:.2g} % of what is asked" if misses else ""
 
     def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
         """The result as it is and its errors, where a finer one did not come to its end."""
@@ -308,7 +319,7 @@ class ErrorController:
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
-            "scattered": self.scattered,
+            "scattered": self.scattered, "choice": list(self.choice),
             "irregular": self.irregular, "ratio": self._ratio, "finer": self._judged, "notes": self._notes,
         }  # fmt: skip
 
@@ -319,8 +330,8 @@ class ErrorController:
         ResultError or ValueError: it is none of this scene.
         """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
-        names = ("next", "coarse", "estimate", "statistics", "scattered", "notes")
-        saved = matched(tree, template | dict.fromkeys(names), "error control")
+        names = ("next", "coarse", "estimate", "statistics", "scattered", "notes", "choice")
+        saved = matched({"choice": ["", ""], **tree}, template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._every, self.irregular = saved["every"], saved["irregular"]
@@ -339,6 +350,9 @@ class ErrorController:
         if saved["statistics"]:
             trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
             self.statistics = {name: Estimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
+        self.choice = ModelChoice(*matched(saved["choice"], ["", ""], "choice"))
+        if self.choice.kind not in ("", *WORDS):
+            raise ValueError(f"a model that nobody knows: {self.choice.kind}")
         self.scattered = [name for name in END_FORCES.values() if name in list(saved["scattered"])]
         if self.next is None and self.estimate is None:
             raise ValueError("neither a result nor one that is to come")

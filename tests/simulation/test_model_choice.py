@@ -1,0 +1,130 @@
+"""A scene that names no model: what is taken, what is said, and what stays as the scene asks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.model.model_costs import CHOSEN, Cost, cheapest
+from hybrid.model.resolution import model_is_free
+from hybrid.simulation import model_choice
+
+TAUT = {
+    "environment": {"fluid": {"density": 1025}},
+    "cable": {"sections": [{"length": 52, "mass": 3, "diameter": 0.03, "bending_stiffness": 1, "drag": {"normal": 1.2}}]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [48, 0, 0], "motion": {"heave": {"amplitude": 0.5, "period": 5}, "ramp": 5}},
+    },
+    "initial": "equilibrium", "time": {"duration": 10.0}, "output": {"every": 0.5},
+}  # fmt: skip
+CLAMPED = TAUT | {"ends": TAUT["ends"] | {"start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -1]}}}
+
+
+def chosen(result: hybrid.Result) -> str:
+    (text,) = (e.text for e in result.events if e.kind == CHOSEN)
+    return text
+
+
+def kind_of(result: hybrid.Result) -> str:
+    return str(hybrid.parse_scene(result.scene_text).model.kind)
+
+
+def test_catenaries_where_they_cost_less_and_nothing_asks_for_rods(monkeypatch):
+    monkeypatch.setattr(model_choice, "cheapest", lambda found: next(x for x in found if x.kind == "catenary"))
+    result = hybrid.run(TAUT)
+    assert "no choice" not in chosen(result)
+    assert kind_of(result) == "catenary"
+    assert "accuracy missed" not in {e.kind for e in result.events}
+
+
+def test_rods_where_catenaries_are_no_choice():
+    result = hybrid.run(CLAMPED)
+    assert kind_of(result) == "rod"
+    assert "rods everywhere" in chosen(result) and "an end is clamped" in chosen(result)
+
+
+def test_rods_are_the_same_as_asked_for(tmp_path):
+    """The pre-run is that of rods: the result has the same bits."""
+    hybrid.run(CLAMPED, tmp_path / "free.h5").close()
+    hybrid.run(CLAMPED | {"model": "rod"}, tmp_path / "rod.h5").close()
+    found = differences(tmp_path / "free.h5", tmp_path / "rod.h5")
+    assert found and all("event" in x or "scene" in x for x in found), found
+
+
+@pytest.mark.parametrize("in_file", [False, True])
+def test_rods_after_catenaries_that_fail(tmp_path, monkeypatch, in_file):
+    """A line that is slackened, of which the criteria are not asked: rods, and why."""
+    monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
+    monkeypatch.setattr(
+        model_choice, "cheapest", lambda found: next((x for x in found if x.kind == "catenary"), found[0])
+    )
+    slackened = {"travel": {"by": [-30, 0, 0], "over": 4}}
+    end = TAUT["ends"]["end"] | {"motion": slackened}
+    result = hybrid.run(TAUT | {"ends": TAUT["ends"] | {"end": end}}, tmp_path / "run.h5" if in_file else None)
+    assert kind_of(result) == "rod"
+    assert "were tried" in chosen(result)
+    assert result.status == "complete"
+    assert [x.name for x in tmp_path.iterdir() if x.suffix != ".lock"] == ["run.h5"] * in_file
+
+
+def test_rods_after_catenaries_that_leave_out_too_much(monkeypatch):
+    monkeypatch.setattr(model_choice, "no_catenary", lambda found, s: "")
+    monkeypatch.setattr(model_choice, "structural", lambda scene, cable: "")
+    monkeypatch.setattr(
+        model_choice, "cheapest", lambda found: next((x for x in found if x.kind == "catenary"), found[0])
+    )
+    stiff = {"sections": [TAUT["cable"]["sections"][0] | {"bending_stiffness": 2000}]}
+    result = hybrid.run(CLAMPED | {"cable": stiff})
+    assert kind_of(result) == "rod"
+    assert "leaving bending out makes" in chosen(result)
+
+
+@pytest.mark.parametrize(
+    "more",
+    [
+        {"model": "adaptive"},
+        {"model": {"tolerance": 1e-3}},
+        {"mesh": {"cells": 20}},
+        {"time": {"duration": 1.0, "step": 0.1}},
+        {"output": {"criteria": True}},
+    ],
+)
+def test_zones_move_where_the_scene_asks_for_it(more):
+    scene = hybrid.validate_scene(TAUT | more)
+    assert scene.model.kind == "adaptive"
+    assert not model_is_free(scene)
+
+
+def test_a_criterion_asks_for_zones_that_move():
+    short = hybrid.validate_scene(TAUT | {"time": {"duration": 1.0}})
+    assert model_is_free(short)
+    result = hybrid.run(short, criterion=lambda look: 0.0 * look.s)
+    assert kind_of(result) == "adaptive"
+
+
+def test_the_choice_survives_a_stop(tmp_path: Path, monkeypatch):
+    scene = hybrid.validate_scene(TAUT | {"time": {"duration": 4.0}})
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    for stop in (stopping.heard // 2, stopping.heard - 20):
+        assert went_on(scene, tmp_path / "parts.h5", stopping, [stop]) <= 1
+        assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+
+
+def test_rods_unless_others_cost_clearly_less():
+    rod = Cost("rod", 100, 1.0)
+    assert cheapest([rod, Cost("catenary", 100, 0.95)]).kind == "rod"
+    assert cheapest([rod, Cost("catenary", 100, 0.5), Cost("adaptive", 100, 0.4)]).kind == "adaptive"
+    assert cheapest([rod, Cost("catenary", 100, 0.5, "an end is clamped")]).kind == "rod"
+
+
+def test_the_plan_predicts_each():
+    plan = hybrid.plan(TAUT)
+    assert [kind for kind, _ in plan.choice] == ["rod", "catenary", "adaptive"]
+    assert [kind for kind, _ in hybrid.plan(CLAMPED).choice] == ["rod", "adaptive"]
+    assert {zone.kind for zone in plan.zones} == {"rod"}
+    assert hybrid.plan(TAUT | {"model": "rod"}).choice == ()
