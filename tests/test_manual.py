@@ -16,6 +16,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
+from hybrid.model.model_costs import CHOSEN
 from hybrid.scene.checks import CHECKS
 
 ROOT = Path(__file__).parents[1]
@@ -41,7 +42,7 @@ def kinds_in_code() -> set[str]:
                 if name == "append" and node.args and isinstance(node.args[0], ast.Tuple):  # notes of the error figure
                     given += node.args[0].elts[:1] if "_notes" in ast.unparse(node.func) else []
                 found |= {x.value for x in given if isinstance(x, ast.Constant) and isinstance(x.value, str)}
-    return {kind for kind in found if re.fullmatch(r"[a-z]+( [a-z]+)*", kind)}
+    return {kind for kind in found if re.fullmatch(r"[a-z]+( [a-z]+)*", kind)} | {CHOSEN}
 
 
 def entries() -> list[str]:
