@@ -16,7 +16,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from hybrid.adapt.manager import NodeState
+    from hybrid.adapt.user_criterion import NodeState
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import import_moordyn
@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
     "HybridError": ("hybrid.errors", "HybridError"),
-    "NodeState": ("hybrid.adapt.manager", "NodeState"),
+    "NodeState": ("hybrid.adapt.user_criterion", "NodeState"),
     "Outcome": ("hybrid.errors", "Outcome"),
     "Result": ("hybrid.store.reader", "Result"),
     "ResultError": ("hybrid.errors", "ResultError"),

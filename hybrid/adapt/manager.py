@@ -8,18 +8,19 @@ thresholds, and earlier tensions.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from itertools import pairwise
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
 from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
 from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.stiffness_ramp import advance, shares
+from hybrid.kernels.stiffness_ramp import shares
 from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds
 from hybrid.kernels.zone_step import REJECT_RATIO, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.model.layout import Layout, edges
@@ -37,7 +38,6 @@ LOST_TENSION, WEIGHTLESS = (
 )  # remaining part of a lost tension; tension floor over scale, no weight
 LONGEST_WAIT = 8.0  # hold times that a rod is kept below threshold, where earlier ones were released too soon
 SHORTEST = 2.0  # base cells that make a zone
-FORCED_RATIO = 2.0  # ratio of cells that the scene forces to be rod
 
 
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
@@ -45,26 +45,6 @@ CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
     "going", "next_review", "total_twist", "past", "recent", "age", "recent_age",
 )  # fmt: skip
-
-
-class NodeState(NamedTuple):
-    """What a user criterion receives; the arrays are read-only.
-
-    t: s; s: (N+1,) m; position, velocity: (N+1, 3) m, m/s; tension: (N,) N, of cells; curvature: (N+1,) 1/m;
-    bending_stiffness: (N+1,) N m2.
-    """
-
-    t: float
-    s: Floats
-    position: Floats
-    velocity: Floats
-    tension: Floats
-    curvature: Floats
-    bending_stiffness: Floats
-
-
-# (N+1,) above 1: rod around the node; below 0.5: catenary again.
-UserCriterion = Callable[[NodeState], Floats]
 
 
 class Reason(NamedTuple):
@@ -274,25 +254,8 @@ class DomainManager:
     def ask_user(self, line: Line, state: State, t: float) -> None:
         """Raise the ratios to those of the user's criterion."""
         assert self.user is not None
-        look = NodeState(t, self.s, state.r, state.v, state.T, self.zones.kinds.turn / line.hn, self.EI)
-        for x in look[1:]:
-            x.flags.writeable = False
-        try:
-            ratio = np.asarray(self.user(look), float)
-        finally:
-            for x in look[1:]:
-                x.flags.writeable = True
-        if ratio.shape != self.s.shape:
-            raise ValueError(
-                f"the criterion gave an array of shape {ratio.shape}, expected one number per node, {self.s.shape}"
-            )
-        if not np.isfinite(ratio).all():
-            i = int(np.flatnonzero(~np.isfinite(ratio))[0])
-            raise ValueError(
-                f"the criterion gave {ratio[i]} at t = {t:.6g} s, s = {self.s[i]:.6g} m, expected a number"
-            )
-        cells = np.maximum(ratio[:-1], ratio[1:])
-        cells[cells == 1.0] = FORCED_RATIO  # a mask of what must be rod does as well
+        nodes = NodeState(t, self.s, state.r, state.v, state.T, self.zones.kinds.turn / line.hn, self.EI)
+        cells = cell_ratios(self.user, nodes)
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
         self.loudest = max(self.loudest, float(np.max(self.ratios[GIVEN], where=~quiet, initial=0.0)))
@@ -449,11 +412,6 @@ class DomainManager:
         zones = self.zones
         shares(self.grown, self.leaving, zones.haste, dt / self.pace, zones.kinds.base_of_cell, zones.share)
         return zones.share
-
-    def advance_ramp(self, dt: float) -> None:
-        """Advance the ramps of stiffness by dt."""
-        advance(self.grown, self.leaving, self.zones.haste, dt / self.pace)
-        self._update_ramping()
 
     def _update_ramping(self) -> None:
         self.coming = bool((self.layout.rod & ~self.leaving & (self.grown < 1.0)).any())

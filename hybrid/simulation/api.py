@@ -18,7 +18,7 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-from hybrid.adapt.manager import UserCriterion
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
 from hybrid.model.model_costs import NAMED, ModelChoice, with_model
 from hybrid.model.resolution import (

@@ -12,7 +12,7 @@ from threading import Event
 
 import numpy as np
 
-from hybrid.adapt.manager import UserCriterion
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA

@@ -352,7 +352,7 @@ class ErrorController:
             self.statistics = {name: Estimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
         self.choice = ModelChoice(*matched(saved["choice"], ["", ""], "choice"))
         if self.choice.kind not in ("", *WORDS):
-            raise ValueError(f"a model that nobody knows: {self.choice.kind}")
+            raise ValueError(f"model chosen: got {self.choice.kind!r}, expected one of {', '.join(WORDS)}")
         self.scattered = [name for name in END_FORCES.values() if name in list(saved["scattered"])]
         if self.next is None and self.estimate is None:
             raise ValueError("neither a result nor one that is to come")

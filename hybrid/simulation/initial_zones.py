@@ -6,7 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from hybrid.adapt.manager import DomainManager, UserCriterion
+from hybrid.adapt.manager import DomainManager
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels.state import Floats, Line, State
 from hybrid.model.bending_reference import LEFT

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.manager import UserCriterion
+from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.cache import kernel_hash
 from hybrid.model.build import MOST_PARTS, Model, build

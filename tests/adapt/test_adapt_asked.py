@@ -28,6 +28,7 @@ from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.moment_joints import Joints
 from hybrid.kernels.criteria import BEND, CRITERIA
 from hybrid.kernels.state import no_sea
+from hybrid.kernels.stiffness_ramp import advance
 from hybrid.kernels.zone_step import REJECT_RATIO
 
 STEP = 0.02
@@ -215,8 +216,7 @@ def test_a_rod_that_comes_back_is_blended_in_again():
         for _ in range(round(seconds / 0.05)):
             t += 0.05
             manager.ratios[BEND] = ratio
-            if manager.ramping:
-                manager.advance_ramp(0.05)
+            advance(manager.grown, manager.leaving, manager.zones.haste, 0.05 / manager.pace)
             if manager.review_due(t):
                 manager.review(t, state)
 
@@ -224,7 +224,7 @@ def test_a_rod_that_comes_back_is_blended_in_again():
     assert manager.leaving.all() and 0.0 < manager.grown.max() < 0.9 and manager.stiffness_shares().max() < 0.9
     pass_by(2.0, 0.9)
     assert not manager.leaving.any() and (manager.grown == 1.0).all() and (manager.stiffness_shares() == 1.0).all()
-    assert not manager.ramping
+    assert not manager.going
 
 
 def test_far_beyond_is_no_tension_that_is_only_foreseen():
