@@ -49,7 +49,7 @@ from hybrid.simulation.static_case import StaticCase
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
 from hybrid.store.named_arrays import Tree
-from hybrid.store.reader import Result, open_result
+from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.stored_rows import remove_rows
 
 # s between two signals of which the second ends a run at once: process managers may send the same one twice.
@@ -95,7 +95,7 @@ def run(
         if isinstance(target, Path):
             _beside(target).unlink(missing_ok=True)  # of a run that was cut off
         _compute(case, target)
-    return open_result(target)
+    return written_result(target)
 
 
 def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
@@ -116,13 +116,13 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
     with locked(_path(output)):
         if not wants_errors(scene):
             case.record(resolution, target)
-            return open_result(target)
+            return written_result(target)
         compute = _replacing(target, case.record, case.record)
         free = _free(scene)._replace(steps=False)
         control = ErrorController(requested_accuracy(scene), free, False, case.sample, compute)
         result, errors = control.start(resolution)
         write_errors(target, scene, control, result, errors, clock.process_time() - begin)
-    return open_result(target)
+    return written_result(target)
 
 
 def resume(
@@ -158,7 +158,7 @@ def resume(
         case = Case(remaining.scene, criterion, remaining.changes, remaining.points)
         with _supervised(case, progress):
             _compute(case, target, path, remaining)
-    return open_result(target)
+    return written_result(target)
 
 
 def _compute(

@@ -41,6 +41,7 @@ from hybrid.simulation.run_sample import (
     COMPARED,
     MODEL_ERRORS,
     NOT_ESTIMATED,
+    Notes,
     RunSample,
     compared_cells,
     rows_key,
@@ -51,10 +52,10 @@ from hybrid.simulation.transient import Transient
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.store.checkpoint import Checkpoint, digest_of, read_checkpoint
-from hybrid.store.hdf5_file import is_result, opened
+from hybrid.store.hdf5_file import is_result, open_file, opened
 from hybrid.store.memory_recorder import MemoryRecorder
 from hybrid.store.named_arrays import Tree, pack
-from hybrid.store.reader import open_result
+from hybrid.store.reader import open_result, written_result
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import RowsRecorder, rows_path
 from hybrid.store.writer import Recorder
@@ -226,16 +227,20 @@ class Case:
         resolution, cells = run.resolution, compared_cells(run.model)
         if not wants_errors(self.scene):
             return RunSample(resolution, {}, cells, run.steps, 0.0)
-        with open_result(target) as result:
-            # they stay in the file, if that is one and no finer result may replace it
-            stay = target if isinstance(target, Path) and requested_accuracy(self.scene) is None else None
-            names = [name for name in result.names if name in COMPARED or name.startswith(MODEL_ERRORS)]
-            found = {name: StoredArray(stay, name) if stay is not None else np.array(result[name]) for name in names}
-            values = {name: found[name] for name in COMPARED if name in found}
-            model_error = {x.removeprefix(MODEL_ERRORS): y for x, y in found.items() if x not in values}
-            unresolved = any(event.kind == "unresolved bend" for event in result.events)
-            notes = damped_vibrations(result) if resolution.local is not None else ()
-            forces = np.column_stack([np.array(result[f"steps/{name}"]) for name in FORCES])
+        with open_file(target, summed=False) as file:
+            model_errors = [f"{MODEL_ERRORS}{x}" for x in file.get(MODEL_ERRORS, ())]
+            stored = {name: file[name] for name in (*COMPARED, *model_errors) if name in file}
+            # they stay in the file, if they are many, that is one, and no finer result may replace it
+            many = sum(data.size for data in stored.values()) > MOST_IN_MEMORY
+            stay = target if many and isinstance(target, Path) and requested_accuracy(self.scene) is None else None
+            found = {name: StoredArray(stay, name) if stay is not None else x[()] for name, x in stored.items()}
+            unresolved = b"unresolved bend" in file["events/kind"][()]
+            forces = np.column_stack([file[f"steps/{name}"][()] for name in FORCES])
+        values, model_error = split_outputs(found)
+        notes: Notes = ()
+        if resolution.local is not None:
+            with written_result(target) as result:
+                notes = damped_vibrations(result)
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes, forces=forces,
         )  # fmt: skip

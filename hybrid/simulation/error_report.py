@@ -8,14 +8,15 @@ from pathlib import Path
 
 import numpy as np
 
+from hybrid.errors import ZONE_EVENTS
+from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import Errors, summary
 from hybrid.simulation.result_checks import undersampled_end_forces
 from hybrid.simulation.run_sample import RunSample
-from hybrid.store.amend import amend
+from hybrid.store.amend import Happened, amend
 from hybrid.store.format import Field
-from hybrid.store.reader import open_result
 
 UNITS = {
     "position": "m", "tension": "N", "curvature": "1/m", "bending_moment": "N m",
@@ -55,11 +56,12 @@ def write_errors(
             if f"errors/{cause}/{name}" in names:
                 yield f"errors/{cause}/{name}", begin, values
 
-    def known_then() -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
-        with open_result(target) as file:
-            total = errors.fields.get("total", {}) if errors is not None and control.moves else {}
-            largest = {name: errors.largest("total", name) for name in total if errors is not None}
-            undersampled = undersampled_end_forces(file, largest)
+    def known_then(happened: Happened) -> tuple[Mapping[str, str | float | int], list[tuple[str, str]]]:
+        undersampled: list[tuple[str, str]] = []
+        if errors is not None and control.moves:
+            largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
+            changes = [t for t, kind in happened if kind in ZONE_EVENTS]
+            undersampled = undersampled_end_forces(np.array([0.0, *output_times(scene)]), result, largest, changes)
         found = summary(errors) if errors is not None else {}
         if control.irregular:
             each = [summary(estimate.errors) for estimate in control.statistics.values()]

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from hybrid.errors import ZONE_EVENTS
+from hybrid.kernels.state import Floats
+from hybrid.simulation.run_sample import RunSample
 from hybrid.store.reader import Result
 
 # Worth a word: so many times the estimated error, and this part of the largest end force.
@@ -20,21 +21,25 @@ NOTHING_LOST = 1e-6
 IN_BOOKS = 0.01
 
 
-def undersampled_end_forces(result: Result, errors: Mapping[str, float]) -> list[tuple[str, str]]:
-    """Events (kind, text): where an end force leaves the curve through its outputs by more than its error, N."""
+def undersampled_end_forces(
+    times: Floats, result: RunSample, errors: Mapping[str, float], changes: Sequence[float]
+) -> list[tuple[str, str]]:
+    """Events (kind, text): where an end force leaves the curve through its outputs by more than its error, N.
+
+    times: (nt,) s, of the outputs; changes: s, when zones have changed.
+    """
     out: list[tuple[str, str]] = []
-    times, t = result.times, result["steps/t"] if "steps/t" in result else np.zeros(0)
+    t = result.forces[:, 0]
     if len(times) < 4 or len(t) <= len(times):
         return out
     from scipy.interpolate import CubicSpline  # slow to import
 
-    largest = max(float(result[f"steps/end_force_{end}"].max()) for end in ("start", "end"))
-    for end in ("start", "end"):
+    largest = float(result.forces[:, 1:].max())
+    for end, force in (("start", result.forces[:, 1]), ("end", result.forces[:, 2])):
         name = f"end_force_{end}"
-        if name not in errors or f"reaction_{end}" not in result:
+        if name not in errors or f"reaction_{end}" not in result.values:
             continue
-        force = result[f"steps/end_force_{end}"]
-        seen = CubicSpline(times, np.linalg.norm(result[f"reaction_{end}"], axis=1))
+        seen = CubicSpline(times, np.linalg.norm(np.asarray(result.values[f"reaction_{end}"]), axis=1))
         inside = (t >= times[1]) & (t <= times[-2])  # at the first and last output the curve has one side only
         off = np.where(inside, np.abs(force - seen(t)), 0.0)
         i = int(off.argmax())
@@ -46,7 +51,7 @@ def undersampled_end_forces(result: Result, errors: Mapping[str, float]) -> list
                 f"t = {t[i]:.4g} s; the error figure ({error:.2g} N) is that of outputs; output.every: "
                 f"{every / 10:.2g} shows it"
             )
-            shaken = [e.t for e in result.events if e.kind in ZONE_EVENTS and 0.0 <= t[i] - e.t <= SOON * every]
+            shaken = [x for x in changes if 0.0 <= t[i] - x <= SOON * every]
             if shaken:
                 text += f"; zones that change (t = {shaken[-1]:.4g} s) may have shaken it: model: rod has none"
             out.append(("end force between outputs", text))

@@ -10,15 +10,17 @@ from pathlib import Path
 
 import h5py
 import numpy as np
+from h5py import h5d, h5p, h5s
 
 from hybrid.store.checkpoint import BEFORE
-from hybrid.store.format import EVENTS, Field, annotate, attach, checked
+from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign
-from hybrid.store.table import Table
+from hybrid.store.table import NUMBERS, Table, write_rows
 
 # Name of a quantity, number of its first output, and values; attributes, and events (kind, text).
 Block = tuple[str, int, np.ndarray]
+Happened = Sequence[tuple[float, str]]  # events of the result: t, s, and kind
 Others = tuple[Mapping[str, str | float | int], Sequence[tuple[str, str]]]
 
 
@@ -26,14 +28,14 @@ def amend(
     target: Path | io.BytesIO,
     fields: Sequence[Field],
     blocks: Iterable[Block],
-    others: Callable[[], Others],
+    others: Callable[[Happened], Others],
     done: bool = True,
 ) -> None:
     """Add to a complete result what is known only afterwards.
 
     fields: quantities over the output times, (nt, ...); blocks: all their values: name, number of the first output, and
     values (n, ...) of n outputs; others: gives attributes, and events of all the cable (kind, text), after the last
-    block; done: whether nothing is left to go on with.
+    block, from the events that the result has; done: whether nothing is left to go on with.
     """
     if isinstance(target, io.BytesIO):
         with in_memory(target.getvalue()) as file:
@@ -60,18 +62,29 @@ def amend(
         new.unlink(missing_ok=True)
 
 
-def _add(file: h5py.File, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[], Others]) -> None:
-    named = {field.name: field for field in fields}
+def _add(
+    file: h5py.File, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
+) -> None:
+    count, named, scales = len(file["t"]), {field.name: field for field in fields}, dict[str, h5d.DatasetID]()
+    with_groups = h5p.create(h5p.LINK_CREATE)
+    with_groups.set_create_intermediate_group(True)
+    made = {}
     for field in fields:
         if field.name in file:  # of a result that was amended before, and then resumed
             del file[field.name]
-        data = file.create_dataset(field.name, (len(file["t"]), *field.shape), field.dtype)
+        space = h5s.create_simple((count, *field.shape))
+        made[field.name] = data = h5d.create(
+            file.id, field.name.encode(), NUMBERS[field.dtype], space, lcpl=with_groups
+        )
         annotate(data, field.unit, field.description, field.frame)
-        attach(data, ("t", *field.dims), [file["t"], *(file[d] for d in field.dims)])
+        dims = ("t", *field.dims)
+        attach_scales(data, dims, [scales.setdefault(dim, file[dim].id) for dim in dims])
+        made[field.name] = data
     for name, begin, values in blocks:
         checked(named[name], values[0])
-        file[name][begin : begin + len(values)] = values
-    attributes, events = others()
+        write_rows(made[name], begin, np.ascontiguousarray(values, named[name].dtype))
+    kinds = [plain_text(x) for x in file["events/kind"][:]]
+    attributes, events = others(list(zip(file["events/t"][:].tolist(), kinds, strict=True)))
     for name, value in attributes.items():
         file.attrs[name] = value
     if events:

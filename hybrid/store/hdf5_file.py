@@ -27,8 +27,11 @@ _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole,
 # ---- reading --------------------------------------------------------------------------------------
 
 
-def open_file(source: Path | io.BytesIO) -> h5py.File:
-    """Open a file, or bytes in memory, for reading.  ResultError when it is no HDF5 file or not there."""
+def open_file(source: Path | io.BytesIO, summed: bool = True) -> h5py.File:
+    """Open a file, or bytes in memory, for reading.  ResultError when it is no HDF5 file or not there.
+
+    summed: whether the bytes of a closed file are held against its sum; not of one that was written just now.
+    """
     if not isinstance(source, Path):
         try:
             return _Image(h5py.File.in_memory(source.getvalue()).id)
@@ -39,7 +42,7 @@ def open_file(source: Path | io.BytesIO) -> h5py.File:
     if source.is_dir():
         raise ResultError(f"{source} is a folder\n    try:      name the result file in it")
     try:
-        if not being_written(source):
+        if not being_written(source, summed):
             return h5py.File(source, "r", locking="best-effort")
         if is_held(source) or source.stat().st_size > _MOST_IN_MEMORY:
             return h5py.File(source, "r", swmr=True, locking="best-effort")

@@ -39,8 +39,11 @@ _LACKING = 1 << 24
 _PIECE = 1 << 17  # bytes read at a time, of which the processor's cache has room
 
 
-def being_written(path: Path) -> bool:
-    """Whether a file has a writer, alive or killed; ResultError when it is no HDF5 file, spoilt or cut off."""
+def being_written(path: Path, summed: bool = True) -> bool:
+    """Whether a file has a writer, alive or killed; ResultError when it is no HDF5 file, spoilt or cut off.
+
+    summed: whether its bytes are held against its sum.
+    """
     with path.open("rb") as file:
         head = file.read(_SIZE)
         size = file.seek(0, 2)
@@ -63,7 +66,7 @@ def being_written(path: Path) -> bool:
         raise ResultError(f"{wrong}it is cut off: {size} of {end} bytes are there{other}")
     if writing:
         return True
-    if _has_changed(path, end, size):
+    if summed and _has_changed(path, end, size):
         raise ResultError(f"{wrong}it has changed since it was written, on the disk or on the way{other}")
     return False
 
@@ -100,8 +103,8 @@ def is_signed(path: Path) -> bool:
 
 
 def copy_unsigned(path: Path, new: Path) -> None:
-    """Copy a closed file without the sum behind its end.  ResultError: it has changed since it was written."""
-    being_written(path)
+    """Copy a file that was written just now without the sum behind its end.  ResultError: it is no such file."""
+    being_written(path, summed=False)
     shutil.copyfile(path, new)
     with path.open("rb") as file:
         end = struct.unpack("<Q", file.read(_SIZE)[28:36])[0]

@@ -69,12 +69,13 @@ class Result:
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(self, source: Path | io.BytesIO) -> None:
+    def __init__(self, source: Path | io.BytesIO, summed: bool = True) -> None:
+        """summed: as of `open_file`."""
         self._source = source
-        self._open()
+        self._open(summed)
 
-    def _open(self) -> None:
-        self._file = open_file(self._source)
+    def _open(self, summed: bool = True) -> None:
+        self._file = open_file(self._source, summed)
         try:
             with readable(self._source):
                 check_format(self._file, self._source)
@@ -364,6 +365,11 @@ def open_result(source: str | Path | bytes | io.BytesIO) -> Result:
     """
     source = io.BytesIO(source) if isinstance(source, bytes) else source
     return Result(source if isinstance(source, io.BytesIO) else Path(source).expanduser().resolve())
+
+
+def written_result(source: Path | io.BytesIO) -> Result:
+    """Open a result that this process has written just now, without holding its bytes against their sum."""
+    return Result(source, summed=False)
 
 
 def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim: str, unit: str) -> Any:

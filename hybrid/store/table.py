@@ -11,7 +11,7 @@ from h5py import h5d, h5s, h5t
 
 from hybrid.store.format import Field, cut
 
-_NUMBERS = {"float64": h5t.NATIVE_DOUBLE, "int64": h5t.NATIVE_INT64}
+NUMBERS = {"float64": h5t.NATIVE_DOUBLE, "int64": h5t.NATIVE_INT64}
 
 
 class Table:
@@ -23,7 +23,7 @@ class Table:
     def __init__(self, file: h5py.File, group: str, fields: Sequence[Field]) -> None:
         names = [f"{group}/{field.name}".lstrip("/") for field in fields]
         self.fields, self._datasets = tuple(fields), [h5d.open(file.id, name.encode()) for name in names]
-        self._types = [_NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
+        self._types = [NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
         self.scale = names[0] if names else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
         self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
@@ -64,6 +64,11 @@ class Table:
         parts, data = [block[k] for block in self._blocks], self._datasets[k]
         column = np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
         data.set_extent((self.count + len(column), *column.shape[1:]))
-        there = data.get_space()
-        there.select_hyperslab((self.count, *[0] * (column.ndim - 1)), column.shape)
-        data.write(h5s.create_simple(column.shape), there, column, self._types[k])
+        write_rows(data, self.count, column, self._types[k])
+
+
+def write_rows(data: h5d.DatasetID, begin: int, rows: np.ndarray, kind: Any = None) -> None:
+    """Write contiguous rows (n, ...) from row number `begin` on, into room that is there; kind: their type in HDF5."""
+    there = data.get_space()
+    there.select_hyperslab((begin, *[0] * (rows.ndim - 1)), rows.shape)
+    data.write(h5s.create_simple(rows.shape), there, rows, kind)
