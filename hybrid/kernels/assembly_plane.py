@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
-from hybrid.kernels.block_elimination_plane import WIDE, eliminate2, eliminate_chain
+from hybrid.kernels.block_elimination import ROW
+from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, eliminate2, eliminate_chain
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
@@ -219,25 +220,29 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
 
 
 @inner
-def eliminate(node, force_before, X, i, wide):
+def eliminate(node, force_before, X, i, kept, wide):
     """Eliminate the block row of node i, with its law of length in the unit of the balance; False if singular."""
     size, row = node.size, force_before.row
     sized = (size * row[0], size * row[1])
     hck, gap = size * force_before.hck, size * force_before.gap
     K, L, back, D, ahead, U, V, b, _ = node
     if wide:
-        return eliminate2(sized, hck, gap, K, L, back, D, ahead, U, V, b, X, i)
-    return eliminate_chain(sized, hck, gap, L, back, D, ahead, U, b, X, i)
+        return eliminate2(sized, hck, gap, K, L, back, D, ahead, U, V, b, X, i, kept, size)
+    return eliminate_chain(sized, hck, gap, L, back, D, ahead, U, b, X, i, kept, size)
 
 
 @kernel
 def march_planar(line, sea, ends, r, state, cv, ca, work):
-    """As kernels.assembly.march for a cable in the plane `line.plane`; no factors are kept.
+    """As kernels.assembly.march for a cable in the plane `line.plane`.
 
-    work.rows with N+1 entries receives every block row before elimination, three rows of WIDE.
+    work.rows with N+1 entries receives every block row before elimination, three rows of WIDE.  Factors are kept behind
+    the X_i where X has room for those of space (kernels.entry.workspace).
     """
     n, plane = line.h.shape[0], line.plane
     u, X, report, rows = work.u, work.X, work.report, work.rows
+    kept, next_kept = 0, 0
+    if X.shape[0] > (n + 1) * ROW:
+        kept, next_kept = (n + 1) * TRIPLE, KEPT
     for j in range(ASSEMBLED):
         report[j] = 0.0
     report[RESIDUAL_NODE] = -1.0
@@ -257,11 +262,12 @@ def march_planar(line, sea, ends, r, state, cv, ca, work):
         node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         if rows.shape[0] > 0:
             store_block_row(rows, i, node, force_before)
-        if not eliminate(node, force_before, X, i, bent or bent_before):
+        if not eliminate(node, force_before, X, i, kept, bent or bent_before):
             return i
         if i == n - 1:
             for k in range(3):
                 report[MOMENT_B + k] = there.M * plane[2, k]
+        kept += next_kept
         cell_before, force_before, bent_before = cell, force, bent
         cell, here = following, there
     return -1

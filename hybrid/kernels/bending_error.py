@@ -21,10 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.block_elimination import solve_again
+from hybrid.kernels.block_elimination_plane import solve_again_planar
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO, STEP_BEFORE, UNKNOWN_ERROR
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.forces import FRICTION, ROTARY, SEABED, STIFFNESS_DAMPING
+from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED, STIFFNESS_DAMPING
 from hybrid.kernels.generalized_alpha import Scheme, scheme
 from hybrid.kernels.neglected_moments import Bending, chord_of, neglected_moments, tabulate_chords, turn_chords
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
@@ -316,6 +317,8 @@ def solve_error(job, state, old, history, s, moving):
     if moving:
         predict_error(old, s, history)
     right_hand_side(line, job.sea, ends, chords, state, job.u, M, moving, history, arrays.b)
+    if line.bits & PLANAR:
+        return solve_again_planar(line.plane, job.X, arrays.b, arrays.x)
     return solve_again(job.X, job.W, arrays.b, arrays.x)
 
 

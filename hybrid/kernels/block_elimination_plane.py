@@ -5,7 +5,9 @@ the length of that cell and the balance of the node.  After elimination
 
     x_i = X_i[5] - X_i[0..2] x_{i+1} - X_i[3..4] dr_{i+2}
 
-with X_i in three rows of six numbers.  In space: kernels.block_elimination.
+with X_i in three rows of six numbers.  Where there is room behind them, what another right-hand side with the same
+matrix needs is kept (`solve_again_planar`): KEPT numbers a block, K, the rows over dT_{i-2}.. and dr_{i-1}, the pivot
+block and the size of the law of length.  In space: kernels.block_elimination.
 """
 
 from __future__ import annotations
@@ -19,6 +21,9 @@ from hybrid.kernels.plane import to_space
 COLUMNS = 6  # of a row of X_i
 TRIPLE = 3 * COLUMNS  # numbers of X_i
 WIDE = 13  # of a block row before elimination (kernels.assembly_plane)
+# Numbers kept of a block for another right-hand side, and where they begin: rows over the block before, three of (dT, dr),
+# the pivot block, three rows of three, and the size of the law of length; K comes first.
+KEPT, LOWER, PIVOT, SIZE_AT = 23, 4, 13, 22
 
 
 @inner
@@ -50,8 +55,20 @@ def node_rows_times(l, X, p):
 
 
 @inner
-def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
-    """Eliminate the block of node i; False when it is singular.
+def keep(X, k, size, K, lower, B0, B1, B2):
+    """Keep at X[k:] what another right-hand side needs of a block; lower: of the balance, two rows over dT, dr before."""
+    for j in range(4):
+        X[k + j] = K[j]
+    for j in range(6):
+        X[k + LOWER + 3 + j] = lower[j]
+    for j in range(3):
+        X[k + PIVOT + j], X[k + PIVOT + 3 + j], X[k + PIVOT + 6 + j] = B0[j], B1[j], B2[j]
+    X[k + SIZE_AT] = size
+
+
+@inner
+def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i, kept, size):
+    """Eliminate the block of node i; False when it is singular.  kept: where its factors are kept in X, 0: nowhere.
 
     length   row.(dr_i - dr_{i-1}) - hck dT_{i-1} = gap
     balance  K dr_{i-2} + L dr_{i-1} + back dT_{i-1} + D dr_i + ahead dT_i + U dr_{i+1} + V dr_{i+2} = b
@@ -71,6 +88,9 @@ def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i):
     B0 = (-hck - x[0], row[0] - x[1], row[1] - x[2], 0.0, -x[3], -x[4], 0.0, 0.0, gap - x[5])
     B1 = (back[0] - y[0], D1[0] - y[1], D1[1] - y[2], ahead[0], U[0] - y[3], U[1] - y[4], V[0], V[1], b1 - y[5])
     B2 = (back[1] - z[0], D2[0] - z[1], D2[1] - z[2], ahead[1], U[2] - z[3], U[3] - z[4], V[2], V[3], b2 - z[5])
+    if kept > 0:
+        X[kept + LOWER], X[kept + LOWER + 1], X[kept + LOWER + 2] = 0.0, -row[0], -row[1]
+        keep(X, kept, size, K, (t1, L1[0], L1[1], t2, L2[0], L2[1]), B0, B1, B2)
     # Gauss-Jordan in registers; a pivot of zero makes everything infinite or NaN, which is seen at the end
     if abs(B1[0]) > abs(B0[0]):
         B0, B1 = B1, B0
@@ -105,7 +125,7 @@ def subtract_chain(A, m, X, p, q):
 
 
 @inner
-def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
+def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i, kept, size):
     """As `eliminate2` where nothing bends: X_i keeps zeros for dr_{i+2}."""
     B0 = (-hck, row[0], row[1], gap)
     B1 = (back[0], D[0], D[1], b[0])
@@ -116,6 +136,9 @@ def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i):
         B0 = subtract_chain(B0, (-row[0], -row[1]), X, p, q)
         B1 = subtract_chain(B1, (L[0], L[1]), X, p, q)
         B2 = subtract_chain(B2, (L[2], L[3]), X, p, q)
+    if kept > 0:
+        X[kept + LOWER], X[kept + LOWER + 1], X[kept + LOWER + 2] = 0.0, -row[0], -row[1]
+        keep(X, kept, size, (0.0, 0.0, 0.0, 0.0), (0.0, L[0], L[1], 0.0, L[2], L[3]), B0, B1, B2)
     G0 = (B0[0], B0[1], B0[2], 0.0, 0.0, 0.0, B0[3])
     G1 = (B1[0], B1[1], B1[2], ahead[0], U[0], U[1], B1[3])
     G2 = (B2[0], B2[1], B2[2], ahead[1], U[2], U[3], B2[3])
@@ -160,4 +183,61 @@ def substitute_planar(plane, X, x):
         x[i, 0], x[i, 4] = t, 0.0
         x[i, 1], x[i, 2], x[i, 3] = to_space(plane, (a, b))
         y, z = (t, a, b), (y[1], y[2])
+    return total < math.inf
+
+
+@inner
+def solve3(A0, A1, A2):
+    """Three unknowns from three rows (four numbers, the last the right-hand side), with pivoting."""
+    if abs(A1[0]) > abs(A0[0]):
+        A0, A1 = A1, A0
+    if abs(A2[0]) > abs(A0[0]):
+        A0, A2 = A2, A0
+    i0 = 1.0 / A0[0]
+    f1, f2 = i0 * A1[0], i0 * A2[0]
+    B1 = (A1[1] - f1 * A0[1], A1[2] - f1 * A0[2], A1[3] - f1 * A0[3])
+    B2 = (A2[1] - f2 * A0[1], A2[2] - f2 * A0[2], A2[3] - f2 * A0[3])
+    if abs(B2[0]) > abs(B1[0]):
+        B1, B2 = B2, B1
+    i1 = 1.0 / B1[0]
+    f2 = i1 * B2[0]
+    x2 = (B2[2] - f2 * B1[2]) / (B2[1] - f2 * B1[1])
+    x1 = i1 * (B1[2] - B1[1] * x2)
+    return i0 * (A0[3] - A0[1] * x1 - A0[2] * x2), x1, x2
+
+
+@kernel
+def solve_again_planar(plane, X, b, x):
+    """As `block_elimination.solve_again` for a cable in a plane: b and x (N+1, 5) are of space, what b has across the
+    plane is not read, and x has nothing there and no spin.
+    """
+    n = x.shape[0] - 1
+    y0, y1, y2, z1, z2 = 0.0, 0.0, 0.0, 0.0, 0.0  # of the node before: dT, dr; of the one before that: dr
+    for i in range(n + 1):
+        k = (n + 1) * TRIPLE + i * KEPT
+        f = (
+            plane[0, 0] * b[i, 1] + plane[0, 1] * b[i, 2] + plane[0, 2] * b[i, 3],
+            plane[1, 0] * b[i, 1] + plane[1, 1] * b[i, 2] + plane[1, 2] * b[i, 3],
+        )
+        m, p = k + LOWER, k + PIVOT
+        c0 = X[k + SIZE_AT] * b[i, 0] - X[m] * y0 - X[m + 1] * y1 - X[m + 2] * y2
+        c1 = f[0] - X[k] * z1 - X[k + 1] * z2 - X[m + 3] * y0 - X[m + 4] * y1 - X[m + 5] * y2
+        c2 = f[1] - X[k + 2] * z1 - X[k + 3] * z2 - X[m + 6] * y0 - X[m + 7] * y1 - X[m + 8] * y2
+        z1, z2 = y1, y2
+        y0, y1, y2 = solve3(
+            (X[p], X[p + 1], X[p + 2], c0), (X[p + 3], X[p + 4], X[p + 5], c1), (X[p + 6], X[p + 7], X[p + 8], c2)
+        )
+        x[i, 0], x[i, 1], x[i, 2] = y0, y1, y2
+    y, z = (0.0, 0.0, 0.0), (0.0, 0.0)
+    total = 0.0
+    for i in range(n, -1, -1):
+        p = i * TRIPLE
+        q, s = p + COLUMNS, p + 2 * COLUMNS
+        t = x[i, 0] - X[p] * y[0] - X[p + 1] * y[1] - X[p + 2] * y[2] - X[p + 3] * z[0] - X[p + 4] * z[1]
+        a = x[i, 1] - X[q] * y[0] - X[q + 1] * y[1] - X[q + 2] * y[2] - X[q + 3] * z[0] - X[q + 4] * z[1]
+        c = x[i, 2] - X[s] * y[0] - X[s + 1] * y[1] - X[s + 2] * y[2] - X[s + 3] * z[0] - X[s + 4] * z[1]
+        total += abs(t) + abs(a) + abs(c)
+        x[i, 0], x[i, 4] = t, 0.0
+        x[i, 1], x[i, 2], x[i, 3] = to_space(plane, (a, c))
+        y, z = (t, a, c), (y[1], y[2])
     return total < math.inf

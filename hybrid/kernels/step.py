@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.block_elimination import ROW
+from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import carry_director
@@ -190,7 +192,10 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
         seabed_work(line, sea, old, new, u, report)
     if plane is not None:
         if was.shape[0] > 0:
+            n, A = was.shape[0], work.X
+            if A.shape[0] > n * ROW:  # behind the factors that are kept
+                A = A[n * (TRIPLE + KEPT) :]
             report[PUSH_ENERGY], report[WRONG_PIVOTS] = step_out_of_plane(
-                line, sea, ends, new, dt, task.before, task.rho, was, now, work.X
+                line, sea, ends, new, dt, task.before, task.rho, was, now, A
             )
     return largest_turn(old.e, u)

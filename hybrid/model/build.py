@@ -7,7 +7,7 @@ lists its contents: what is on and by which key, what is off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Literal
 
@@ -178,8 +178,6 @@ def build(
     corrected = corrects(scene)
     follows = (resolution.follow or corrected) and followed(scene, zones, corrected).on
     plane, flat = in_plane(scene, start, others, ends.values)
-    if follows and scene.dimension is None:
-        plane, flat = None, replace(flat, on=False, why="what leaving bending out does is followed in space")
     if plane is not None and scene.dimension == 2:
         line = planar(line, plane)
     return Model(

@@ -11,8 +11,8 @@ import pytest
 from test_jacobian import BITS, CA, CV, ZONES, random_case
 
 from hybrid.kernels import forces
-from hybrid.kernels.block_elimination import SIZE, WIDTH
-from hybrid.kernels.block_elimination_plane import WIDE
+from hybrid.kernels.block_elimination import SIZE, WIDTH, solve_again
+from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, solve_again_planar
 from hybrid.kernels.configuration import update
 from hybrid.kernels.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.forces import PLANAR
@@ -124,6 +124,42 @@ def test_both_marches_give_the_same_correction(zones, bits, held, seed):
     assert np.abs(told - said)[:22].max() < 1e-9 * np.abs(told).max()
 
 
+@pytest.mark.parametrize("held", [(0, 0), (1, 1), (1, 0)])
+@pytest.mark.parametrize("zones", ZONES)
+def test_kept_factors_solve_any_right_hand_side(zones, held):
+    """In the plane as in space, where the right-hand side lies in it; round-off of both."""
+    line, sea, ends, st = flat_case(3, ZONES[zones], 2047, held)
+    b = np.random.default_rng(8).normal(size=(N + 1, 5))
+    b[0, 0] = b[:, 4] = 0.0  # there is no cell before the start, and nothing turns about its axis
+    b[:, 1:4] = b[:, 1:4] @ line.plane[:2].T @ line.plane[:2]
+    for k, node in ((0, 0), (1, N)):
+        if held[k]:
+            b[node, 1:4] = 0.0
+    found = []
+    for bits in (line.bits, line.bits & ~PLANAR):
+        work, x = workspace(N, keep=True), np.full((N + 1, 5), np.nan)
+        assembly(line._replace(bits=bits), sea, ends, st, CV, CA, work)
+        if bits & PLANAR:
+            assert solve_again_planar(line.plane, work.X, b, x)
+        else:
+            assert solve_again(work.X, work.W, b, x)
+        found.append(x)
+    plane, space = found
+    np.testing.assert_allclose(plane, space, rtol=0, atol=1e-8 * np.abs(space).max())
+
+
+def test_keeping_factors_changes_nothing():
+    """Bit for bit: what is kept is a copy."""
+    line, sea, ends, st = flat_case(5, ZONES["three"], 2047)
+    found = []
+    for keep in (False, True):
+        work = workspace(N, keep)
+        assembly(line, sea, ends, st, CV, CA, work)
+        found.append((work.X[: (N + 1) * TRIPLE].copy(), work.report.copy()))
+    np.testing.assert_array_equal(found[0][0], found[1][0])
+    np.testing.assert_array_equal(found[0][1], found[1][1])
+
+
 def dense(rows):
     J, b = np.zeros((3 * N + 3, 3 * N + 3 + 16)), np.zeros(3 * N + 3)
     for i in range(N + 1):
@@ -214,6 +250,8 @@ def _dense(rows):
 def test_band_of_the_push_fits_its_work_array():
     assert workspace(N).X.size >= (2 * (N + 1) + 4) * BAND
     assert workspace(1).X.size >= (2 * 2 + 4) * BAND
+    for n in (1, N):  # also behind factors that are kept
+        assert workspace(n, keep=True).X[(n + 1) * (TRIPLE + KEPT) :].size >= (2 * (n + 1) + 4) * BAND
 
 
 @pytest.mark.parametrize("zones", ["rod", "rod-catenary", "three"])

@@ -59,6 +59,22 @@ def test_the_gallery_in_its_plane_and_in_space(name: str) -> None:
         assert n is not None and np.abs(flat.velocity @ n[2]).max() == 0.0
 
 
+@pytest.mark.parametrize("name, model", [("touchdown", "catenary"), ("irregular_sea", None), ("rov_tether", None)])
+def test_the_model_error_in_its_plane_and_in_space(name: str, model: str | None) -> None:
+    """What leaving bending out does, followed with the factors of either march; 1e-9 in tensions makes 1e-7 in forces."""
+    what = example(name, 100).model_dump(exclude_none=True)
+    what["output"]["errors"] = True
+    if model is not None:
+        what["model"] = model
+    space, *flat = (hybrid.run(scene(what, **asked)) for asked in ({"dimension": 3}, {}, {"dimension": 2}))
+    names = [x for x in space.names if x.startswith("errors/model/")]
+    assert np.abs(space["errors/model/position"]).max() > 1e-4
+    for found in flat:
+        assert not [e for e in found.events if e.kind in ("out of plane", "model error not estimated")]
+        for x in names:
+            assert np.abs(found[x] - space[x]).max() < 1e-6 * np.abs(space[x]).max(), x
+
+
 @pytest.mark.parametrize("name", [*FLAT[:2], "05_cantilever", "s_tether", "rov_tether"])
 def test_statics_in_the_plane_and_in_space(name: str) -> None:
     what = example(name).model_dump(exclude_none=True) | {"initial": {"kind": "equilibrium"}}
