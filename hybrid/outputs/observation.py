@@ -148,7 +148,21 @@ class Observation:
             else:
                 force = self.reaction(k) if k else -self.reaction(k)
                 ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
-        return on_grid(self.grid.held, np.concatenate([ends[:1], self.T, ends[1:]]))
+        found = on_grid(self.grid.held, np.concatenate([ends[:1], self.T, ends[1:]]))
+        return found if self.shift is None else found - on_grid(self.grid.sides, self._borne_by_bending(self.shift))
+
+    def _borne_by_bending(self, shift: Shift) -> Floats:
+        """Tension (n sides, nb), N, that a catenary has and the rod in its place has not: M^2/(2 EI) of an elastica,
+
+        whose force is that of the catenary but across its tangent in part.  The ends' tension knows it already.
+        """
+        out = self._square_of_moment(self.node_moment) * 0.5
+        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
+            if zone.kind == "rod":
+                out[o : o + b - a + 1] = 0.0
+        out[[0, -1]] = 0.0
+        EI = shift.stiffness[self.grid.side_nodes][:, None]
+        return np.divide(out, EI, out=np.zeros_like(out), where=EI > 0.0)
 
     @cached_property
     def tangent(self) -> Floats:
@@ -265,13 +279,17 @@ class Observation:
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
-        d, moment = self._plain.d, self.node_moment
+        bending = np.sqrt(self._square_of_moment(self.node_moment))
+        EI = shift.stiffness[self.grid.side_nodes][:, None]
+        return np.divide(bending, EI, out=self._plain._strains[:, 0].copy(), where=EI > 0.0)
+
+    def _square_of_moment(self, moment: Floats) -> Floats:
+        """Of moments (N+1, 3, nb) N m the square of what bends (n sides, nb)."""
+        d = self._plain.d
         t = np.concatenate([d[:1], d[1:] + d[:-1], d[-1:]])
         t /= np.maximum(size(t), 1e-12)[:, None]
-        bending = size(moment - dot(moment, t)[:, None] * t)
-        side = self.grid.side_nodes
-        EI = shift.stiffness[side][:, None]
-        return np.divide(bending[side], EI, out=self._plain._strains[:, 0].copy(), where=EI > 0.0)
+        bending = moment - dot(moment, t)[:, None] * t
+        return np.asarray((bending * bending).sum(axis=1)[self.grid.side_nodes])
 
     # ---- at the ends --------------------------------------------------------------------------
 

@@ -43,6 +43,7 @@ from hybrid.simulation.run_sample import (
     NOT_ESTIMATED,
     Notes,
     RunSample,
+    catenary_length,
     compared_cells,
     rows_key,
     split_outputs,
@@ -238,11 +239,16 @@ class Case:
             forces = np.column_stack([file[f"steps/{name}"][()] for name in FORCES])
         values, model_error = split_outputs(found)
         notes: Notes = ()
-        if resolution.local is not None:
+        catenary = np.zeros(0)
+        if resolution.local is not None or run.switching is not None:
             with written_result(target) as result:
-                notes = damped_vibrations(result)
+                if resolution.local is not None:
+                    notes = damped_vibrations(result)
+                if run.switching is not None:
+                    catenary = np.array([catenary_length(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes, forces=forces,
+            catenary=catenary,
         )  # fmt: skip
 
     # --- runs to compare with -------------------------------------------------------------------
@@ -296,6 +302,7 @@ class Case:
             notes,
             found.reference() if isinstance(found, RowsRecorder) else {},
             found.steps,
+            found.catenary if switching is not None else np.zeros(0),
         )
 
     def survey(self, resolution: Resolution) -> Survey | None:

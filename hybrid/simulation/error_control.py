@@ -139,6 +139,7 @@ class ErrorController:
                 if self.estimate is None:
                     raise
                 return self.without_refinement(f"a finer run failed: {str(error).splitlines()[0]}")
+            stricter = False
             if self.estimate is not None:
                 stricter = resolution.zones < self.estimate.run.resolution.zones
                 self.estimate.update(result)
@@ -146,10 +147,10 @@ class ErrorController:
                     found = statistics_of(result, self._every)
                     for name, estimate in self.statistics.items():
                         estimate.update(found[name])
-                if stricter:
-                    self._renew_model_errors(self.estimate, resolution)
             elif not self._first_estimate(result):
                 return result, None
+            if self.estimate is not None and (stricter or self.estimate.lacks_model_errors()):
+                self._renew_model_errors(self.estimate, resolution)
             self.next = self._next_resolution()
         assert self.estimate is not None
         errors = self.estimate.errors
@@ -245,10 +246,10 @@ class ErrorController:
         self.statistics = estimates(result, coarse, rough, coarsest, self._every)
 
     def _renew_model_errors(self, estimate: Estimate, resolution: Resolution) -> None:
-        """Zones have become stricter: what they neglect now."""
-        coarser = comparison_resolutions(resolution, self.moves)[0]
+        """Zones are others than those whose model error is known: follow it on the mesh of the result."""
+        longer = resolution.coarser(1.0, COARSER if self.moves else 1.0)
         try:
-            run = self._counted(self.sample(replace(coarser, follow=True)))
+            run = self._counted(self.sample(replace(longer, follow=True)))
             estimate.set_model_errors(run)
             if self.statistics:
                 found = statistics_of(run, self._every)

@@ -37,6 +37,10 @@ LEAST_RATIO = 1.1
 COARSER = 2.0
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
+# Part of the length of catenaries by which two runs may differ whose model errors count as the same.
+OTHER_ZONES = 0.1
+# What a checkpoint calls the cells, the outputs and the catenaries of the run that model errors are of.
+MODEL_OF = "cells", "every", "catenary"
 # Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
 MOST = 500_000
 
@@ -157,13 +161,33 @@ class Estimate:
         found = coarse.model_error if not doubtful else {}
         self._model: Mapping[str, Outputs] = {name: x for name, x in found.items() if len(x)}
         self._model_every = coarse.every
+        self._model_of = coarse.cells, coarse.every, coarse.catenary
+
+    def lacks_model_errors(self) -> bool:
+        """Whether zones of the result have moved otherwise than those of the run that its model error is known by, or
+
+        its cells are so much shorter that it is another line.  Zones of coarse cells are rod where fine ones need not.
+        """
+        now, (cells, every, then) = self.run.catenary, self._model_of
+        if self.run.model_error or not now.any():
+            return False
+        if self.run.cells > LEAST_RATIO * COARSER * cells or not then.size:
+            return True
+        here = now[every_of(now.size, every)]
+        return bool((np.abs(here - then) > OTHER_ZONES * here).any())
 
     def update(self, result: RunSample) -> None:
         """A finer run has become the result."""
         by_step, by_mesh = self._keep()
         before, self.run = self.run, result
         finer, shorter = result.cells / before.cells, result.steps / before.steps
+        other_zones = result.resolution.zones != before.resolution.zones
         for name, p in self.order.items():
+            if other_zones:  # what has changed is not by cells and steps alone
+                for found, ratio in ((by_step, shorter), (by_mesh, finer)):
+                    if name in found:
+                        found[name] = found[name] / ratio**p
+                continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
@@ -230,7 +254,8 @@ class Estimate:
         model = {name: _at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
                  for name, x in self._model.items()}  # fmt: skip
         found: Tree = {"order": self.order, "falls": self.falls, "late": by_step, "cells": by_mesh, "model": model}
-        return found | {"notes": self.notes, "run": self.run.checkpoint()}
+        of = dict(zip(MODEL_OF, self._model_of, strict=True))
+        return found | {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
 
     @classmethod
     def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Estimate:
@@ -241,6 +266,11 @@ class Estimate:
         self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
         late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
+        older = dict(zip(MODEL_OF, (1, 1, np.zeros(0)), strict=True))  # checkpoints of 0.6 do not say
+        count, every, catenary = matched(tree.get("model_of", older), older, "model error").values()
+        if min(count, every) < 1 or catenary.shape not in ((0,), every_of(shape[0], every).shape):
+            raise ValueError("a model error of no run")
+        self._model_of = count, every, catenary
         self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")

@@ -53,7 +53,7 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
     errors = _model_errors(run, values, every, windows)
     return {
         statistic: replace(
-            run, every=1, rows={}, forces=run.forces[:0],
+            run, every=1, rows={}, forces=run.forces[:0], catenary=run.catenary[:0],
             values={name: _as_vector(name, x[k]) for name, x in found.items()},
             model_error={name: x[k] for name, x in errors.items()},
         )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -11,11 +11,13 @@ from typing import Any
 import numpy as np
 
 from hybrid.model.build import Model
+from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.outputs.probes import SIDED_ERRORS
 from hybrid.scene.schema import Scene
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.store.named_arrays import Tree, matched, pack
+from hybrid.store.records import Zone as ZoneRow
 from hybrid.store.stored_array import StoredArray
 from hybrid.store.stored_rows import StoredRows, rows_from, rows_path
 
@@ -49,6 +51,7 @@ class RunSample:
     notes: Notes = ()  # that the result should carry
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
+    catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) m at outputs, of zones that move
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -74,6 +77,11 @@ def compared_cells(model: Model) -> int:
     return model.cells if model.layout is None else int(model.layout.rod.size)
 
 
+def catenary_length(zones: Iterable[Zone | ZoneRow]) -> float:
+    """How much of a line is catenary, m."""
+    return float(sum(zone.s_b - zone.s_a for zone in zones if zone.kind == "catenary"))
+
+
 def every_of(count: int, step: int) -> np.ndarray:
     """Numbers of every `step`-th of `count` outputs, and of the last."""
     return np.unique(np.append(np.arange(0, count, step), count - 1))
@@ -95,9 +103,12 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     """
     blank = RunSample(first_resolution(scene), {}, 1, 1, 0.0).checkpoint()
     free = dict.fromkeys(("resolution", "values", "model_error", "notes", "rows"))
-    saved = matched({"rows": {}} | tree, blank | free, "run")  # a checkpoint of 0.6 has no rows
+    older = {"rows": {}, "catenary": np.zeros(0)}  # that a checkpoint of 0.6 has not
+    saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")
+    if not (saved["catenary"].ndim == 1 and (saved["catenary"] >= 0.0).all()):
+        raise ValueError("lengths of catenary that no run has")
     resolution = resolution_from(saved["resolution"], scene)
     if saved["rows"] and result is not None:
         found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))

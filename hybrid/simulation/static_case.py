@@ -28,7 +28,7 @@ from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
 from hybrid.simulation.result_file import result_recorder
-from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, compared_cells
+from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_length, compared_cells
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
@@ -113,4 +113,5 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
 def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
     kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
     left = {k.removeprefix(MODEL_ERRORS): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL_ERRORS)}
-    return RunSample(resolution, kept, compared_cells(model), 1, cpu, 1, False, left)
+    catenary = np.array([catenary_length(model.zones)]) if model.layout is not None else np.zeros(0)
+    return RunSample(resolution, kept, compared_cells(model), 1, cpu, 1, False, left, catenary=catenary)

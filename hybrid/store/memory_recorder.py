@@ -19,6 +19,7 @@ class MemoryRecorder:
         self.times: list[float] = []
         self.events: list[tuple[str, str]] = []  # kind, text
         self._kept: dict[str, list[np.ndarray]] = {}  # batches (nb, ...)
+        self._catenary: list[float] = []
 
     @property
     def last(self) -> float:
@@ -38,6 +39,7 @@ class MemoryRecorder:
             if not finite.all():
                 raise ResultError(f"{name} is not finite at t = {times[np.argmin(finite)]:.9g} s")
         self.times += times.tolist()
+        self._catenary += [sum((b - a for kind, a, b in zones if kind == "catenary"), 0.0)] * len(times)
         self._keep(values)
 
     def _keep(self, values: Mapping[str, np.ndarray]) -> None:
@@ -55,6 +57,11 @@ class MemoryRecorder:
     def steps(self) -> np.ndarray:
         """The columns that are kept, of all steps."""
         return np.concatenate([np.zeros((0, len(self._columns))), *self._steps])
+
+    @property
+    def catenary(self) -> np.ndarray:
+        """(nt,) m of the line that were catenary at the outputs."""
+        return np.array(self._catenary)
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:
         """Note that something happened at time t (s) from s_a to s_b (m)."""

@@ -113,7 +113,25 @@ class Plain:
                 ends.append(self._end_tension(k))
             else:
                 ends.append(float(force @ t) / float(np.linalg.norm(t)))
-        return np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
+        found = np.asarray(self.grid.held @ np.concatenate([ends[:1], self.state.T, ends[1:]]))
+        return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
+
+    def _borne_by_bending(self, shift: Shift) -> Floats:
+        """Tension (n sides,), N, M^2/(2 EI), that a rod has less than the catenary in its place."""
+        out = []
+        moment = self._bending(self.node_moment)
+        for zone, (a, b, _) in zip(self.grid.parts, self.grid.spans, strict=True):
+            for i in range(a, b + 1):
+                known = zone.kind == "rod" or i in (0, len(moment) - 1) or shift.stiffness[i] <= 0.0
+                out.append(0.0 if known else moment[i] ** 2 / (2.0 * shift.stiffness[i]))
+        return np.array(out)
+
+    def _bending(self, moment: Floats) -> Floats:
+        """Size (N+1,) of what of moments (N+1, 3) N m bends."""
+        d = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None]
+        t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
+        t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
+        return np.asarray(np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1))
 
     @cached_property
     def tangent(self) -> Floats:
@@ -211,10 +229,7 @@ class Plain:
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides,) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
-        d, moment = self.computed.e / np.linalg.norm(self.computed.e, axis=1)[:, None], self.node_moment
-        t = np.vstack([d[:1], d[1:] + d[:-1], d[-1:]])
-        t /= np.maximum(np.linalg.norm(t, axis=1), 1e-12)[:, None]
-        bending = np.linalg.norm(moment - np.einsum("ij,ij->i", moment, t)[:, None] * t, axis=1)
+        bending = self._bending(self.node_moment)
         side = self.grid.side_nodes
         EI = shift.stiffness[side]
         return np.divide(bending[side], EI, out=self._strains[:, 0].copy(), where=EI > 0.0)
