@@ -101,6 +101,7 @@ EVENTS_BY_WEIGHT = (
     "largest force uncertain",
     "irregular motion",
     "end force between outputs",
+    "line meets itself",
     "slack",
     "unstable",
     "out of plane",

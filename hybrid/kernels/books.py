@@ -86,6 +86,7 @@ AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
 # Bits of FLAGS.
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
 UNKNOWN_ERROR = 256
+IS_BENT, MEETS_ITSELF = 512, 1024
 
 # --- powers and work --------------------------------------------------------------------------------
 

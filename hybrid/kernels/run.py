@@ -32,9 +32,11 @@ from hybrid.kernels.books import (
     END_STEP,
     FAILED,
     FLAGS,
+    IS_BENT,
     JUDGE,
     LAST_DT,
     LOG,
+    MEETS_ITSELF,
     MUTE_CUTS,
     MUTE_SLACK,
     NEW_STATE,
@@ -74,6 +76,7 @@ from hybrid.kernels.powers import find_powers
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
+from hybrid.kernels.self_distance import UNBENT, is_bent
 from hybrid.kernels.state import (
     Ends,
     Floats,
@@ -108,7 +111,9 @@ class Job(NamedTuple):
     books: Books
     following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.bending_error)
     zone_table: NDArray[np.int64]  # of a kernels.zone_step.ZoneJob, of a run whose zones move
+    itself_table: NDArray[np.int64]  # of a kernels.self_distance.ItselfJob, of a line that could come near itself
     zones: int = 0  # address of kernels.zone_step.follow_zones; 0: zones stay, or Python follows them
+    itself: int = 0  # address of kernels.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
@@ -133,12 +138,22 @@ def blank_job() -> Job:
     task = Task(0, limits=limits)
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(1, np.int64), np.zeros(0, np.int64),
+        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
     )  # fmt: skip
 
 
 read = reader(blank_job())
-call_solver, call_follower, call_zones = caller((0, 0, 0.0, 0)), caller(0), caller(0)
+call_solver, call_follower, call_zones, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
+
+
+@inner
+def watch_itself(job, state):
+    """How near the line is to itself after a step, as bits: whether it has become so bent, whether it meets itself."""
+    if job.itself == UNBENT:
+        return IS_BENT if is_bent(state) else 0
+    if job.itself != 0 and call_itself(job.itself, job.itself_table) != 0:
+        return MEETS_ITSELF
+    return 0
 
 
 @inner
@@ -161,6 +176,7 @@ def conclude(job, old, new):
             count[FLAGS] |= STEPS_SLACK
         if job.follower != 0:
             count[FLAGS] |= call_follower(job.follower, job.following)
+        count[FLAGS] |= watch_itself(job, new)
         if books.extremes.shape[1] > 0:
             note_extremes(line, sea, ends, new, books, clock[NOW])
         if job.zones != 0:

@@ -54,6 +54,7 @@ class Material:
     buoy: Floats  # (K,) N/m, buoyancy that depends on the surface
     displaced: Floats  # (K,) kg/m
     diameter: Floats  # (K,) m, of the displaced volume
+    outer_diameter: Floats  # (K,) m, as given for the sections; 0 where none is
     bits: int  # optional forces that are on wherever the line is; rods may ask for more
     held_tangent: tuple[bool, bool]  # whether an element sits at the ends of a rod
     held_twist: tuple[bool, bool]  # and resists twist
@@ -145,6 +146,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         polar=np.array([rotary_inertia(x)[1] for x in of]),
         damp=nothing, tau=nothing, drag_n=nothing, drag_t=nothing, added_n=nothing, added_t=nothing,
         buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
+        outer_diameter=np.array([x.diameter or 0.0 for x in of]),
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
         held_twist=(start.holds_twist, end.holds_twist),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
@@ -163,7 +165,7 @@ def _wetted(out: Material, scene: Scene, of: list[Section], middle: Floats) -> N
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     assert fluid is not None
     rho = fluid.density
-    width = np.array([x.diameter or 0.0 for x in of])
+    width = out.outer_diameter
     disc = 0.25 * np.pi * width**2
     volume, area, extra = disc.copy(), np.zeros(len(of)), np.zeros(len(of))
     for m in modules_of(scene):

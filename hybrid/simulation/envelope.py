@@ -21,6 +21,7 @@ from hybrid.model.output_points import NEAR
 from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
 from hybrid.outputs.output_grid import Grid
 from hybrid.scene.schema import Scene
+from hybrid.simulation.self_watch import SelfWatch
 from hybrid.solve.run import CompiledRun, no_extremes
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
@@ -82,6 +83,7 @@ class Envelope:
         beside[first] -= side
         beside[second] += side
         self._limits = limits_along(scene, beside)
+        self.itself = SelfWatch(model)
 
     # --- what is kept -------------------------------------------------------------------------------
 
@@ -120,13 +122,20 @@ class Envelope:
 
     def checkpoint(self, now: Floats) -> dict[str, Any]:
         """What was kept; now: extremes on the mesh of now."""
-        return {"begin": self.begin, "start": self._start, "bounds": self._bounds, "now": now.copy()}
+        return {
+            "begin": self.begin,
+            "start": self._start,
+            "bounds": self._bounds,
+            "now": now.copy(),
+            "itself": self.itself.itself.found.copy(),
+        }
 
     def restore(self, saved: Mapping[str, Any], now: Floats) -> None:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
-        found = matched(saved, self.checkpoint(now), "state/envelope")
+        mine = self.checkpoint(now)
+        found = matched({"itself": mine["itself"]} | dict(saved), mine, "state/envelope")  # files of before have none
         self.begin, self._start, self._bounds = found["begin"], found["start"], found["bounds"]
-        now[:] = found["now"]
+        now[:], self.itself.itself.found[:] = found["now"], found["itself"]
 
     # --- for the file -------------------------------------------------------------------------------
 
@@ -145,7 +154,7 @@ class Envelope:
                 out.append((when, unknown))
         for name, text in ((BEGIN, "the steps counted begin"), (END, "they end, so far")):
             out.append((Field(name, "s", f"extremes are of all accepted steps: when {text}", nan_ok=True), unknown[0]))
-        return out
+        return out + [(field, unknown[0]) for field in self.itself.fields()]
 
     def judged(self, values: Mapping[str, np.ndarray]) -> list[Judged]:
         """The limits of the sections against those values."""
@@ -160,7 +169,7 @@ class Envelope:
     def values(self, nodes: Floats, extremes: Floats, t: float) -> dict[str, np.ndarray]:
         """Values of those fields up to time t (s), with the extremes (4, EXTREMES, N+1+K) of the mesh of now."""
         bounds = self._with(nodes, extremes)
-        out = {BEGIN: np.array(self.begin), END: np.array(t)}
+        out = {BEGIN: np.array(self.begin), END: np.array(t), **self.itself.values()}
         for row, (name, *_) in self._rows.items():
             for k, bound in enumerate(("min", "max")):
                 x = bounds[k, row]
@@ -169,8 +178,13 @@ class Envelope:
         return out
 
 
-def of_equilibrium(envelope: Envelope, scene: Scene, model: Model, found: Equilibrium) -> dict[str, np.ndarray]:
-    """Values of the envelope of an equilibrium under full loads: those of its one state."""
+def of_equilibrium(
+    envelope: Envelope, scene: Scene, model: Model, found: Equilibrium, event: Callable[..., None]
+) -> dict[str, np.ndarray]:
+    """Values of the envelope of an equilibrium under full loads: those of its one state.
+
+    event: as Recorder.event, for a line that meets itself.
+    """
     run, line = CompiledRun(1.0, np.zeros(0), extremes=True), model.line
     ends, sea = model.ends.at(np.inf), model.sea.at(np.inf)
     stepper = Stepper(line, model.length, model.tension_scale)
@@ -181,4 +195,6 @@ def of_equilibrium(envelope: Envelope, scene: Scene, model: Model, found: Equili
     )  # fmt: skip
     run.books.report[0] = found.report
     run.note_state()
+    envelope.itself.attach(model, run)
+    envelope.itself.look_at_start(run, event)
     return envelope.values(line.s, run.books.extremes, 0.0)

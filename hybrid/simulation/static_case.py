@@ -65,7 +65,7 @@ class StaticCase:
                 raise ComputationError(stop[0], None, float(model.line.s[stop[1]]), detail)
             values = _values(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
-            reached = of_equilibrium(envelope, self.scene, model, found)
+            reached = of_equilibrium(envelope, self.scene, model, found, recorder.event)
             recorder.replace(reached)
             envelope.note_broken(reached, recorder.event)
             recorder.close("complete", f"equilibrium: {found.summary}; residual force {found.residual:.2g} N")

@@ -162,6 +162,8 @@ class Transient:
             self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
         first = slice(None) if model.layout is None else model.layout.first
         self.run.place(state.r[first].copy())
+        if self.envelope is not None:
+            self.envelope.itself.look_at_start(self.run, self.events.event)
 
     def _rotate_ends_in(self, state: State) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
@@ -299,6 +301,8 @@ class Transient:
             self._note_cut()
         if flags & b.STEPS_SLACK:
             self._note_slack()
+        if flags & (b.IS_BENT | b.MEETS_ITSELF):
+            self._look_at_itself(flags)
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:
@@ -327,6 +331,13 @@ class Transient:
         text = slack_steps_text(float(clock[b.SLACK_STEP]), float(clock[b.LAST_DT]), float(clock[b.WAVE_STEP]))
         self._note(cell, "steps cut", text)
         self.slackened, clock[b.MUTE_SLACK] = True, 1.0
+
+    def _look_at_itself(self, flags: int) -> None:
+        """The line has become so bent that it could come near itself, or it meets itself: an event."""
+        assert self.envelope is not None
+        watch = self.envelope.itself
+        if flags & b.MEETS_ITSELF or watch.look(self.run):
+            watch.tell(self.t, float(self.run.clock[b.LAST_DT]), self.events.event)
 
     def _note_unknown_error(self) -> None:
         """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
@@ -420,6 +431,7 @@ class Transient:
         )  # fmt: skip
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)
+            self.envelope.itself.attach(model, self.run)
         self.plane_monitor.attach(self.run, model.line)
         if self.switching is not None:
             self.switching.attach(self.run, self.resolution.every)

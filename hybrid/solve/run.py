@@ -127,6 +127,10 @@ class CompiledRun:
         """Zones move from now on (kernels.zone_step); compiled: every step asks them, not Python."""
         self.table.bind(zones=follow_zones.address(zones.numbers) if compiled else 0, zone_table=zones.numbers)
 
+    def watch_itself(self, table: np.ndarray, address: int) -> None:
+        """From now on steps look how near the line comes to itself (kernels.self_distance)."""
+        self.table.bind(itself=address, itself_table=table)
+
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""
         self.table.bind(moves=moves)

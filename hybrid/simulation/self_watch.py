@@ -1,0 +1,126 @@
+"""How near a line comes to itself in a run: an event where its surfaces meet, and the least clearance for the file."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+
+import numpy as np
+
+from hybrid.kernels.binding import Table
+from hybrid.kernels.self_distance import (
+    CLEARANCE,
+    DISTANCE,
+    LEAST,
+    LEAST_DISTANCE,
+    LEAST_OTHER,
+    LEAST_S,
+    LEAST_TIME,
+    OTHER_S,
+    TURNED,
+    UNBENT,
+    S,
+    blank_itself,
+    blank_itself_job,
+    watch_itself,
+)
+from hybrid.kernels.state import Floats, State
+from hybrid.model.build import Model
+from hybrid.solve.run import CompiledRun
+from hybrid.store.format import Field
+
+GROUP = "self_distance"
+# In the file: where in `found` it stands, unit, meaning.
+FIELDS = {
+    f"{GROUP}/clearance": (LEAST, "m", "least clearance between surfaces of the line that are no neighbours"),
+    f"{GROUP}/distance": (LEAST_DISTANCE, "m", "distance of the centrelines there"),
+    f"{GROUP}/s_a": (LEAST_S, "m", "arc length where it was"),
+    f"{GROUP}/s_b": (LEAST_OTHER, "m", "arc length of the other place"),
+    f"{GROUP}/time": (LEAST_TIME, "s", "when it was"),
+}
+
+
+def diameters(model: Model) -> Floats:
+    """Outer diameters (N,) m of the cells; 0 where the scene gives none."""
+    s = model.line.s
+    return np.asarray(model.cable.outer_diameter[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
+
+
+def meeting_text(s: float, other: float, distance: float, width: float, dt: float) -> str:
+    """Text of the event of a line that comes within `distance`, m, of itself at two arc lengths, m.
+
+    width: m, of the cable; dt: s, the step in which it does, 0: in none.
+    """
+    passing = f" in a step of {dt:.3g} s" if dt > 0.0 else ""
+    return (
+        f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
+        f"diameter of {width:.3g} m: contact of a line with itself is not computed, nothing keeps it from passing "
+        f"through itself here"
+    )
+
+
+class SelfWatch:
+    """Watches one line for as long as a run lasts; a line without a diameter is not watched."""
+
+    def __init__(self, model: Model) -> None:
+        self.on = bool(diameters(model).any())
+        self.itself = blank_itself(np.ones(1))
+        self._job = Table(blank_itself_job())
+        self._address = UNBENT
+
+    def attach(self, model: Model, run: CompiledRun) -> None:
+        """Go on with a (new) line of a run."""
+        if not self.on:
+            return
+        self.itself = blank_itself(diameters(model))._replace(found=self.itself.found)
+        old, new = run.states
+        self._job.bind(
+            line=model.line, ends=model.ends.values, old=old, new=new, clock=run.clock, counts=run.count,
+            itself=self.itself,
+        )  # fmt: skip
+        run.watch_itself(self._job.numbers, self._address)
+
+    def look(self, run: CompiledRun) -> bool:
+        """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
+
+        now on; whether surfaces have met.
+        """
+        if self._address == UNBENT:
+            self._address = watch_itself.address(self._job.numbers)
+            run.watch_itself(self._job.numbers, self._address)
+        return bool(watch_itself(self._job.numbers))
+
+    def look_at_start(self, run: CompiledRun, event: Callable[..., None]) -> None:
+        """Look at the state of a run that has made no step."""
+        if self.on and is_bent(run.state) and self.look(run):
+            self.tell(run.t, 0.0, event)
+
+    def tell(self, t: float, dt: float, event: Callable[..., None]) -> None:
+        """An event for what was found; dt: s, the step in which it was, 0: in none."""
+        found = self.itself.found
+        distance, width = float(found[DISTANCE]), float(found[DISTANCE] - found[CLEARANCE])
+        s, other = sorted((float(found[S]), float(found[OTHER_S])))
+        text = meeting_text(s, other, distance, width, dt)
+        event(t, s, other, "line meets itself", text, value=distance, threshold=width)
+
+    def fields(self) -> list[Field]:
+        """Fields of the file; NaN where the line never came near itself."""
+        if not self.on:
+            return []
+        return [
+            Field(name, unit, f"{text}; NaN: it was never near", nan_ok=True)
+            for name, (_, unit, text) in FIELDS.items()
+        ]
+
+    def values(self) -> dict[str, np.ndarray]:
+        """Values of those fields."""
+        found = self.itself.found
+        near = self.on and math.isfinite(found[LEAST])
+        return {x.name: np.array(found[FIELDS[x.name][0]] if near else np.nan) for x in self.fields()}
+
+
+def is_bent(state: State) -> bool:
+    """As kernels.self_distance.is_bent, which only kernels can call."""
+    along, c = state.e @ (state.r[-1] - state.r[0]), state.r[-1] - state.r[0]
+    size = np.linalg.norm(state.e, axis=1) * np.linalg.norm(c)
+    return bool((~((along > 0.0) & (along >= TURNED * size))).any())
