@@ -46,7 +46,7 @@ def remap(
     loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
     tangent of what holds the twist of the two ends, None: nothing does.
     """
-    out = blank_state(target.h.size)
+    out = blank_state(target.h.size, len(target.torsion))
     now, then = old.first, new.first
     place = then[:-1]
     changed = old.rod != new.rod

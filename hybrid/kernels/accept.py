@@ -49,6 +49,7 @@ from hybrid.kernels.books import (
     WASTED,
     WAVE_STEP,
     WHERE,
+    ZONES,
 )
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED
@@ -65,6 +66,7 @@ from hybrid.kernels.report import (
     WRONG_PIVOTS,
 )
 from hybrid.kernels.step_control import halve, passes
+from hybrid.kernels.zone_torque import POWER
 
 # Twist of an element (rad) that could become its opposite unseen: the log strain ends at pi, and a step may add what
 # an end turns in it (model.resolution.MOST_TURN); what goes beyond pi comes back as more than this.
@@ -135,6 +137,8 @@ def accept(line, ends, old, new, books, work, end, dt):
     keep_imposed(ends, books.imposed)
     find_powers(line, ends, books.velocity, new, report, books.power[0])
     book_work(line, dt, report, books)
+    for z in range(new.turn.shape[0]):
+        books.work[0, ZONES] += 0.5 * dt * (old.turn[z, POWER] + new.turn[z, POWER])
     row = books.log[count[ROWS]]
     row[0], row[1], row[2], row[3] = end, dt, count[TRIES] + count[WASTED], clock[CORRECTION]
     row[4], row[5], row[6] = report[RESIDUAL], count[REPEATS], report[LOCAL_ERROR]

@@ -248,8 +248,8 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
 
 
 @inner
-def fill_spin(W, line, state, i, cell, here, there, ca):
-    """The row of the spin of cell i: d.(M_{i+1} - M_i) - polar w' = 0."""
+def fill_spin(W, line, state, i, cell, here, there, ca, passed):
+    """The row of the spin of cell i: d.(M_{i+1} - M_i) - polar w' = 0, with the torque of a catenary zone beside it."""
     d, _, il = cell.chord
     o = 4 * WIDTH
     if i >= line.h.shape[0] or not line.spin[i]:
@@ -270,6 +270,9 @@ def fill_spin(W, line, state, i, cell, here, there, ca):
     if line.bits & ROTARY:
         residual -= line.polar[i] * state.wd[i]
         inertia = line.polar[i] * ca
+    if passed.shape[1] > 0:
+        residual += passed[0, i]
+        soft -= passed[1, i]
     for j in range(3):
         W[o + 6 + j] = -sm[j]
         W[o + 11 + j] = sm[j] - s0[j]
@@ -295,7 +298,7 @@ def size_of_spin(line, i, cell, here, there, ca):
 
 
 @inner
-def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca):
+def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed):
     """The whole block row of node i."""
     for j in range(SIZE * WIDTH):
         W[j] = 0.0
@@ -322,7 +325,7 @@ def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, 
             W[o + 15] = d[j]
             W[o + 19] = force.np[j]
     W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = rhs
-    fill_spin(W, line, state, i, cell, here, there, ca)
+    fill_spin(W, line, state, i, cell, here, there, ca, passed)
 
 
 @inner
@@ -374,7 +377,9 @@ def march(line, sea, ends, r, state, cv, ca, work):
         node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         wide = bent or bent_before
         if wide or rows.shape[0] > 0:
-            fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca)
+            fill(
+                W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, work.torsion.passed
+            )  # fmt: skip
             if rows.shape[0] > 0:
                 for j in range(SIZE * WIDTH):
                     rows[i, j] = W[j]

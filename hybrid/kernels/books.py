@@ -135,8 +135,8 @@ class Books(NamedTuple):
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
-# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); of the model
-# error, where it is followed, K numbers.
+# work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
+# of zones that a torque passes through; of the model error, where it is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,
@@ -150,9 +150,9 @@ SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
 HEAD = SAMPLE_WORK + WORKS
 
 
-def sample_size(cells: int, varies: bool = False) -> int:
-    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness.
+def sample_size(cells: int, varies: bool = False, zones: int = 0) -> int:
+    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns.
 
     What is sampled of the model error comes behind them.
     """
-    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1))
+    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1)) + 3 * zones

@@ -14,7 +14,8 @@ from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, OK, STEP, L
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.run import blank_job, in_plane, in_space
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state, no_ends, no_torsion
+from hybrid.kernels.zone_torque import pass_torque, torsion_of
 
 NO_PUSH: Floats = np.zeros((0, 4))
 NO_STRAINS: Floats = np.zeros((0, 3))
@@ -35,10 +36,17 @@ def _solve(
     task: Task, line: Line, sea: Sea, ends: Ends, old: State, new: State, was: Floats, now: Floats, work: Work
 ) -> tuple[int, int, float, int]:
     """As kernels.newton.solve, by the kernel for the line's kind."""
+    check_turns(line, new)
     table = _here.table
     table.bind(task=task, line=line, sea=sea, ends=ends, old=old, new=new, was=was, now=now, work=work)
     found: tuple[int, int, float, int] = (in_plane if line.bits & PLANAR else in_space)(table.numbers)
     return found
+
+
+def check_turns(line: Line, state: State) -> None:
+    """ValueError: a state does not know the turns of the zones of its line that a torque passes through."""
+    if state.turn.shape[0] != line.torsion.shape[0]:
+        raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
 
 
 def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:
@@ -46,6 +54,17 @@ def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, i
     if line.bits & PLANAR:
         return sharpest_in_plane(line, ends, state.e, state.T, state.a1, NO_STRAINS)
     return sharpest_in_space(line, ends, state.e, state.T, state.a1, NO_STRAINS)
+
+
+def workspace_of(line: Line, keep: bool = False) -> Work:
+    """Arrays for a line, with what a torque through its catenary zones takes; keep: as of `workspace`."""
+    work = workspace(line.h.size, keep or bool(line.torsion.size))
+    if line.torsion.size and not line.bits & PLANAR:
+        torsion = torsion_of(line)
+        work = work._replace(torsion=torsion)
+        address = pass_torque.address(line, no_ends(), blank_state(line.h.size), work, 0, 0.0)
+        work = work._replace(torsion=torsion._replace(address=address))
+    return work
 
 
 def workspace(n_cells: int, keep: bool = False) -> Work:
@@ -58,6 +77,7 @@ def workspace(n_cells: int, keep: bool = False) -> Work:
         report=np.zeros(REPORT_SIZE),
         gaps=np.zeros(0),
         rows=np.zeros((0, SIZE * WIDTH)),
+        torsion=no_torsion(),
     )
 
 

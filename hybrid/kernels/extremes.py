@@ -21,6 +21,8 @@ from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.seabed import pressure
+from hybrid.kernels.zone_torque import FIRST, LAST
+from hybrid.kernels.zone_torque import TORQUE as PASSED
 
 
 @kernel  # a call costs a nanosecond; inlined at thirty places it costs seconds of compilation
@@ -128,8 +130,10 @@ def note_catenary(line, state, books, i, t):
 
 
 @inner
-def note_rod_end(line, ends, state, books, i, t):
-    """Curvature, moment and torque where a rod has no element: those of the moment that is given, at a joint none.
+def note_rod_end(line, ends, state, books, i, passed, t):
+    """Curvature, moment and torque where a rod has no element: those of the moment that is given, at a joint none but
+
+    the torque `passed` of the zone beside it, N m.
 
     Where the rod is curved without load and a moment is given, the curvature is the largest that both can have.
     """
@@ -139,7 +143,7 @@ def note_rod_end(line, ends, state, books, i, t):
         if cell < 0 or cell == n or not line.spin[cell]:
             continue
         d, _, _ = chord(get3(state.e, cell))
-        torque, moment = 0.0, 0.0
+        torque, moment = passed, 0.0
         if i == 0 or i == n:
             m = scale(-1.0 if i == 0 else 1.0, get3(ends.moment, 0 if i == 0 else 1))
             torque = dot(m, d)
@@ -194,16 +198,21 @@ def note_extremes(line, sea, ends, state, books, t):
     n = line.h.shape[0]
     normal = get3(sea.normal.reshape(1, 3), 0)
     note_tension(line, ends, state, books, t)
+    zone, zones = 0, line.torsion.shape[0]
     for i in range(n + 1):
+        passed = 0.0
+        if zone < zones and i >= line.torsion[zone, FIRST]:
+            passed = state.turn[zone, PASSED]
+            zone += i >= line.torsion[zone, LAST]
         if line.element[i]:
             note_element(line, books, i, t)
         else:
             note_catenary(line, state, books, i, t)
             if line.spin[max(i - 1, 0)] or line.spin[min(i, n - 1)]:
-                note_rod_end(line, ends, state, books, i, t)
+                note_rod_end(line, ends, state, books, i, passed, t)
             else:
                 widen_both(books.extremes, books.right, MOMENT, i, 0.0, t)
-                widen_both(books.extremes, books.right, TORQUE, i, 0.0, t)
+                widen_both(books.extremes, books.right, TORQUE, i, passed, t)
         if line.bits & SEABED:
             p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
             q, _, _ = pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)

@@ -19,8 +19,10 @@ from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.generalized_alpha import Scheme, scheme
+from hybrid.kernels.references import caller_of_six
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
@@ -66,6 +68,16 @@ LOW_TENSION = 1e-3
 # (damped Newton): the linearised constraint of length is useless beyond about half a radian.
 LARGEST_TURN = 0.7
 
+call_torque = caller_of_six(0)
+
+
+@inner
+def pass_torque(space, line, ends, state, work, part, cv):
+    """A part of what a torque through catenary zones takes (kernels.zone_torque), where there is one."""
+    if space is not None:
+        if work.torsion.address != 0:
+            call_torque(work.torsion.address, line, ends, state, work, part, cv)
+
 
 @inner
 def round_off_tension(line, ca, scale):
@@ -106,6 +118,7 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
     while it < most and outcome == NOT_CONVERGED:
         it += 1
         bad, good = -1, True
+        pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
         if space is not None:
             bad = march(line, sea, ends, old.r, new, cv, ca, work)
         if plane is not None:
@@ -120,6 +133,7 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
             break
         if space is not None:
             good = substitute(work.X, work.x)
+            pass_torque(space, line, ends, new, work, CORRECT, cv)
         if plane is not None:
             good = substitute_planar(plane, work.X, work.x)
         if not good:
@@ -149,6 +163,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
         before = size if part == 1.0 else math.inf
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
+    pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
+    if task.what == STEP:
         if outcome == OK:
             turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
             if not turn < LARGEST_STEP_TURN:

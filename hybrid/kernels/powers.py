@@ -21,8 +21,18 @@ from hybrid.kernels.report import (
     WAVE_POWER,
 )
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
+from hybrid.kernels.zone_torque import FIRST, LAST
 
 START, APPLIED = 0, 2
+
+
+@inner
+def holds_torque(line, k):
+    """Whether end k holds a catenary zone that a torque passes through."""
+    zones = line.torsion.shape[0]
+    if zones == 0:
+        return False
+    return line.torsion[0, FIRST] == 0.0 if k == 0 else line.torsion[zones - 1, LAST] == line.h.shape[0]
 
 
 @inner
@@ -43,7 +53,7 @@ def find_powers(line, ends, velocity, state, report, power):
         else:
             power[APPLIED] += dot(get3(ends.force, k), get3(state.v, node))
         at = MOMENT_A + 3 * k
-        if line.element[node]:
+        if line.element[node] or holds_torque(line, k):
             turning = dot((report[at], report[at + 1], report[at + 2]), get3(ends.spin, k))
             power[k] += turning if k else -turning
         elif line.spin[cell]:

@@ -88,15 +88,27 @@ def caller(returned: Any) -> Any:
 
     @intrinsic
     def call(typingctx: Any, address: Any, table: Any) -> Any:
-        def generate(context: Any, builder: Any, signature: Any, args: Any) -> Any:
-            kinds = signature.args[1:]
-            code = context.call_conv.get_function_type(signature.return_type, kinds).as_pointer()
-            called = builder.inttoptr(args[0], code)
-            return context.call_conv.call_function(builder, called, signature.return_type, kinds, args[1:])[1]
-
-        return result(types.int64, table), generate
+        return result(types.int64, table), _call
 
     return call
+
+
+def caller_of_six(returned: Any) -> Any:
+    """The same with six arguments, call(address, a, b, c, d, e, f)."""
+    result = typeof(returned)
+
+    @intrinsic
+    def call(typingctx: Any, address: Any, a: Any, b: Any, c: Any, d: Any, e: Any, f: Any) -> Any:
+        return result(types.int64, a, b, c, d, e, f), _call
+
+    return call
+
+
+def _call(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+    kinds = signature.args[1:]
+    code = context.call_conv.get_function_type(signature.return_type, kinds).as_pointer()
+    called = builder.inttoptr(args[0], code)
+    return context.call_conv.call_function(builder, called, signature.return_type, kinds, args[1:])[1]
 
 
 @register_model(Reference)
@@ -172,7 +184,9 @@ def _unboxed(kind: Any, value: Any, c: Any) -> NativeValue:
 
 
 def _numbers(context: Any, builder: Any, kind: Any, value: Any) -> list[Any]:
-    """What a table holds of an array or a number."""
+    """What a table holds of an array, a number or a NamedTuple by reference."""
+    if isinstance(kind, Reference):
+        return [builder.load(cgutils.gep_inbounds(builder, value, k)) for k in range(size(kind))]
     if isinstance(kind, types.Array):
         array = context.make_array(kind)(context, builder, value)
         return [builder.ptrtoint(array.data, _WORD), *cgutils.unpack_tuple(builder, array.shape)]

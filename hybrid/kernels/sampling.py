@@ -213,6 +213,10 @@ def sample_step(line, sea, old, new, books):
         if count[VARIES]:
             sample_line(line, row)
             at += line.h.shape[0] + line.kb.size
+        for z in range(new.turn.shape[0]):
+            for j in range(3):
+                row[at + j] = x * new.turn[z, j] + (1.0 - x) * old.turn[z, j]
+            at += 3
         sample_model_error(books.model_error, x, row, at)
         count[SAMPLES] += 1
         count[OUTPUT] += 1

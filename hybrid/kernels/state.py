@@ -18,6 +18,10 @@ LANES = 16
 # Of a line in space.  Writeable: a read-only default would give every kernel a second signature.
 NO_PLANE: Floats = np.full((3, 3), np.nan)
 NOT_VARYING: Floats = np.zeros(0)
+# Of a line without catenary zones that a torque passes through.
+NO_TORSION: Floats = np.zeros((0, 5))
+NO_TURN: Floats = np.zeros((0, 3))
+NO_TURNS: Floats = np.zeros((0, 0, 3))
 
 
 class Line(NamedTuple):
@@ -57,6 +61,9 @@ class Line(NamedTuple):
     footing: Floats  # (N+1,) m, length of cable that presses on the seabed as much as the body at the node
     bits: int  # which optional forces are on (kernels.forces)
     plane: Floats = NO_PLANE  # (3, 3) rows p, q and the normal p x q of the plane that a planar line lies in
+    # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
+    # turn without torque (rad), stiffness-proportional damping time (s)
+    torsion: Floats = NO_TORSION
 
 
 class Ends(NamedTuple):
@@ -140,6 +147,9 @@ class State(NamedTuple):
     wd: Floats  # (N,) 1/s2, true spin acceleration
     slip: Floats  # (N+1, 3) m, elastic travel of friction on the seabed
     bed: Floats  # (N+1, 3) N, force of the seabed
+    # (K, 3) of zones that a torque passes through: turn of the frame after the zone against that before it, counted
+    # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
+    turn: Floats = NO_TURN
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -170,6 +180,7 @@ class Batch(NamedTuple):
     sea_now: Floats  # (nb, 4) as `Sea.now`
     h: Floats = NOT_VARYING  # (nb, N) m, lengths of cells where they change in a run; else empty: those of the line
     kb: Floats = NOT_VARYING  # (nb, N+1, 3) N m, stiffness of elements, likewise
+    turn: Floats = NO_TURNS  # (nb, K, 3) as `State.turn`
 
     def line(self, k: int, line: Line) -> Line:
         """The line at output k, from the one of all outputs."""
@@ -186,13 +197,14 @@ def batch_of_one(t: float, ends: Ends, state: State, report: Floats, work: Float
     return Batch(
         np.array([t]), now.r, now.v, now.vd, now.e, now.T, now.a1, now.w, ends.held[None].copy(),
         ends.position[None].copy(), ends.frame[None].copy(), ends.spin[None].copy(), ends.force[None].copy(),
-        ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(),
+        ends.moment[None].copy(), report[None].copy(), work[None].copy(), sea.now[None].copy(), turn=now.turn,
     )  # fmt: skip
 
 
 def state_in(batch: Batch, k: int) -> State:
     """The state at output k, in arrays of its own; algorithmic accelerations and friction are not known."""
-    state = blank_state(batch.T.shape[1])
+    state = blank_state(batch.T.shape[1], batch.turn.shape[1])
+    state.turn[:] = batch.turn[k] if batch.turn.size else 0.0
     for name in ("r", "v", "vd", "e", "T", "a1", "w"):
         getattr(state, name)[:] = getattr(batch, name)[k]
     return state
@@ -202,6 +214,18 @@ def ends_in(batch: Batch, k: int) -> Ends:
     """The conditions of the ends at output k, in arrays of their own."""
     rows = (batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
     return Ends(*(np.array(x[k]) for x in rows))
+
+
+class Torsion(NamedTuple):
+    """What a torque through K catenary zones takes beside the march (kernels.zone_torque); empty: there is none."""
+
+    address: int  # of kernels.zone_torque.pass_torque; 0: there is none
+    passed: Floats  # (2, N) N m of cells of rods beside zones: torque on their spin; stiffness that holds it meanwhile
+    slope: Floats  # (N+1, 3) how the turn of the zone answers to the directions of the two chords of a node
+    floating: NDArray[np.int64]  # (F,) cells that are held meanwhile: one of each rod that no end holds
+    columns: Floats  # (K+F, N+1, 5) how the line answers to the torque of each zone, to a torque on each such cell
+    right: Floats  # (N+1, 5) a right-hand side
+    dense: Floats  # (K+F, K+F+1) equations of the torques and of those spins
 
 
 class Work(NamedTuple):
@@ -214,14 +238,21 @@ class Work(NamedTuple):
     report: Floats  # (REPORT_SIZE,) named in kernels.report
     gaps: Floats  # (N,) m, change of length asked of inextensible cells; empty: their law of length
     rows: Floats  # (N+1, ...) the block rows before their elimination; empty: they are not kept
+    torsion: Torsion
 
 
-def blank_state(n_cells: int) -> State:
-    """A state of zeros with room for `n_cells` cells."""
+def no_torsion() -> Torsion:
+    """No torque passes through catenary zones."""
+    z = np.zeros
+    return Torsion(0, z((2, 0)), z((0, 3)), z(0, np.int64), z((0, 0, 5)), z((0, 5)), z((0, 1)))
+
+
+def blank_state(n_cells: int, zones: int = 0) -> State:
+    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through."""
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
     w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
-    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node))
+    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node), z((zones, 3)))
 
 
 def no_sea(n_cells: int) -> Sea:
@@ -259,7 +290,7 @@ def blank_line(n_cells: int) -> Line:
     cell = dict.fromkeys(cells, np.zeros(n_cells))
     kinds = {"element": np.zeros(n_cells + 1, np.int8), "spin": np.zeros(n_cells, np.int8), "bits": 0}
     values: dict[str, Any] = dict.fromkeys(Line._fields, np.zeros(n_cells + 1)) | node | cell | kinds
-    return Line(**values | {"plane": NO_PLANE})
+    return Line(**values | {"plane": NO_PLANE, "torsion": NO_TORSION})
 
 
 def no_ends() -> Ends:
@@ -280,4 +311,4 @@ def no_moves() -> Moves:
 def no_work() -> Work:
     """A workspace in which nothing can be solved."""
     z = np.zeros
-    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)))
+    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion())

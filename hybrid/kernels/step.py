@@ -119,6 +119,9 @@ def predict_cells(plane, space, line, old, new, u, s):
                     new.w[i] -= cv * dpsi
                     new.wd[i] -= ca * dpsi
         new.a1[i, 0], new.a1[i, 1], new.a1[i, 2] = a
+    for z in range(new.turn.shape[0]):  # the turn is counted on from where it was
+        for k in range(new.turn.shape[1]):
+            new.turn[z, k] = old.turn[z, k]
 
 
 @inner

@@ -152,10 +152,11 @@ def build(
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    line = line_on(cable, s, rod, touch, sections_turn=layout is None)  # rods that come and go have no such inertia
+    # rods that come and go have no inertia of their sections
+    line = line_on(cable, s, rod, touch, sections_turn=layout is None, passes_torque=layout is None)
     h, compliance = line.h, line.ck
 
-    start = blank_state(n)
+    start = blank_state(n, len(line.torsion))
     start.r[:], shape_name = initial_nodes(scene, s)
     start.T[:] = scale
     shape = hung(scene, line, sea.values)
@@ -169,10 +170,9 @@ def build(
     if isinstance(scene.initial, Straight):  # exact chords: no round-off of the positions in the strain
         start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
         start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
-    ends, frames = ends_and_frames(scene, start.e, rod, sea)
-    start.a1[:] = frames
+    ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
     others = [
-        (name, _spare_start(scene, r, rod, scale, sea))
+        (name, _spare_start(scene, r, line, scale, sea))
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
     ]
     corrected = corrects(scene)
@@ -208,12 +208,12 @@ def _nodes(
     return None, *_placed(scene, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
 
 
-def _spare_start(scene: Scene, r: Floats, rod: np.ndarray, scale: float, sea: Surroundings) -> State:
+def _spare_start(scene: Scene, r: Floats, line: Line, scale: float, sea: Surroundings) -> State:
     """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
-    spare = blank_state(r.shape[0] - 1)
+    spare = blank_state(r.shape[0] - 1, len(line.torsion))
     spare.r[:], spare.T[:] = r, scale
     spare.e[:] = np.diff(r, axis=0)
-    spare.a1[:] = ends_and_frames(scene, spare.e, rod, sea)[1]
+    _, spare.a1[:], spare.turn[:, 0] = ends_and_frames(scene, spare.e, line, sea)
     return spare
 
 

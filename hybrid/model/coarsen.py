@@ -9,6 +9,7 @@ import numpy as np
 
 from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED
 from hybrid.kernels.state import Floats, Line, State, blank_state
+from hybrid.kernels.zone_torque import COMPLIANCE, FREE
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
 from hybrid.model.line import line_on
@@ -35,19 +36,21 @@ def coarser(model: Model) -> Model | None:
         kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
-    new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), sections_turn=bool(line.bits & ROTARY))
+    new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY), bool(line.torsion.size))
     if line.bits & PLANAR:
         new = planar(new, line.plane)
-    start = picked(new, model.start, at)
+    start = picked(new, model.start, at, _turns(line, new, model.start))
     if start is None:
         return None
-    others = tuple((name, x) for name, state in model.other_starts if (x := picked(new, state, at)) is not None)
+    spare = ((name, picked(new, x, at, _turns(line, new, x))) for name, x in model.other_starts)
+    others = tuple((name, x) for name, x in spare if x is not None)
     return replace(model, line=new, sea=model.sea.on(rod.size), start=start, other_starts=others, layout=None)
 
 
 def refined(state: State, coarse: Line, line: Line) -> State:
     """A state of a coarse line on a finer one: its nodes on parabolas, joined, so that a rod begins without kinks."""
-    out = blank_state(line.h.size)
+    out = blank_state(line.h.size, len(line.torsion))
+    out.turn[:, 0] = _turns(coarse, line, state)
     out.r[:] = _smooth(state.r, coarse.s, line.s)
     out.e[:] = np.diff(out.r, axis=0)
     middle = 0.5 * (line.s[:-1] + line.s[1:])
@@ -57,9 +60,20 @@ def refined(state: State, coarse: Line, line: Line) -> State:
     return out
 
 
-def picked(line: Line, state: State, at: np.ndarray) -> State | None:
-    """The state at some of its nodes, those of `line`; None: two of them lie at the same place."""
-    out = blank_state(at.size - 1)
+def _turns(line: Line, other: Line, state: State) -> Floats:
+    """Turns (K,) rad of zones of the other line that make their torques those of a state of the line."""
+    torque = (state.turn[:, 0] - line.torsion[:, FREE]) / line.torsion[:, COMPLIANCE]
+    return np.asarray(torque * other.torsion[:, COMPLIANCE] + other.torsion[:, FREE])
+
+
+def picked(line: Line, state: State, at: np.ndarray, turns: Floats | None = None) -> State | None:
+    """The state at some of its nodes, those of `line`; None: two of them lie at the same place.
+
+    turns: (K,) rad, of zones of the line that a torque passes through.
+    """
+    out = blank_state(at.size - 1, len(line.torsion))
+    if turns is not None:
+        out.turn[:, 0] = turns
     out.r[:], out.v[:] = state.r[at], state.v[at]
     out.e[:] = np.add.reduceat(state.e, at[:-1], axis=0)
     if not out.e.any(axis=1).all():

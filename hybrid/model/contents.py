@@ -194,10 +194,10 @@ def contents_of(
         why = "rods that come and go have none; fixed zones and `model: rod` do"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]
     if scene.ends.turns:
-        loose = next((z for z in zones if z.kind != "rod"), None)
+        loose = next((z for z in zones if z.kind != "rod" and not line.torsion.size), None)
         what, why = f"twist by {scene.ends.turns:g} turns of the ends", "ends.*.turns"
         if loose is not None:
-            why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m transmits no torque; a rod does"
+            why = f"no effect: the catenary zone s = {loose.s_a:g} to {loose.s_b:g} m passes no torque on; a rod does"
         entries.append(Entry(what, loose is None, why, event="torque neglected" if loose is not None else ""))
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None

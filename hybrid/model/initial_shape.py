@@ -217,11 +217,14 @@ def corners(scene: Scene) -> list[float]:
     return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
 
 
-def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundings) -> tuple[EndConditions, Floats]:
-    """End conditions, and first directors of all cells, carried without twist from the start.
+def ends_and_frames(
+    scene: Scene, e: Floats, line: Line, around: Surroundings
+) -> tuple[EndConditions, Floats, Floats]:
+    """End conditions, first directors of all cells, carried without twist from the start, and the turns (K,) rad of
+    catenary zones that a torque passes through.
 
     An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
-    shape has.  Where both ends fix it, and rod joins them, there is a twist to close, less than half a turn; it is
+    shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than half a turn; it is
     spread over the line, and so are the `turns` by which one end is twisted against the other.
     """
     l = np.linalg.norm(e, axis=1)
@@ -230,7 +233,7 @@ def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundin
     first = first_director(start.held_tangent or tuple(d[0]), start.held_normal)
     tangents = np.vstack([start.held_tangent or d[0], d, end.held_tangent or d[-1]])
     carried = transported(first, tangents)
-    closing = 0.0  # turns
+    closing, zones, turns = 0.0, line.torsion[:, :2].astype(int), np.zeros(len(line.torsion))  # turns
     t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
     if end.held_tangent is not None and end.held_normal is not None:
         wanted = first_director(end.held_tangent, end.held_normal)
@@ -239,14 +242,16 @@ def ends_and_frames(scene: Scene, e: Floats, rod: np.ndarray, around: Surroundin
     if closing or start.held_turns or end.held_turns:
         n = l.size
         part = np.concatenate([[0.0], (np.cumsum(l) - 0.5 * l) / l.sum(), [1.0]])
-        if not rod.all():
+        rod = line.spin == 1
+        if not (rod.all() or line.torsion.size):
             part = np.ones(n + 2)  # the rod at the end takes it; joints let the rest be
             part[: n - int(np.argmin(rod[::-1])) + 1] = 0.0
         whole = part if start.fixes_frame else np.ones(n + 2)  # the whole line takes the end's orientation
         turned = start.held_turns + part * scene.ends.turns + whole * closing
+        turns = 2.0 * np.pi * (turned[zones[:, 1] + 1] - turned[zones[:, 0]])
         angle = 2.0 * np.pi * (turned - np.round(turned))[:, None]  # so that a full turn is none, to the last digit
         carried = carried * np.cos(angle) + np.cross(t, carried) * np.sin(angle)
-    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1]
+    return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1], turns
 
 
 def _end_conditions(

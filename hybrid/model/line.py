@@ -5,14 +5,18 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.forces import BODIES, ROTARY
-from hybrid.kernels.state import Floats, Line
+from hybrid.kernels.state import NO_TORSION, Floats, Line
 from hybrid.model.material import Material
 
 
-def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True) -> Line:
+def line_on(
+    material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True,
+    passes_torque: bool = True,
+) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
-    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
+    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia;
+    passes_torque: whether a torque passes through catenary zones between ends that hold the twist.
     """
     h = np.diff(s)
     n = h.size
@@ -37,6 +41,7 @@ def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, 
         footing[place[: material.footing.size]] = material.footing
     element, kb, k0, hn = _elements(material, h, rod, of)
     half = 0.5 * h
+    torsion = torsion_zones(material, h, rod, of) if passes_torque else NO_TORSION
     return Line(
         s=s, h=h, ck=material.ck[of], mass=_to_nodes(h * material.mass[of]) + point["point_mass"], force=force,
         element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
@@ -44,7 +49,7 @@ def line_on(material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, 
         added_n=half * material.added_n[of], added_t=half * material.added_t[of],
         damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
         buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
-        footing=footing, bits=bits, **point,
+        footing=footing, bits=bits, torsion=torsion, **point,
     )  # fmt: skip
 
 
@@ -78,3 +83,27 @@ def _elements(
             if not material.held_twist[k]:
                 kb[node, 2] = 0.0
     return element, kb, k0, hn
+
+
+def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray) -> Floats:
+    """Catenary zones that a torque passes through, (K, 5) as `Line.torsion`; none where an end turns freely.
+
+    h: (N,) m, cells; rod: (N,) whether they are; of: (N,) their pieces.  Half of a rod's cell beside a zone counts as
+    the zone's: from the frame in its middle.
+    """
+    GJ = material.B[of, 2]
+    if rod.all() or not (all(material.held_twist) and all(material.held_tangent)):
+        return NO_TORSION
+    rows = []
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], ~rod, [0]])))
+    for a, b in edges.reshape(-1, 2):
+        share = h[max(a - 1, 0) : b + 1].copy()
+        share[0] *= 0.5 if a > 0 else 1.0
+        share[-1] *= 0.5 if b < h.size else 1.0
+        cells = slice(max(a - 1, 0), b + 1)
+        if not GJ[cells].all():
+            continue
+        soft = share / GJ[cells]
+        tau = float(soft @ np.nan_to_num(material.tau[of[cells]]) / soft.sum())
+        rows.append((a, b, soft.sum(), share @ material.kappa[of[cells], 2], tau))
+    return np.array(rows, float).reshape(-1, 5)

@@ -19,6 +19,7 @@ from scipy.sparse import csr_array
 from hybrid.kernels.energies import observe
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
+from hybrid.kernels.zone_torque import COMPLIANCE, FREE, TORQUE, TURN
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, sum_down, touchdown
 from hybrid.solve.bending_corrector import Shift
@@ -199,7 +200,27 @@ class Observation:
     @cached_property
     def torque(self) -> Floats:
         """(ns, nb) N m, about the tangent."""
-        return dot(self.moment, self.tangent)
+        torque = dot(self.moment, self.tangent)
+        return torque + on_grid(self.grid.sides, self._passed) if self.batch.turn.size else torque
+
+    @cached_property
+    def _passed(self) -> Floats:
+        """Torque (n sides, nb) N m that catenary zones pass on, on their nodes and the joints of rods beside them."""
+        out = np.zeros((len(self.grid.side_nodes), self.batch.t.size))
+        for z, (first, last) in enumerate(self.line.torsion[:, :2].astype(int)):
+            for a, b, o in self.grid.spans:
+                low, high = max(a, first), min(b, last)
+                if low <= high:
+                    out[o + low - a : o + high - a + 1] = self.batch.turn[:, z, TORQUE]
+        return out
+
+    def end_moment(self, k: int) -> Floats:
+        """(3, nb) N m, inertial, at end k: moment of what is after it on what is before it."""
+        moment, torsion = self.node_moment[-k], self.line.torsion
+        if self.batch.turn.size and (torsion[-1, 1] == self.line.h.size if k else torsion[0, 0] == 0.0):
+            tangent = self.batch.frame[:, k, 2::3]
+            moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
+        return moment
 
     @property
     def bending_moment(self) -> Floats:
@@ -265,15 +286,18 @@ class Observation:
         return {int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes}
 
     def _strain_of_moment(self, node: int, cell: int) -> Floats:
-        """Curvature and twist (2, nb) at a rod's end that carries the given moment (zero at a joint)."""
-        line = self.line
+        """Curvature and twist (2, nb) at a rod's end that carries the given moment (at a joint that of its zone)."""
+        line, torque = self.line, np.zeros(1)
+        for z, (first, last) in enumerate(line.torsion[:, :2]):
+            if node in (first, last) and self.batch.turn.size:
+                torque = self.batch.turn[:, z, TORQUE]
         inner = cell + 1 if cell == node else cell
         if not line.element[inner]:
             return np.zeros((2, self.batch.t.size))
         B = self.batch.stiffness(inner, line).T * line.hn[inner]
         k0 = (line.k0[inner] / line.hn[inner])[:, None]
         a1, d, M = self.batch.a1[:, cell].T[None], self.d[cell : cell + 1], self.node_moment[node : node + 1]
-        body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M)])
+        body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque])
         k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
         return np.stack([np.hypot(k[0], k[1]), k[2]])
 
@@ -342,6 +366,9 @@ class Observation:
     def energies(self) -> dict[str, Floats]:
         """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
         kinetic, bending, torsion, stretch = self._observed[2]
+        if self.batch.turn.size:
+            of = self.line.torsion
+            torsion = torsion + ((self.batch.turn[:, :, TURN] - of[:, FREE]) ** 2 / (2.0 * of[:, COMPLIANCE])).sum(axis=1)
         r = self._plain.r
         potential = -sum_down(self.line.force.reshape(-1, 1) * r.reshape(-1, r.shape[-1]))
         return {

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
@@ -21,7 +21,7 @@ from hybrid.store.format import Field
 
 @dataclass(frozen=True)
 class Probe:
-    """A quantity that can be recorded: unit, description, dimensions, how to get it, and what it `needs`.
+    """A quantity that can be recorded: unit, description, dimensions, how to get it, and what it `needs`, one of.
 
     value: of an observation, with the dimensions and then the outputs of the batch.
     """
@@ -45,14 +45,16 @@ PROBES: dict[str, Probe] = {
     "curvature": Probe("1/m", "curvature of the centreline", _S, lambda v: v.curvature_twist[:, 0]),
     "twist": Probe("1/m", "twist of the material frame per length", _S, lambda v: v.curvature_twist[:, 1], "rod"),
     "bending_moment": Probe("N m", "magnitude of the bending moment", _S, lambda v: v.bending_moment, "rod"),
-    "torque": Probe("N m", "torque (moment about the tangent)", _S, lambda v: v.torque, "rod"),
+    "torque": Probe("N m", "torque (moment about the tangent)", _S, lambda v: v.torque, "rod torsion"),
     "shear": Probe("N", "magnitude of the shear force", _S, lambda v: v.shear, "rod"),
     "reaction_start": Probe("N", "force on the cable at its start", _X, lambda v: v.reaction(0), frame="inertial"),
     "reaction_end": Probe("N", "force on the cable at its end", _X, lambda v: v.reaction(1), frame="inertial"),
     "moment_start": Probe(
-        "N m", "moment on the cable at its start", _X, lambda v: -v.node_moment[0], "rod", "inertial"
+        "N m", "moment on the cable at its start", _X, lambda v: -v.end_moment(0), "rod torsion", "inertial"
     ),
-    "moment_end": Probe("N m", "moment on the cable at its end", _X, lambda v: v.node_moment[-1], "rod", "inertial"),
+    "moment_end": Probe(
+        "N m", "moment on the cable at its end", _X, lambda v: v.end_moment(1), "rod torsion", "inertial"
+    ),
     "contact": Probe("N/m", "force of the seabed per length, along its normal", _S, lambda v: v.contact, "seabed"),
     "contact_force": Probe("N", "force of the seabed along its normal", (), lambda v: v.contact_force, "seabed"),
     "grounded_length": Probe("m", "length in contact with the seabed", (), lambda v: v.touchdown.grounded, "seabed"),
@@ -69,7 +71,7 @@ PROBES: dict[str, Probe] = {
     "energy/contact": Probe(
         "J", "energy stored by the seabed under the cable", (), lambda v: v.energies["contact"], "seabed"
     ),
-    "energy/torsion": Probe("J", "energy of torsion", (), lambda v: v.energies["torsion"], "rod"),
+    "energy/torsion": Probe("J", "energy of torsion", (), lambda v: v.energies["torsion"], "rod torsion"),
 }
 
 WORK = {
@@ -83,7 +85,7 @@ WORK = {
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
     "contact": "work of the damping of the seabed",
     "friction": "work of friction on the seabed",
-    "zones": "energy that zones put in or take out when they change",
+    "zones": "energy that zones put in or take out when they change, and of torque where a catenary bends without it",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
@@ -148,11 +150,12 @@ class Observer:
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
-        has = (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
+        has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
+        has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         self._probes = {
             name: p
             for name, p in PROBES.items()
-            if (not p.needs or p.needs in has or (corrected and name in CORRECTED)) and (only is None or name in only)
+            if (not p.needs or has.intersection(p.needs.split()) or (corrected and name in CORRECTED)) and (only is None or name in only)
         }
         self._errors, self._corrected = errors, corrected
         self.first_energy: float | None = None  # J, at the first output

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -34,7 +34,7 @@ QUANTITIES = {
     b.TENSION: ("tension", "N", "tension", ""),
     b.CURVATURE: ("curvature", "1/m", "curvature", ""),
     b.MOMENT: ("bending_moment", "N m", "bending moment of the elastic strain", "rod"),
-    b.TORQUE: ("torque", "N m", "torque of the elastic strain", "rod"),
+    b.TORQUE: ("torque", "N m", "torque of the elastic strain", "torsion"),
     b.PRESSURE: ("contact", "N/m", "normal force of the seabed per length", "seabed"),
     b.DISPLACEMENT: ("displacement", "m", "distance from where the node was at the start", "time"),
 }
@@ -76,6 +76,7 @@ class Envelope:
         self._bounds = no_extremes(self.s.size)  # of meshes before that of now
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
+        has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
         first, second = (np.flatnonzero(np.diff(self.s) == 0.0) + k for k in (0, 1))

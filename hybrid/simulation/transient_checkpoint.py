@@ -48,7 +48,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     model, monitor, compiled = run.model, run.plane_monitor, run.run
     if saved["push"] is not None and model.plane is not None:
         monitor.speed = model.length / model.time_scale
-    state = blank_state(model.cells)
+    state = blank_state(model.cells, len(model.line.torsion))
     run.set_model(model, state)
     complete = "report" in saved  # not in a checkpoint of 0.6
     free = dict.fromkeys(("mesh", "plane", "envelope"))

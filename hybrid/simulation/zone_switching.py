@@ -46,7 +46,7 @@ MOST_RESCUES = 20
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
     more = model.line.bits & (SEABED | FRICTION)
-    line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
+    line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False, passes_torque=False)
     if model.line.bits & PLANAR:
         line = planar(line, model.line.plane)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))

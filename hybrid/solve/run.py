@@ -15,7 +15,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import sample_size
-from hybrid.kernels.entry import NO_PUSH
+from hybrid.kernels.entry import NO_PUSH, check_turns
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
@@ -73,9 +73,10 @@ class CompiledRun:
         kernels.books, what nodes have; corrector: of the model error, if it is followed.  Extremes are kept anew;
         displacements count from `books.start`, which the caller fills.
         """
+        check_turns(line, state)
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
-        size = sample_size(cells, bool(self.count[b.VARIES])) + followed.shape[1]
+        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion)) + followed.shape[1]
         if not self._room.size:
             self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
         rows = max(1, min(ROWS, self._room.size // size))
@@ -230,9 +231,12 @@ class CompiledRun:
         r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
         varies = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else ()
+        turn = take(len(self.state.turn), 3)
         held = np.repeat(ends.held[None], count, axis=0)
         self.sampled_errors = rows[:, at:]
-        return Batch(t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, *varies)
+        return Batch(
+            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, *varies, turn=turn,
+        )  # fmt: skip
 
 
 def no_extremes(columns: int) -> Floats:

@@ -10,7 +10,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
-from hybrid.kernels.entry import Limits, workspace
+from hybrid.kernels.entry import Limits, workspace_of
 from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.resolution_checks import lowest
@@ -64,7 +64,7 @@ class Equilibrium:
 class _Solver:
     def __init__(self, line: Line, sea: Sea, length: float, scale: float, floor: float) -> None:
         self.line, self.sea, self.length, self.scale, self.floor = line, sea, length, scale, floor
-        self.work = workspace(line.h.size)
+        self.work = workspace_of(line)
         self.stability = Stability(line, sea, length, scale)
         self.anchor = self.stability.anchor
         self.total = 0

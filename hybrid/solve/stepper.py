@@ -11,7 +11,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels import entry
-from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace
+from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
 from hybrid.kernels.seabed import normal_forces, stored
@@ -76,7 +76,7 @@ class Stepper:
         self.line = line
         self.limits = Limits(REACH * length, tension_scale, MOST_ITERATIONS)
         self.floor = slack_floor  # N; a catenary cell not above it refuses the step
-        self.work = workspace(line.h.size, keep)
+        self.work = workspace_of(line, keep)
         self.told: list[float] = self.work.report.tolist()  # the report of the last step or start, as plain numbers
 
     def step(self, sea: Sea, ends: Ends, old: State, new: State, dt: float, rho: float, before: float) -> Taken:

@@ -1,0 +1,316 @@
+"""Torque that passes through catenary zones (docs/theory.md, 16).
+
+A catenary has no frames, so one number stands for the twist of a zone: the turn of the frame after it against the frame
+before it, carried along the chords by the smallest rotations, and counted beyond half a turn.
+
+    symbol   meaning                                                                  unit
+    turn     of the frame after the zone (of its cell, or of an end that holds it)     rad
+    C        compliance of the zone, with the halves of the rod cells beside it        rad/(N m)
+    M        torque, (turn - turn without torque + tau rate)/C                         N m
+    c_i      (d_{i-1} x d_i)/(1 + d_{i-1}.d_i) at node i of the zone                    -
+
+It answers to the spins of the cells beside it and to all chords:
+    d turn = dpsi_after - dpsi_before + sum c_i.(de_{i-1}/l_{i-1} + de_i/l_i).
+That couples two cells far apart, which the march does not know: its solution is corrected by that of a small dense
+system.  Newton calls `pass_torque` by its address, so that lines without such zones compile none of it.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from hybrid.kernels.assembly import get9
+from hybrid.kernels.block_elimination import SIZE, solve_again
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.forces import STIFFNESS_DAMPING
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
+from hybrid.kernels.rotations import add, cross, dot, scale, sub
+from hybrid.kernels.state import Floats, Line, Torsion, no_torsion
+
+# Parts of `pass_torque`.
+BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
+TURN, TORQUE, POWER = 0, 1, 2  # columns of State.turn
+FIRST, LAST, COMPLIANCE, FREE, TAU = range(5)  # columns of Line.torsion
+LOAD, HOLD = 0, 1  # rows of Torsion.passed
+
+
+@inner
+def frame_before(line, ends, state, a):
+    """First director and direction of what lies before cell a: a cell of a rod, or the frame of the start."""
+    if a > 0:
+        d, _, _ = chord(get3(state.e, a - 1))
+        return get3(state.a1, a - 1), d
+    R = get9(ends.frame, 0)
+    return (R[0], R[3], R[6]), (R[2], R[5], R[8])
+
+
+@inner
+def frame_after(line, ends, state, b):
+    """The same of what lies after cell b - 1."""
+    if b < line.h.shape[0]:
+        d, _, _ = chord(get3(state.e, b))
+        return get3(state.a1, b), d
+    R = get9(ends.frame, 1)
+    return (R[0], R[3], R[6]), (R[2], R[5], R[8])
+
+
+@inner
+def carry(a, d, dn):
+    """Director a of d, carried to dn by the smallest rotation, and how that answers to both directions."""
+    f = 1.0 / (1.0 + dot(d, dn))
+    s = f * dot(a, dn)
+    return sub(a, scale(s, add(d, dn))), scale(f, cross(d, dn))
+
+
+@inner
+def find_turn(line, ends, state, torsion, a, b):
+    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1; its slopes into `torsion`."""
+    director, d = frame_before(line, ends, state, a)
+    slope = torsion.slope
+    for i in range(a, b):
+        dn, _, _ = chord(get3(state.e, i))
+        director, c = carry(director, d, dn)
+        slope[i, 0], slope[i, 1], slope[i, 2] = c
+        d = dn
+    last, dn = frame_after(line, ends, state, b)
+    director, c = carry(director, d, dn)
+    slope[b, 0], slope[b, 1], slope[b, 2] = c
+    return math.atan2(dot(cross(director, last), dn), dot(director, last))
+
+
+@inner
+def rate_of_ends(ends, k):
+    """Spin (1/s) of the frame of end k about its tangent, and rate of the tangent."""
+    R = get9(ends.frame, k)
+    t = (R[2], R[5], R[8])
+    w = get3(ends.spin, k)
+    return dot(w, t), cross(w, t)
+
+
+@inner
+def turn_rates(line, ends, state, torsion, a, b):
+    """Rate of the turn of the zone of cells a to b - 1: by spins, and by chords (1/s)."""
+    n, slope, v = line.h.shape[0], torsion.slope, state.v
+    before, after, by_chords = 0.0, 0.0, 0.0
+    if a > 0:
+        before = state.w[a - 1]
+    else:
+        before, t1 = rate_of_ends(ends, 0)
+        by_chords += dot(get3(slope, a), t1)
+    if b < n:
+        after = state.w[b]
+    else:
+        after, t1 = rate_of_ends(ends, 1)
+        by_chords += dot(get3(slope, b), t1)
+    for i in range(max(a - 1, 0), min(b + 1, n)):
+        _, _, il = chord(get3(state.e, i))
+        c = (0.0, 0.0, 0.0)
+        if i >= a:
+            c = get3(slope, i)
+        if i < b:
+            c = add(c, get3(slope, i + 1))
+        by_chords += il * dot(c, sub(get3(v, i + 1), get3(v, i)))
+    return after - before, by_chords
+
+
+@inner
+def find_torques(line, ends, state, torsion, finished):
+    """Turn and torque of every zone, and what rods beside them feel; finished: the power of a step as well.
+
+    Returns what damping takes out of the torsion of the zones (W).
+    """
+    passed, loss = torsion.passed, 0.0
+    n = line.h.shape[0]
+    for z in range(line.torsion.shape[0]):
+        a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+        turn = find_turn(line, ends, state, torsion, a, b)
+        turn += 2.0 * math.pi * math.floor((state.turn[z, TURN] - turn) / (2.0 * math.pi) + 0.5)
+        torque = turn - line.torsion[z, FREE]
+        damped = line.bits & STIFFNESS_DAMPING and line.torsion[z, TAU] > 0.0
+        by_chords = 0.0
+        if finished or damped:
+            by_spins, by_chords = turn_rates(line, ends, state, torsion, a, b)
+            if damped:
+                late = line.torsion[z, TAU] * (by_spins + by_chords)
+                loss += late * (by_spins + by_chords) / line.torsion[z, COMPLIANCE]
+                torque += late
+        torque /= line.torsion[z, COMPLIANCE]
+        state.turn[z, TURN], state.turn[z, TORQUE], state.turn[z, POWER] = turn, torque, torque * by_chords
+        if a > 0:  # of a rod of one cell the zone before has written
+            beside = z > 0 and int(line.torsion[z - 1, LAST]) == a - 1
+            passed[LOAD, a - 1] = torque + (passed[LOAD, a - 1] if beside else 0.0)
+        if b < n:
+            passed[LOAD, b] = -torque
+    return loss
+
+
+@inner
+def report_end_moments(line, ends, state, report):
+    """Moments of ends that hold a zone: its torque, about the tangent of the end."""
+    n, last = line.h.shape[0], line.torsion.shape[0] - 1
+    if line.torsion[0, FIRST] == 0.0:
+        _, t = frame_before(line, ends, state, 0)
+        for k in range(3):
+            report[MOMENT_A + k] += state.turn[0, TORQUE] * t[k]
+    if line.torsion[last, LAST] == n:
+        _, t = frame_after(line, ends, state, n)
+        for k in range(3):
+            report[MOMENT_B + k] += state.turn[last, TORQUE] * t[k]
+
+
+@inner
+def solve_columns(line, work):
+    """How the line answers to each torque, and to a torque on each cell that is held meanwhile."""
+    torsion, n = work.torsion, line.h.shape[0]
+    zones = line.torsion.shape[0]
+    good = True
+    for j in range(torsion.columns.shape[0]):
+        right = torsion.right
+        for i in range(n + 1):
+            for k in range(SIZE):
+                right[i, k] = 0.0
+        if j < zones:
+            a, b = int(line.torsion[j, FIRST]), int(line.torsion[j, LAST])
+            if a > 0:
+                right[a - 1, 4] = 1.0
+            if b < n:
+                right[b, 4] = -1.0
+        else:
+            cell = torsion.floating[j - zones]
+            right[cell, 4] = torsion.passed[HOLD, cell]
+        good = solve_again(work.X, work.W, right, torsion.columns[j]) and good
+    return good
+
+
+@inner
+def turn_by(line, state, torsion, z, x):
+    """Change (rad) of the turn of zone z by a correction x (N+1, 5)."""
+    n, slope = line.h.shape[0], torsion.slope
+    a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+    total = 0.0
+    if a > 0:
+        total -= x[a - 1, 4]
+    if b < n:
+        total += x[b, 4]
+    for i in range(max(a - 1, 0), min(b + 1, n)):
+        _, _, il = chord(get3(state.e, i))
+        c = (0.0, 0.0, 0.0)
+        if i >= a:
+            c = get3(slope, i)
+        if i < b:
+            c = add(c, get3(slope, i + 1))
+        total += il * (
+            c[0] * (x[i + 1, 1] - x[i, 1]) + c[1] * (x[i + 1, 2] - x[i, 2]) + c[2] * (x[i + 1, 3] - x[i, 3])
+        )
+    return total
+
+
+@inner
+def unknown_of(line, state, torsion, j, x):
+    """What the correction x makes of unknown j: the change of the turn of a zone, or the spin of a cell that is held."""
+    zones = line.torsion.shape[0]
+    if j < zones:
+        return turn_by(line, state, torsion, j, x)
+    return x[torsion.floating[j - zones], 4]
+
+
+@inner
+def solve_dense(A):
+    """Solve A[:, :n] y = A[:, n] in place by elimination with pivoting; y is then in the last column."""
+    n = A.shape[0]
+    for c in range(n):
+        best = c
+        for r in range(c + 1, n):
+            if abs(A[r, c]) > abs(A[best, c]):
+                best = r
+        for k in range(c, n + 1):
+            A[c, k], A[best, k] = A[best, k], A[c, k]
+        for r in range(c + 1, n):
+            f = A[r, c] / A[c, c]
+            for k in range(c, n + 1):
+                A[r, k] -= f * A[c, k]
+    for c in range(n - 1, -1, -1):
+        for k in range(c + 1, n):
+            A[c, n] -= A[c, k] * A[k, n]
+        A[c, n] /= A[c, c]
+
+
+@inner
+def correct(line, state, work, cv):
+    """Correct the march's solution work.x for the torques that change with it."""
+    torsion, x = work.torsion, work.x
+    zones, m = line.torsion.shape[0], torsion.columns.shape[0]
+    if not solve_columns(line, work):
+        x[0, 1] = math.nan
+        return
+    A = torsion.dense
+    for j in range(m):
+        for k in range(m):
+            A[j, k] = unknown_of(line, state, torsion, j, torsion.columns[k])
+        A[j, m] = unknown_of(line, state, torsion, j, x)
+        size = 1.0
+        if j < zones:
+            size = line.torsion[j, COMPLIANCE]
+            if line.bits & STIFFNESS_DAMPING:
+                size /= 1.0 + cv * line.torsion[j, TAU]
+        A[j, j] += size
+    solve_dense(A)
+    for j in range(m):
+        y, column = A[j, m], torsion.columns[j]
+        for i in range(x.shape[0]):
+            for k in range(SIZE):
+                x[i, k] -= y * column[i, k]
+
+
+@kernel
+def pass_torque(line, ends, state, work, part, cv):
+    """A part of Newton's iteration for a line whose state has turns; cv: dv'/dr' of the scheme, 1/s.
+
+    BEFORE_MARCH  the torques of the configuration, for the march
+    CORRECT       its solution work.x with the torques that change with it; the march has kept its factors
+    AFTER_STEP    turns, torques and powers of the configuration found, and what it reports: moments of the ends, loss
+
+    A line that is catenary from end to end feels nothing of its torque: that is found after the step.
+    """
+    felt = line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
+    if part == AFTER_STEP:
+        work.report[STIFFNESS_DAMPING_POWER] += find_torques(line, ends, state, work.torsion, True)
+        report_end_moments(line, ends, state, work.report)
+    elif felt and part == CORRECT:
+        correct(line, state, work, cv)
+    elif felt:
+        find_torques(line, ends, state, work.torsion, False)
+    return 0
+
+
+def floating_rods(line: Line, held: np.ndarray) -> np.ndarray:
+    """One cell of each rod that a torque passes to and nothing else holds; held: (2,) whether the ends hold the twist."""
+    ends_of_zones, first_of_zones = line.torsion[:, LAST].astype(int), line.torsion[:, FIRST].astype(int)
+    found = []
+    rods = np.flatnonzero(np.diff(np.concatenate([[0], line.spin, [0]]))).reshape(-1, 2)
+    for a, b in rods:
+        passes = (ends_of_zones == a).any() or (first_of_zones == b).any()
+        if passes and not (a == 0 and held[0]) and not (b == line.h.size and held[1]):
+            found.append(a)
+    return np.array(found, np.int64)
+
+
+def torsion_of(line: Line) -> Torsion:
+    """What a torque through the catenary zones of a line takes; the kernel is compiled if it has not been."""
+    zones = line.torsion.shape[0]
+    if not zones:
+        return no_torsion()
+    n = line.h.size
+    held = (line.element[[0, -1]] == 1) & (line.kb[[0, -1], 2] > 0.0)
+    floating = floating_rods(line, held)
+    unknowns, z = zones + floating.size, np.zeros
+    passed = z((2, n))
+    passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
+    return Torsion(
+        address=0, passed=passed, slope=z((n + 1, 3)), floating=floating, columns=z((unknowns, n + 1, SIZE)),
+        right=z((n + 1, SIZE)), dense=z((unknowns, unknowns + 1)),
+    )  # fmt: skip
