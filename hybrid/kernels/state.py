@@ -252,7 +252,9 @@ def blank_state(n_cells: int, zones: int = 0) -> State:
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
     w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
-    return State(z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node), z((zones, 3)))
+    return State(
+        z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node), z((zones, 3))
+    )
 
 
 def no_sea(n_cells: int) -> Sea:

@@ -29,7 +29,7 @@ from hybrid.kernels.forces import STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
-from hybrid.kernels.state import Floats, Line, Torsion, no_torsion
+from hybrid.kernels.state import Line, Torsion, no_torsion
 
 # Parts of `pass_torque`.
 BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
@@ -203,9 +203,7 @@ def turn_by(line, state, torsion, z, x):
             c = get3(slope, i)
         if i < b:
             c = add(c, get3(slope, i + 1))
-        total += il * (
-            c[0] * (x[i + 1, 1] - x[i, 1]) + c[1] * (x[i + 1, 2] - x[i, 2]) + c[2] * (x[i + 1, 3] - x[i, 3])
-        )
+        total += il * (c[0] * (x[i + 1, 1] - x[i, 1]) + c[1] * (x[i + 1, 2] - x[i, 2]) + c[2] * (x[i + 1, 3] - x[i, 3]))
     return total
 
 

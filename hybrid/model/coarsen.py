@@ -36,7 +36,8 @@ def coarser(model: Model) -> Model | None:
         kept[np.linspace(a, b, max(2, round((b - a) / FEWER)) + 1).astype(int) if b - a > 1 else [a, b]] = True
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
-    new = line_on(cable, line.s[at], rod, line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY), bool(line.torsion.size))
+    bits, turns = line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY)
+    new = line_on(cable, line.s[at], rod, bits, sections_turn=turns, passes_torque=bool(line.torsion.size))
     if line.bits & PLANAR:
         new = planar(new, line.plane)
     start = picked(new, model.start, at, _turns(line, new, model.start))

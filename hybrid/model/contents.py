@@ -113,11 +113,14 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
     yield Entry("error figure, by coarser runs", wants, why)
 
 
-def _parts(scene: Scene, rods: bool, flat: Entry) -> Iterator[Entry]:
+def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]:
     """Parts of the model of the cable itself: dimension, torsion, sections with axes of their own, attachments."""
     yield flat
     why = "rod cells" if rods else "no rod zone in model"
     yield Entry("torsion", rods and not flat.on, "nothing twists in a plane" if rods and flat.on else why)
+    if line.torsion.size:
+        why = "nothing twists in a plane" if flat.on else "both ends hold the twist"
+        yield Entry(f"torque through {len(line.torsion)} catenary zones", not flat.on, why)
     sections = scene.cable.sections
     differ = any(x.anisotropic for x in sections)
     yield Entry("bending that differs in two directions", differ, "sections[].bending_stiffness of two numbers")
@@ -151,7 +154,7 @@ def contents_of(
     """What is on and by which key, what is off and what would switch it on; flat: whether it is in a plane."""
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
-    entries += _parts(scene, "rod" in kinds, flat)
+    entries += _parts(scene, line, "rod" in kinds, flat)
     extensible = [x.axial_stiffness is not None for x in scene.cable.sections]
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
     if "rod" in kinds:
@@ -207,7 +210,7 @@ def contents_of(
                 Entry(
                     f"moment and tangent at ends.{name}",
                     False,
-                    "the cable ends in a catenary zone, which transmits no moment",
+                    "the cable ends in a catenary zone, which transmits no bending moment",
                     event="ignored",
                 )
             )

@@ -217,15 +217,13 @@ def corners(scene: Scene) -> list[float]:
     return [float(x) for x in knots[:-1] * scene.length / knots[-1]]
 
 
-def ends_and_frames(
-    scene: Scene, e: Floats, line: Line, around: Surroundings
-) -> tuple[EndConditions, Floats, Floats]:
+def ends_and_frames(scene: Scene, e: Floats, line: Line, around: Surroundings) -> tuple[EndConditions, Floats, Floats]:
     """End conditions, first directors of all cells, carried without twist from the start, and the turns (K,) rad of
     catenary zones that a torque passes through.
 
     An end whose `normal` is given fixes the material frame there; a clamp without one holds the twist that the initial
-    shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than half a turn; it is
-    spread over the line, and so are the `turns` by which one end is twisted against the other.
+    shape has.  Where both ends fix it, and a torque passes from one to the other, there is a twist to close, less than
+    half a turn; it is spread over the line, and so are the `turns` by which one end is twisted against the other.
     """
     l = np.linalg.norm(e, axis=1)
     d = e / l[:, None]

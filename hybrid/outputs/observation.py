@@ -368,7 +368,8 @@ class Observation:
         kinetic, bending, torsion, stretch = self._observed[2]
         if self.batch.turn.size:
             of = self.line.torsion
-            torsion = torsion + ((self.batch.turn[:, :, TURN] - of[:, FREE]) ** 2 / (2.0 * of[:, COMPLIANCE])).sum(axis=1)
+            twisted = self.batch.turn[:, :, TURN] - of[:, FREE]
+            torsion = torsion + (twisted**2 / (2.0 * of[:, COMPLIANCE])).sum(axis=1)
         r = self._plain.r
         potential = -sum_down(self.line.force.reshape(-1, 1) * r.reshape(-1, r.shape[-1]))
         return {

@@ -155,7 +155,8 @@ class Observer:
         self._probes = {
             name: p
             for name, p in PROBES.items()
-            if (not p.needs or has.intersection(p.needs.split()) or (corrected and name in CORRECTED)) and (only is None or name in only)
+            if (not p.needs or has.intersection(p.needs.split()) or (corrected and name in CORRECTED))
+            and (only is None or name in only)
         }
         self._errors, self._corrected = errors, corrected
         self.first_energy: float | None = None  # J, at the first output

@@ -20,7 +20,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
-from hybrid.kernels.state import Batch, Ends, Floats, Line, Moves, Sea, State, Work
+from hybrid.kernels.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work
 from hybrid.kernels.zone_step import follow_zones
 from hybrid.solve.bending_corrector import Corrector
 
@@ -230,12 +230,12 @@ class CompiledRun:
         spin, force, moment, report, work = take(2, 3), take(2, 3), take(2, 3), take(REPORT_SIZE), take(b.WORKS)
         r, v, vd = take(cells + 1, 3), take(cells + 1, 3), take(cells + 1, 3)
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
-        varies = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else ()
+        h, kb = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else (NOT_VARYING, NOT_VARYING)
         turn = take(len(self.state.turn), 3)
         held = np.repeat(ends.held[None], count, axis=0)
         self.sampled_errors = rows[:, at:]
         return Batch(
-            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, *varies, turn=turn,
+            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, h, kb, turn,
         )  # fmt: skip
 
 
