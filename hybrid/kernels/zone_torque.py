@@ -1,4 +1,4 @@
-"""Torque that passes through catenary zones (docs/theory.md, 16).
+"""Torque that passes through catenary zones (docs/theory.md, 15).
 
 A catenary has no frames, so one number stands for the twist of a zone: the turn of the frame after it against the frame
 before it, carried along the chords by the smallest rotations, and counted beyond half a turn.

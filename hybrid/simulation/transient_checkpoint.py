@@ -58,6 +58,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if run.correction is not None and isinstance(saved.get("correction"), dict):
         older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
+    if isinstance(saved.get("state"), dict) and "turn" not in saved["state"] and not model.line.torsion.size:
+        saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
