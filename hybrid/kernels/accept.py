@@ -173,9 +173,10 @@ def remember_worst(line, old, new, books, t, dt):
 def watch(line, old, new, books, report, t, dt):
     """What there is to look at after a step, as bits; and how far the line has moved, how its peak tension varies."""
     clock, flags = books.clock, 0
-    peak, before, stretched = new.T[0], old.T[0], False
+    peak, before, stretched, slack = new.T[0], old.T[0], False, False
     for c in range(new.T.shape[0]):
         peak, before = max(peak, new.T[c]), max(before, old.T[c])
+        slack |= not (line.spin[c] or new.T[c] > clock[SLACK_LIMIT])
         e, longest = new.e[c], books.borne[c] * line.h[c]
         stretched |= e[0] * e[0] + e[1] * e[1] + e[2] * e[2] > longest * longest
     clock[LEAST_PEAK], clock[LARGEST_PEAK] = min(clock[LEAST_PEAK], peak), max(clock[LARGEST_PEAK], peak)
@@ -189,7 +190,7 @@ def watch(line, old, new, books, report, t, dt):
         flags |= JUMPED
     if report[BEND] > clock[BEND_LIMIT] or report[TWIST] > min(clock[TWIST_LIMIT], LARGEST_TWIST):
         flags |= BENT
-    if not report[SLACKEST] > clock[SLACK_LIMIT]:
+    if slack:
         flags |= SLACKENED
     return flags
 

@@ -102,3 +102,26 @@ def lowest(line, T):
         if not line.spin[i] and not T[i] > low:
             where, low = i, T[i]
     return low, where
+
+
+@kernel
+def lowest_not_held(line, sea, T):
+    """As `lowest`, without the cells that lie on the bed and are compressed by less than friction holds there.
+
+    Friction changes the tension by up to mu N from one cell to the next: a compression below that is within what cells
+    of this length resolve, and the bed keeps the line from buckling.
+    """
+    where, low = -1, math.inf
+    for i in range(T.shape[0]):
+        if not line.spin[i] and not T[i] > low:
+            a, b = normal_force(sea, i), normal_force(sea, i + 1)
+            if not (a > 0.0 and b > 0.0 and -T[i] < 0.5 * sea.friction[0] * (a + b)):
+                where, low = i, T[i]
+    return low, where
+
+
+@inner
+def normal_force(sea, i):
+    """Force of the bed on a node along the normal of the bed, N."""
+    n, bed = sea.normal, sea.bed
+    return n[0] * bed[i, 0] + n[1] * bed[i, 1] + n[2] * bed[i, 2]

@@ -28,7 +28,7 @@ from hybrid.kernels.report import (
     TWIST_NODE,
     WRONG_PIVOTS,
 )
-from hybrid.kernels.resolution_checks import lowest, sharpest_in_plane, sharpest_in_space
+from hybrid.kernels.resolution_checks import lowest, lowest_not_held, sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.rotations import dot, spin_about
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.water import wave_kinematics
@@ -187,7 +187,10 @@ def end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, s
     if plane is not None:
         sharp = sharpest_in_plane(line, ends, new.e, new.T, new.a1, strains)
     report[BEND], report[BEND_NODE], report[TWIST], report[TWIST_NODE] = sharp
-    report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
+    if line.bits & FRICTION:
+        report[SLACKEST], report[SLACKEST_CELL] = lowest_not_held(line, sea, new.T)
+    else:
+        report[SLACKEST], report[SLACKEST_CELL] = lowest(line, new.T)
     change, place = acceleration_change(old, new)
     _, _, _, _, slip = weights(task.rho, task.before / dt)
     report[LOCAL_ERROR], report[LOCAL_ERROR_NODE] = slip * dt * dt * change, place

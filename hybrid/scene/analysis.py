@@ -97,7 +97,8 @@ class Equilibrium(Table):
     friction: Annotated[Literal["neglected", "settled"], Renamed({"left_out": "neglected"})] = Field(
         default="neglected",
         description="on a seabed with friction: neglected (the equilibrium without it, where there is one, which is "
-        "one with it as well), or settled (the line comes to rest from its first shape with friction, and stays near)",
+        "one with it as well), or settled (guess auto or catenary: laid there without tension, then pulled tight "
+        "against friction; a given shape, or where that fails: the line comes to rest from its first shape)",
     )
 
     @model_validator(mode="after")

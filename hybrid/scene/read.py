@@ -107,6 +107,8 @@ def _text_of(path: str | Path) -> str:
 
 def parse_scene(text: str, file: str = "", overrides: Sequence[str] = ()) -> Scene:
     """Read a scene from YAML text; `file` is its name in complaints and the folder of motion files."""
+    if not isinstance(text, str):
+        raise TypeError(f"the text of a scene is a str, not {type(text).__name__}; validate_scene takes Python data")
     return _warn_renamed(*_parsed(text, file, overrides))
 
 

@@ -211,7 +211,8 @@ class Diagnostics:
 
     def watch(self, run: CompiledRun) -> None:
         """Tell a run beyond which values there is something to look at."""
-        clock, warns = run.clock, self._model.slack == "warn"
+        clock, model = run.clock, self._model
+        warns = model.slack == "warn" or bool(model.line.bits & FRICTION)  # friction may hold a compressed line
         clock[b.BEND_LIMIT], clock[b.TWIST_LIMIT], clock[b.SCALED_JUMP] = self._bend, self._twist, self._jump
         clock[b.SLACK_LIMIT] = self._slack if warns else -np.inf
 
@@ -345,11 +346,13 @@ class Diagnostics:
                 return
 
     def tension(self, t: float, state: State) -> None:
-        """Catenary cells without tension, where the scene asks to go on with them."""
+        """Catenary cells without tension, where friction holds them or the scene asks to go on with them."""
         tension, cell = lowest(self._model.line, state.T)
         if not tension > self._slack:
             s = float(self._model.line.s[cell])
-            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: what follows is grid noise there"
+            lies = self._model.line.bits & FRICTION and state.bed[cell : cell + 2].any(axis=1).all()
+            follows = "friction holds it on the seabed, loose" if lies else "what follows is grid noise there"
+            text = f"tension {tension:.3g} N in a catenary zone at s = {s:g} m: {follows}"
             self.note(t, cell, "slack", text)
             self._slack = min(10.0 * tension, 10.0 * self._slack)
 

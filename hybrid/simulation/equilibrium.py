@@ -15,6 +15,7 @@ from hybrid.model.build import Model
 from hybrid.model.coarsen import coarser, refined
 from hybrid.model.equilibrium_hints import reasons_against
 from hybrid.model.plane import leaves_plane, planar, untwist
+from hybrid.scene.analysis import Equilibrium as StaticStart
 from hybrid.scene.schema import Scene
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium, solve_statics
@@ -65,7 +66,7 @@ def _count_turns(scene: Scene, model: Model, t: float, state: State) -> None:
 
 
 def solve_model(
-    model: Model, t: float, start: State, settle: bool, quick: bool = False, take_slack: bool = False,
+    model: Model, t: float, start: State, settle: str, quick: bool = False, take_slack: bool = False,
     others: Sequence[tuple[str, State]] = (),
 ) -> Equilibrium:  # fmt: skip
     """Equilibrium of a model with the loads of time t: in its plane where it holds in space too, else in space.
@@ -100,15 +101,22 @@ def _untwisted(model: Model, line: Line, start: State) -> State:
 
 
 def _statics(scene: Scene, model: Model, t: float, quick: bool = False) -> Equilibrium:
-    settle = getattr(scene.initial, "friction", "") == "settled"
+    settle = _settling(scene)
     slack = model.slack == "warn" and not quick
     return solve_model(model, t, model.start, settle, quick, slack, model.other_starts)
 
 
 def _settles(scene: Scene, model: Model, t: float) -> bool:
     """Whether friction holds the cable where it starts, so that no other start will do."""
-    asked = getattr(scene.initial, "friction", "") == "settled"
-    return bool(model.line.bits & FRICTION) and (asked or not model.ends.at(t).held.any())
+    return bool(model.line.bits & FRICTION) and (bool(_settling(scene)) or not model.ends.at(t).held.any())
+
+
+def _settling(scene: Scene) -> str:
+    """How friction is to settle, as of `solve_statics`: a shape that the scene gives is where the line was laid."""
+    asked = scene.initial
+    if not isinstance(asked, StaticStart) or asked.friction != "settled":
+        return ""
+    return "pull" if asked.points is None and asked.guess in ("auto", "catenary") else "start"
 
 
 def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:

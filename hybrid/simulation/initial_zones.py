@@ -142,7 +142,7 @@ def _difference(full: State, layout: Layout, answer: tuple[Model, Equilibrium], 
 
 def _equilibrium(model: Model, t: float, start: State, with_friction: bool) -> Equilibrium:
     """with_friction: whether friction took part in what it is compared with."""
-    return solve_model(model, t, start, settle=with_friction)
+    return solve_model(model, t, start, settle="start" if with_friction else "")
 
 
 def _on_fewer(state: State, s: Floats, line: Line) -> State:

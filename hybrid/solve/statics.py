@@ -13,9 +13,10 @@ from hybrid.kernels import entry
 from hybrid.kernels.entry import Limits, workspace_of
 from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
-from hybrid.kernels.resolution_checks import lowest
+from hybrid.kernels.resolution_checks import lowest, lowest_not_held
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
+from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged
 from hybrid.solve.stepper import Stepper
 
@@ -99,7 +100,7 @@ class _Solver:
                 break
             outcome, where = Outcome.NOT_CONVERGED, int(self.work.report[RESIDUAL_NODE])
         if outcome == Outcome.OK:
-            tension, cell = lowest(line, new.T)
+            tension, cell = self.lowest(line, new)
             if not tension > self.floor:
                 outcome, where = Outcome.SLACK, cell
         if outcome == Outcome.OK and line is self.line and sea is None:
@@ -114,6 +115,12 @@ class _Solver:
         if outcome == Outcome.OK and judged and not self.stability.holds(ends, new):
             outcome, where = Outcome.UNSTABLE, int(np.argmin(new.T))
         return Outcome(outcome), int(where), new
+
+    def lowest(self, line: Line, state: State) -> tuple[float, int]:
+        """Lowest tension of a catenary cell that no friction on the bed holds, N, and the cell."""
+        if line.bits & FRICTION:
+            return lowest_not_held(line, self.sea, state.T)
+        return lowest(line, state.T)
 
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
@@ -255,6 +262,20 @@ def _settled(solver: _Solver, ends: Ends, start: State, shape: str) -> tuple[str
     return f"settled with friction from {shape}", *solver.newton(solver.line, ends, _relax(solver, ends, rest))
 
 
+def _pulled(
+    smooth: _Solver, rough: _Solver, roads: Iterator[tuple[str, Outcome, int, State]], ends: Ends
+) -> Iterator[tuple[str, Outcome, int, State]]:
+    """Laid on the bed without tension along the equilibrium without friction, then pulled tight against friction."""
+    for how, outcome, where, state in roads:
+        if outcome != Outcome.OK:
+            yield f"without friction, {how}", outcome, where, state
+            continue
+        rest = laid_on_bed(smooth.line, smooth.sea, ends, state)
+        rough.total += smooth.total
+        yield "pulled tight against friction from where it lay without tension", *rough.newton(rough.line, ends, rest)
+        return
+
+
 def _attempts(
     solver: _Solver, ends: Ends, start: State, shape: str, others: Sequence[tuple[str, State]]
 ) -> Iterator[tuple[str, Outcome, int, State]]:
@@ -291,7 +312,7 @@ def solve_statics(
     floor: float | None = None,
     take_slack: bool = False,
     shape: str = "the starting shape",
-    settle: bool = False,
+    settle: str = "",
     others: Sequence[tuple[str, State]] = (),
     quick: bool = False,
 ) -> Equilibrium:
@@ -299,8 +320,9 @@ def solve_statics(
 
     length: m; scale: the tension scale, N; floor: what counts as no tension in motion, N
     (None: 1e-6 of the scale); at rest a catenary needs LEAST_TENSION times that; shape: what the
-    start is, for people; settle: let it come to rest with friction from the start, and try nothing else;
-    others: further starts with their names; quick: try nothing but Newton from the start.
+    start is, for people; settle: on a bed with friction, "start": let it come to rest from the start and try nothing
+    else, "pull": pull it tight from where it would lie without tension along the equilibrium without friction, else
+    the same; others: further starts with their names; quick: try nothing but Newton from the start.
 
     Tries Newton; then a soft line that is hardened; then Newton with turning chords along
     ladders of end loads; then a damped motion that settles, and Newton again; then a push
@@ -309,23 +331,24 @@ def solve_statics(
     """
     # at rest a catenary needs more than no tension: without any, every shape is an equilibrium
     floor = LEAST_TENSION * abs(1e-6 * scale if floor is None else floor)
-    rough = line._replace(bits=line.bits & ~WAVES)
-    smooth = rough._replace(bits=rough.bits & ~FRICTION)
-    solver = _Solver(smooth, sea, length, scale, floor)
+    rough = _Solver(line._replace(bits=line.bits & ~WAVES), sea, length, scale, floor)
+    smooth = _Solver(rough.line._replace(bits=rough.line.bits & ~FRICTION), sea, length, scale, floor)
     path: list[str] = []
     failed: list[tuple[Outcome, int, State]] = []
-    settle = bool(line.bits & FRICTION) and (settle or not ends.held.any())
-    roads = iter(()) if settle else _attempts(solver, ends, start, shape, others)
-    if quick:
-        roads = islice(roads, 1)
-    for how, outcome, where, state in roads:
-        path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
-        if outcome == Outcome.OK:
-            return _found(solver, ends, state, path)
-        failed.append((outcome, where, state))
-    if line.bits & FRICTION and not (quick and failed):
-        solver = _Solver(rough, sea, length, scale, floor)
-        how, outcome, where, state = _settled(solver, ends, start, shape)
+    if line.bits & FRICTION and not ends.held.any():
+        settle = "start"
+
+    def roads() -> Iterator[tuple[_Solver, tuple[str, Outcome, int, State]]]:
+        rubs = bool(line.bits & FRICTION)
+        plain = _attempts(smooth, ends, start, shape, others)
+        if not (settle and rubs):
+            yield from ((smooth, road) for road in (islice(plain, 1) if quick else plain))
+        elif settle == "pull":
+            yield from ((rough, road) for road in _pulled(smooth, rough, plain, ends))
+        if rubs and (settle or not quick):
+            yield rough, _settled(rough, ends, start, shape)
+
+    for solver, (how, outcome, where, state) in roads():
         path.append(f"{how}: {outcome.cause if outcome else 'found'} ({solver.total} iterations in all)")
         if outcome == Outcome.OK:
             return _found(solver, ends, state, path)
@@ -338,7 +361,7 @@ def solve_statics(
     ):  # what says most about the line comes first
         for outcome, where, state in failed:
             if outcome == worst == Outcome.SLACK and take_slack:
-                return _found(solver, ends, state, path)
+                return _found(smooth, ends, state, path)
             if outcome == worst:
                 s = float(line.s[min(max(where, 0), line.s.size - 1)])
                 raise ComputationError(outcome, None, s, "\n              ".join(path))
@@ -347,7 +370,7 @@ def solve_statics(
 
 def _found(solver: _Solver, ends: Ends, state: State, path: list[str]) -> Equilibrium:
     residual = solver.prove(ends, state)
-    tension, cell = lowest(solver.line, state.T)
+    tension, cell = solver.lowest(solver.line, state)
     slack = -1 if tension > solver.floor else cell
     with_friction = bool(solver.line.bits & FRICTION)
     blurred = solver.stability.blurred

@@ -69,9 +69,9 @@ class Result:
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(self, source: Path | io.BytesIO, summed: bool = True) -> None:
+    def __init__(self, source: str | Path | io.BytesIO, summed: bool = True) -> None:
         """summed: as of `open_file`."""
-        self._source = source
+        self._source = Path(source) if isinstance(source, str) else source
         self._open(summed)
 
     def _open(self, summed: bool = True) -> None:

@@ -1,0 +1,47 @@
+"""A line that lies on the seabed without tension, before it is pulled to its equilibrium with friction."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.state import Ends, Line, Sea, State
+
+
+def laid_on_bed(line: Line, sea: Sea, ends: Ends, state: State) -> State:
+    """A copy of an equilibrium whose stretches on the bed have their unstretched length, without friction yet.
+
+    A stretch keeps its path, and its place at a held end that lies on the bed; one without such an end keeps the place
+    of its middle.  The displacement of a node from here is the travel that friction opposes (docs/theory.md, T17b).
+    """
+    laid, cells = state.copy(), line.h.size
+    laid.slip[:] = 0.0
+    touches = sea.offset - state.r @ sea.normal > 0.0
+    touches[0] |= bool(ends.held[0]) and bool(touches[1])
+    touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
+    shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e
+    for first, last in _stretches(touches):
+        kept = (last - first) // 2
+        if last == cells and ends.held[1]:
+            kept = last - first
+        if first == 0 and ends.held[0]:
+            kept = 0
+        shift = np.vstack([np.zeros(3), np.cumsum(shortening[first:last], axis=0)])
+        laid.r[first : last + 1] += shift - shift[kept]
+    for k in np.flatnonzero(ends.held):
+        laid.r[-k] = state.r[-k]
+    laid.e[:] = np.diff(laid.r, axis=0)
+    d = laid.e / np.linalg.norm(laid.e, axis=1)[:, None]
+    across = laid.a1 - np.einsum("ij,ij->i", laid.a1, d)[:, None] * d
+    laid.a1[:] = across / np.linalg.norm(across, axis=1)[:, None]
+    return laid
+
+
+def _stretches(touches: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
+    """First and last node of every run of nodes on the bed, of at least two nodes."""
+    turns = np.flatnonzero(np.diff(np.concatenate([[False], touches, [False]]).astype(np.int8)))
+    for first, after in turns.reshape(-1, 2):
+        if after - first > 1:
+            yield int(first), int(after) - 1
