@@ -6,6 +6,7 @@ Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn acro
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 from itertools import pairwise
 
 import numpy as np
@@ -76,7 +77,7 @@ def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone,
 
 
 class Grid:
-    """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices.
+    """Interpolation from a mesh with its zones to output points s (ns,), as sparse matrices, made when asked for.
 
     nodes: cubic, from node values (positions, velocities); chords: linear, from node values, across joints as well
     (depth, which the contact force is integrated over); cells: linear, from values at
@@ -94,7 +95,6 @@ class Grid:
 
         and the next begins; after: a point on a cut shows the side after it.
         """
-        n = nodes_s.size
         self.s = s
         self.loads, self.changes = tuple(loads), tuple(changes)
         self.parts = stretches(zones, loads)
@@ -104,14 +104,36 @@ class Grid:
         self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
         self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
 
-        stretch = np.searchsorted(bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1], s)
-        a, b = cuts[stretch], cuts[stretch + 1]
-        middles = 0.5 * (nodes_s[:-1] + nodes_s[1:])
-        self.nodes = _sparse(*_cubic(nodes_s, s, a, b), n)
-        self.cells = _sparse(*_linear(middles, s, a, b - 1), n - 1)
-        self.chords = _sparse(*_linear(nodes_s, s, np.zeros_like(a), np.full_like(b, n - 1)), n)
-        # columns of `held`: start, cells, end; next to an end its value takes part
-        start, end = np.where(s < middles[0], 0, a + 1), np.where(s > middles[-1], n, b)
-        self.held = _sparse(*_linear(np.concatenate([nodes_s[:1], middles, nodes_s[-1:]]), s, start, end), n + 1)
-        node, share = _linear(nodes_s, s, a, b)
-        self.sides = _sparse(node + stretch[:, None], share, len(self.side_nodes))
+        self._x = nodes_s
+        self._stretch = np.searchsorted(bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1], s)
+        self._first, self._last = cuts[self._stretch], cuts[self._stretch + 1]  # nodes of the stretch of each point
+
+    @cached_property
+    def _middles(self) -> Floats:
+        return np.asarray(0.5 * (self._x[:-1] + self._x[1:]))
+
+    @cached_property
+    def nodes(self) -> csr_array:
+        return _sparse(*_cubic(self._x, self.s, self._first, self._last), self._x.size)
+
+    @cached_property
+    def cells(self) -> csr_array:
+        return _sparse(*_linear(self._middles, self.s, self._first, self._last - 1), self._x.size - 1)
+
+    @cached_property
+    def chords(self) -> csr_array:
+        n, first = self._x.size, np.zeros_like(self._first)
+        return _sparse(*_linear(self._x, self.s, first, np.full_like(first, n - 1)), n)
+
+    @cached_property
+    def held(self) -> csr_array:
+        """Columns: start, cells, end; next to an end its value takes part."""
+        x, middles = self._x, self._middles
+        start = np.where(self.s < middles[0], 0, self._first + 1)
+        end = np.where(self.s > middles[-1], x.size, self._last)
+        return _sparse(*_linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end), x.size + 1)
+
+    @cached_property
+    def sides(self) -> csr_array:
+        node, share = _linear(self._x, self.s, self._first, self._last)
+        return _sparse(node + self._stretch[:, None], share, len(self.side_nodes))

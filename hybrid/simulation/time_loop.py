@@ -115,7 +115,7 @@ class TimeLoop:
 
     def close(self) -> None:
         """The run is complete: a last checkpoint, what is to be said of all of it, and the file is closed."""
-        self._checkpoint(at_once=True)
+        self._checkpoint(last=True)
         self.finish()
         self.recorder.close("complete", f"{self.run.steps} steps")
 
@@ -271,17 +271,22 @@ class TimeLoop:
 
     # --- checkpoints ----------------------------------------------------------------------------
 
-    def _checkpoint(self, at_once: bool = False) -> None:
-        """Bring the file up to date, with a checkpoint at the output just written, if it is time to (or `at_once`)."""
+    def _checkpoint(self, last: bool = False) -> None:
+        """Bring the file up to date, with a checkpoint at the output just written, if it is time to.
+
+        last: the run is complete: the checkpoint waits until the file is closed.
+        """
         recorder = self.recorder
         self.run.events.write_to(recorder)
-        if isinstance(recorder, Recorder) and (at_once or recorder.due):
+        if isinstance(recorder, Recorder) and (last or recorder.due):
             self._log()
             here = self.run.steps, self.run.changes
-            new = isinstance(self.target, Path) and here != self._kept
-            self.write_envelope()
-            recorder.flush(self._content if new else None)
-            self._kept = here if new else self._kept
+            if isinstance(self.target, Path) and here != self._kept:
+                recorder.checkpoint(self._content)
+                self._kept = here
+            if not last:
+                self.write_envelope()
+                recorder.flush()
 
     def _content(self) -> dict[str, Any]:
         switching = self.run.switching

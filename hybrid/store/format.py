@@ -14,7 +14,7 @@ from importlib.metadata import PackageNotFoundError, version
 
 import h5py
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5s, h5t
+from h5py import h5a, h5d, h5ds, h5i, h5s, h5t
 
 from hybrid.errors import ResultError
 
@@ -159,9 +159,16 @@ def write_fixed(file: h5py.File, grid_s: np.ndarray, fixed: Sequence[tuple[Field
     """The values of what does not grow: the output grid, and quantities that do not depend on time."""
     if grid_s.ndim != 1 or len(grid_s) == 0 or not np.isfinite(grid_s).all() or (np.diff(grid_s) <= 0).any():
         raise ResultError("the output grid must be increasing finite arc lengths")
-    file["s"][...] = grid_s
+    write_all(h5d.open(file.id, b"s"), grid_s)
     for field, values in fixed:
-        file[field.name][...] = checked(field, np.asarray(values, dtype=field.dtype))
+        write_all(h5d.open(file.id, field.name.encode()), checked(field, np.asarray(values, dtype=field.dtype)))
+
+
+def write_all(data: h5d.DatasetID, values: np.ndarray) -> None:
+    """Write all numbers of a dataset that does not grow, by HDF5's own interface: h5py takes eight times as long."""
+    if data.shape != values.shape:
+        raise ResultError(f"{h5i.get_name(data).decode()} has shape {values.shape}, expected {data.shape}")
+    data.write(h5s.ALL, h5s.ALL, np.ascontiguousarray(values))
 
 
 def create_table(file: h5py.File, group: str, fields: Sequence[Field], rows: int | None) -> None:

@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
-from glob import escape
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -44,14 +44,21 @@ def locked(path: Path | None) -> Iterator[None]:
         advice = "a folder you may write to, with free space"
         raise ResultError(f"{path} cannot be written\n    detail:   {error}\n    try:      {advice}") from error
     try:
-        for left in path.parent.glob(f".{escape(path.name)}.[0-9]*.new"):  # of a process that was killed
-            left.unlink(missing_ok=True)
+        _remove_left(path)
         _OURS.add(path)
         yield
     finally:
         _OURS.discard(path)
         beside.unlink(missing_ok=True)
         lock.release()
+
+
+def _remove_left(path: Path) -> None:
+    """Remove what a process that was killed has left beside a result (hdf5_file.beside)."""
+    begin = f".{path.name}."
+    for name in os.listdir(path.parent):
+        if name.startswith(begin) and name.endswith(".new") and name[len(begin) : -4].isdigit():
+            path.with_name(name).unlink(missing_ok=True)
 
 
 def _beside(path: Path) -> Path:

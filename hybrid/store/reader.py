@@ -36,7 +36,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5g, h5o
+from h5py import h5a, h5d, h5ds, h5g, h5o, h5s
 
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
@@ -104,12 +104,12 @@ class Result:
                 groups.add(name)
 
         self._file.id.links.visit(visit)
-        self.names = tuple(data)
+        self.names, self._data = tuple(data), data
         self._dims, self.units = Looked(data, _dims), Looked(data, _units, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
         scales = [n for n, each in data.items() if h5ds.is_scale(each) and self._dims[n] == (n,)]
-        self._rows = {n: self._dataset(n).shape[0] for n in sorted(scales, key=lambda n: n != "t")}
+        self._rows = {n: self._refreshed(n).shape[0] for n in sorted(scales, key=lambda n: n != "t")}
         self._groups = sorted(groups)
         self.attributes: dict[str, Any] = Attributes(
             {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._file.attrs.items()}
@@ -118,11 +118,16 @@ class Result:
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
         self.zones = ZoneHistory(table["output"], [Zone(*row) for row in rows], len(self.times))
 
-    def _dataset(self, name: str) -> Any:
-        data = self._file[self._stored.get(name, name)]
+    def _refreshed(self, name: str) -> Any:
+        """A dataset of HDF5's own interface, whose length is that of now."""
+        data = self._data[name]
         if self._file.swmr_mode:
-            data.refresh()  # HDF5 may remember its length from a moment before the row count was taken
+            data.refresh()  # HDF5 may remember it from a moment before
         return data
+
+    def _dataset(self, name: str) -> Any:
+        self._refreshed(name)
+        return self._file[self._stored.get(name, name)]
 
     def close(self) -> None:
         """Let go of the file; what was read already stays."""
@@ -165,8 +170,7 @@ class Result:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
             dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
             with readable(self._source):
-                data = self._dataset(name)
-                array = data[: self._rows[dims[0]]] if dims and dims[0] in self._rows else data[()]
+                array = _values(self._refreshed(name), self._rows.get(dims[0]) if dims else None)
             if array.dtype.kind == "S":
                 array = np.char.decode(array, "utf-8", "replace")
             array.setflags(write=False)  # it is shared by everyone who asks again
@@ -397,6 +401,18 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
 def _current(name: str) -> str:
     """The name a dataset has now, from an alias or from the name an older version gave it."""
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
+
+
+def _values(data: Any, rows: int | None) -> np.ndarray:
+    """The first rows of a dataset of HDF5's own interface; None: all of it."""
+    shape = data.shape if rows is None else (rows, *data.shape[1:])
+    out = np.empty(shape, data.dtype)
+    if out.size:
+        there = data.get_space()
+        if rows is not None:
+            there.select_hyperslab((0,) * len(shape), shape)
+        data.read(h5s.create_simple(shape) if shape else h5s.create(h5s.SCALAR), there, out)
+    return out
 
 
 def _dims(data: Any) -> tuple[str, ...]:

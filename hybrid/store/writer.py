@@ -27,6 +27,7 @@ from typing import Any
 
 import h5py
 import numpy as np
+from h5py import h5d
 
 from hybrid.errors import OMITTED, ResultError
 from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_before, write_slot
@@ -40,6 +41,7 @@ from hybrid.store.format import (
     set_status,
     tables_of,
     unsound,
+    write_all,
     write_attributes,
     write_fixed,
     write_texts,
@@ -172,6 +174,8 @@ class Recorder:
         self.files: Mapping[str, str] = {}  # digests of files that the run reads, for checkpoints
         self._happened: Counter[str] = Counter()  # events by kind
         self._replaced: dict[str, np.ndarray] = {}  # values of what does not grow
+        self._fixed: dict[str, h5d.DatasetID] = {}  # their datasets
+        self._packed = b""  # a checkpoint that waits
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
         self.closed = self._broken = False
 
@@ -275,20 +279,22 @@ class Recorder:
         """Other values for quantities of `fixed`, by name; written with the next flush."""
         self._replaced.update(values)
 
-    def flush(self, content: Callable[[], Mapping[str, Any]] | None = None) -> None:
-        """Write what is held back, for readers to see; content: makes `program`, `asks`, `resolution` and `state` of a
-        checkpoint."""
+    def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
+        """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
+        `resolution` and `state` of it."""
+        rows = {table.scale: table.count + table.waiting for table in self._all}
+        here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
+        self._packed = pack({**here, "happened": self._happened, "zones": self._zones or [], **content()})
+
+    def flush(self) -> None:
+        """Write what is held back, for readers to see."""
         begin = monotonic()
-        packed = b""
-        if content is not None:
-            rows = {table.scale: table.count + table.waiting for table in self._all}
-            here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
-            packed = pack({**here, "happened": self._happened, "zones": self._zones or [], **content()})
         with self._writing():
-            self._write([self._events, self._zone_rows, self._steps, self._outputs], packed)
-            if packed and self.path is not None:
+            self._write([self._events, self._zone_rows, self._steps, self._outputs], self._packed)
+            if self._packed and self.path is not None:
                 os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
-        self._number += bool(packed)
+        self._number += bool(self._packed)
+        self._packed = b""
         self._flushed = monotonic()
         self._took = self._flushed - begin
 
@@ -308,7 +314,9 @@ class Recorder:
         for table in waiting:
             table.write()
         for name, values in self._replaced.items():
-            self._file[name][...] = values
+            if name not in self._fixed:
+                self._fixed[name] = h5d.open(self._file.id, name.encode())
+            write_all(self._fixed[name], values)
         self._replaced.clear()
         if packed:
             write_slot(self._slots, self._number, packed)

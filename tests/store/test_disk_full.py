@@ -32,7 +32,8 @@ try:
             r.log({{"t": float(i), "residual": 0.0, "dt": 1.0, "iterations": 1}})
             r.save(float(i), values(float(i)), ONE if i % 4 < 2 else TWO)
             if i % 20 == 19:
-                r.flush(lambda: {{"program": "", "asks": False, "resolution": {{}}, "state": {{}}}})
+                r.checkpoint(lambda: {{"program": "", "asks": False, "resolution": {{}}, "state": {{}}}})
+                r.flush()
 except ResultError as error:
     print(error)
 """
