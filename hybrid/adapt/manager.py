@@ -17,13 +17,13 @@ import numpy as np
 from hybrid.adapt.user_criterion import FORCED_RATIO, NodeState, UserCriterion, cell_ratios
 from hybrid.adapt.zone_rules import OFF, Rules, planned, reach, spread, tidied, wanted
 from hybrid.kernels import zone_step as z
-from hybrid.kernels.binding import Table
+from hybrid.kernels.binding import Packed, Table
 from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import shares
-from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds
 from hybrid.kernels.zone_step import REJECT_RATIO, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.model.layout import Layout, edges
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, tension_floor
 
 # Rod on either side of cells above a threshold, in sqrt(EI/T), or (EI/w)^(1/3) where that is shorter: without tension
@@ -86,6 +86,9 @@ def _flag(k: int, text: str) -> Any:
 OF_BASE = ("clock", "counts", "clamped", "tangents", "moments", "ratios", "rod", "leaving", "grown", "haste")
 
 
+all_zones = Packed(lambda n: blank_zones(n, 1), given=(*OF_BASE, "kinds"))
+
+
 class DomainManager:
     """Watches one line.  lengths in m, times in s."""
 
@@ -100,11 +103,12 @@ class DomainManager:
         user: UserCriterion | None = None,
         pace: float | None = None,
         left: float = 1.0,
+        on_base: LineOnBase | None = None,
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
         left: part of the bending error of catenaries that remains in results (1: no correction);
-        dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell).
+        dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
         """
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
@@ -119,7 +123,13 @@ class DomainManager:
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
         self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
-        self._table = Table(blank_zone_job())
+        self._table, self._on_base = Table(blank_zone_job()), on_base or LineOnBase(cable, layout.base)
+        H, of = np.diff(layout.base), cable.piece(0.5 * (layout.base[:-1] + layout.base[1:]))
+        self.zones.clock[z.COMPLIANCE] = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
+        self.zones.clock[z.FREE_TWIST] = H @ cable.kappa[of, 2]
+        weight = np.abs(cable.submerged_weight)
+        floor = tension_floor(cable.mean_bending, weight, scale)
+        self.weightless = bool((floor < WEIGHTLESS * scale).any())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
         self.zones.counts[z.HOLDS_TWIST] = all(cable.held_twist) and all(cable.held_tangent)
         self.set_layout(layout)
@@ -169,29 +179,13 @@ class DomainManager:
     def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
         self.layout = layout
-        s, cable = layout.nodes, self.cable
-        of = cable.piece(0.5 * (s[:-1] + s[1:]))
-        pad = np.concatenate([[of[0]], of, [of[-1]]])
-        EI, weight = cable.mean_bending, np.abs(cable.submerged_weight)
-        self.s, self.EI = s, np.maximum(EI[pad[:-1]], EI[pad[1:]])
-        self.w = np.maximum(weight[pad[:-1]], weight[pad[1:]])
-        node = np.where(EI[pad[:-1]] != EI[pad[1:]], STEP, SMOOTH).astype(np.int8)
-        node[cable.point_nodes(s)] = LOAD
-        self.floor = tension_floor(self.EI, self.w, self.scale)
-        self.weightless = bool((self.floor < WEIGHTLESS * self.scale).any())
+        kinds = self._on_base.kinds(layout, self.free, self.scale)
+        self.s, self.EI, self.w, self.floor = layout.nodes, kinds.EI, kinds.w, kinds.floor
         self.base_of_cell = layout.base_of_cell
-        bent = np.linalg.norm(cable.kappa[of, :2], axis=1)
-        bent = np.maximum(np.append(bent[0], bent), np.append(bent, bent[-1]))
-        kinds = NodeKinds(
-            self.EI, self.w, bent, node, self.floor, self.base_of_cell.astype(np.int64), self.free, np.zeros(s.size),
-            np.zeros(s.size),
-        )  # fmt: skip
         kept = {name: getattr(self.zones, name) for name in OF_BASE}
-        self.zones = blank_zones(s.size - 1, layout.rod.size)._replace(kinds=kinds, **kept)
-        self.zones.rod[:] = layout.rod
+        self.zones = all_zones(layout.base_of_cell.size, kinds=kinds, **kept)
+        self.zones.rod[:], self.zones.since[:] = layout.rod, -np.inf
         clock, flags = self.zones.clock, self.zones.counts
-        clock[z.COMPLIANCE] = np.sum(np.diff(s) / np.maximum(cable.B[of, 2], 1e-300))
-        clock[z.FREE_TWIST] = np.diff(s) @ cable.kappa[of, 2]
         clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
         flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
         self._update_ramping()

@@ -7,6 +7,10 @@ from it.  What is bound is checked when it is bound, and kept alive until someth
 
 from __future__ import annotations
 
+import math
+import threading
+from collections.abc import Callable, Sequence
+from struct import pack, unpack
 from typing import Any
 
 import numpy as np
@@ -20,14 +24,12 @@ class Table:
         """example: with the types that all values have."""
         self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
         self._bound: dict[str, Any] = {}
-        self._before: dict[str, tuple[Any, NDArray[np.int64]]] = {}  # what was bound before, and its numbers
         at = 0
         for name, value in example._asdict().items():
             pattern = _pattern(value)
             self._places[name] = at, at + _size(pattern), pattern
             at += _size(pattern)
         self.numbers: NDArray[np.int64] = np.zeros(at, np.int64)
-        self._floats = self.numbers.view(np.float64)
         self.bind(**example._asdict())
 
     def bind(self, **values: Any) -> None:
@@ -36,39 +38,115 @@ class Table:
             if self._bound.get(name, self) is value:
                 continue
             at, end, pattern = self._places[name]
-            bound = self._bound.pop(name, None)  # nothing is bound there if this fails half-way
+            self._bound.pop(name, None)  # nothing is bound there if this fails half-way
             if not isinstance(pattern, tuple):
                 self._put(at, pattern, value, name)
-            else:  # two states take turns: what was bound before this one may well come back
-                before = self._before.get(name)
-                if bound is not None:
-                    self._before[name] = bound, self.numbers[at:end].copy()
-                if before is not None and before[0] is value:
-                    self.numbers[at:end] = before[1]
-                else:
-                    self._put(at, pattern, value, name)
+            else:
+                self.numbers[at:end] = _numbers_of(value, pattern, name)
             self._bound[name] = value
 
-    def _put(self, at: int, pattern: Any, value: Any, name: str) -> int:
-        if isinstance(pattern, tuple):
-            if len(value) != len(pattern):
-                raise TypeError(f"{name}: {len(value)} values, expected {len(pattern)}")
-            for k, each in enumerate(value):
-                at = self._put(at, pattern[k], each, name)
-            return at
-        if isinstance(pattern, _ArrayPattern):
-            if not (value.dtype == pattern.dtype and value.ndim == pattern.ndim and value.flags.c_contiguous):
-                given = f"{value.dtype} of shape {value.shape}"
-                raise TypeError(f"{name}: {given}, expected {pattern.dtype} of {pattern.ndim} dimensions, contiguous")
-            end = at + 1 + pattern.ndim
-            self.numbers[at] = value.__array_interface__["data"][0]
-            self.numbers[at + 1 : end] = value.shape
-            return end
-        if pattern is float:
-            self._floats[at] = value
-        else:
-            self.numbers[at] = value
-        return at + 1
+    def _put(self, at: int, pattern: Any, value: Any, name: str) -> None:
+        """A number or an array, at its place."""
+        found = _numbers(value, pattern, name)
+        self.numbers[at : at + len(found)] = found
+
+
+# Numbers of the tuples that were bound last: a line is bound in several tables, and two states take turns.
+class _OfThread(threading.local):
+    def __init__(self) -> None:
+        self.known: dict[int, tuple[Any, NDArray[np.int64]]] = {}
+
+
+_here, MOST_KNOWN = _OfThread(), 8
+
+
+def _numbers_of(value: Any, pattern: Any, name: str) -> NDArray[np.int64]:
+    """Numbers of a tuple; those of the last ones are kept, and with them the tuples."""
+    known = _here.known
+    before = known.get(id(value))
+    if before is not None and before[0] is value:
+        return before[1]
+    found = np.array(_numbers(value, pattern, name), np.int64)
+    _keep(value, found)
+    return found
+
+
+def _keep(value: Any, numbers: NDArray[np.int64]) -> None:
+    known = _here.known
+    if len(known) >= MOST_KNOWN:
+        del known[next(iter(known))]
+    known[id(value)] = value, numbers
+
+
+def _numbers(value: Any, pattern: Any, name: str) -> list[int]:
+    """Addresses, shapes and numbers of a value; TypeError: it is not of the pattern."""
+    if isinstance(pattern, tuple):
+        before = _here.known.get(id(value))
+        if before is not None and before[0] is value:
+            return before[1].tolist()
+        if len(value) != len(pattern):
+            raise TypeError(f"{name}: {len(value)} values, expected {len(pattern)}")
+        out: list[int] = []
+        for each, of in zip(value, pattern, strict=True):
+            out += _numbers(each, of, name)
+        return out
+    if isinstance(pattern, _ArrayPattern):
+        if not (value.dtype == pattern.dtype and value.ndim == pattern.ndim and value.flags.c_contiguous):
+            given = f"{value.dtype} of shape {value.shape}"
+            raise TypeError(f"{name}: {given}, expected {pattern.dtype} of {pattern.ndim} dimensions, contiguous")
+        return [value.__array_interface__["data"][0], *value.shape]
+    return [_bits(value) if pattern is float else int(value)]
+
+
+class Packed:
+    """Makes NamedTuples of arrays for lines of any number of cells, each in one block of memory, filled with zeros.
+
+    Their addresses follow from that of the block, so that binding them costs little.
+    """
+
+    def __init__(self, blank: Callable[[int], Any], given: Sequence[str] = ()) -> None:
+        """blank: makes one for a number of cells, of which its shapes are linear functions; given: fields that are none
+
+        of the block, but given whenever one is made.
+        """
+        two, three = blank(2), blank(3)
+        self._make, self._fields = two._make, []
+        for name, x, y in zip(two._fields, two, three, strict=True):
+            if name in given:
+                self._fields.append((name, None, _pattern(x)))
+                continue
+            slopes = tuple(b - a for a, b in zip(x.shape, y.shape, strict=True))
+            fixed = tuple(a - 2 * k for a, k in zip(x.shape, slopes, strict=True))
+            self._fields.append((name, x.dtype, tuple(zip(fixed, slopes, strict=True))))
+
+    def __call__(self, cells: int, **given: Any) -> Any:
+        """One for a line of so many cells."""
+        places, at = [], 0
+        for name, dtype, dims in self._fields:
+            if dtype is None:
+                places.append((name, None, dims, 0))
+                continue
+            shape = tuple([a + b * cells for a, b in dims])
+            places.append((name, dtype, shape, at))
+            at += -(-math.prod(shape) * dtype.itemsize // 8) * 8
+        block = np.zeros(max(at, 8) // 8)
+        begin, numbers, values = block.__array_interface__["data"][0], [], []
+        for name, dtype, shape, offset in places:
+            if dtype is None:
+                values.append(given[name])
+                numbers += _numbers(given[name], shape, name)
+            else:
+                values.append(np.ndarray(shape, dtype, block, offset))
+                numbers += [begin + offset, *shape]
+        value = self._make(values)
+        _keep(value, np.array(numbers, np.int64))
+        return value
+
+
+def _bits(value: float) -> int:
+    """The bits of a number as an integer."""
+    found: int = unpack("q", pack("d", value))[0]
+    return found
 
 
 class _ArrayPattern:

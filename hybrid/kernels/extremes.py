@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
+
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
 from hybrid.kernels.cell import chord
@@ -219,3 +221,32 @@ def note_extremes(line, sea, ends, state, books, t):
             widen_both(books.extremes, books.right, PRESSURE, i, q, t)
         x = sub(get3(state.r, i), get3(books.start, i))
         widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
+
+
+@kernel
+def fold_extremes(places, s, columns, now, out):
+    """Take extremes `now` (4, rows, columns) at `places` (m) into those at s, `out` (4, rows, n): lowest, highest, times.
+
+    places, s: m, not decreasing; two equal ones are the left and the right value there, in both.  columns: column of
+    `now` of each place.  Rows in which something is not known yet are left out.
+    """
+    last = places.size - 1
+    for row in range(out.shape[1]):
+        known = True
+        for c in columns:
+            known &= np.isfinite(now[0, row, c]) and np.isfinite(now[1, row, c])
+        if not known:
+            continue
+        k = 0
+        for i in range(s.size):
+            while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
+                k += 1
+            if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
+                k += 1
+            m = min(k + 1, last)
+            x = (s[i] - places[k]) / (places[m] - places[k]) if places[m] > places[k] and s[i] > places[k] else 0.0
+            near = columns[m] if x > 0.5 else columns[k]
+            for bound in range(2):
+                value = (1.0 - x) * now[bound, row, columns[k]] + (x * now[bound, row, columns[m]] if x > 0.0 else 0.0)
+                if (value > out[bound, row, i]) if bound else (value < out[bound, row, i]):
+                    out[bound, row, i], out[2 + bound, row, i] = value, now[2 + bound, row, near]

@@ -133,6 +133,15 @@ class NodeKinds(NamedTuple):
     twisting: Floats  # (N+1,) N m, torques of nodes (written)
 
 
+def blank_kinds(cells: int, base: int) -> NodeKinds:
+    """Room for what criteria know of a line of so many cells and base cells."""
+    z, nodes = np.zeros, cells + 1
+    return NodeKinds(
+        z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8), z(nodes),
+        z(nodes),
+    )  # fmt: skip
+
+
 @inner
 def raise_ratios(line, sea, tangents, state, past, ahead, tolerance, torque, kinds, ratios):
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.

@@ -23,7 +23,16 @@ from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import dot
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import advance, freed, length_defect, shares, soften
-from hybrid.kernels.zone_criteria import MOST, TWISTED, NodeKinds, end_turn, largest_ratio, raise_ratios, twist_of_rods
+from hybrid.kernels.zone_criteria import (
+    MOST,
+    TWISTED,
+    NodeKinds,
+    blank_kinds,
+    end_turn,
+    largest_ratio,
+    raise_ratios,
+    twist_of_rods,
+)
 
 # How far a falling tension is extrapolated, in ramp times; the rate is taken over one or two samples.
 LOOKAHEAD, LONGEST_LOOKAHEAD = 0.125, 2.0
@@ -92,10 +101,7 @@ def blank_zones(cells: int, base: int) -> Zones:
     z, nodes = np.zeros, cells + 1
     return Zones(
         clock=z(CLOCK_SIZE), counts=z(FLAG_COUNT, np.int64),
-        kinds=NodeKinds(
-            z(nodes), z(nodes), z(nodes), z(nodes, np.int8), z(nodes), z(cells, np.int64), z(base, np.int8), z(nodes),
-            z(nodes),
-        ),
+        kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
         haste=np.ones(base), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),

@@ -21,6 +21,7 @@ from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
@@ -68,6 +69,7 @@ class Model:
     attached: tuple[float, ...]  # m, arc lengths of floats, clumps and end bodies
     cable: Material
     layout: Layout | None = None  # of a line whose zones move
+    on_base: LineOnBase | None = None  # and what makes its lines
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
     follows_error: bool = False  # whether the error of leaving bending out is followed
     corrected: bool = False  # whether results are corrected for it
@@ -77,7 +79,7 @@ class Model:
         """What `build` makes a model of the same mesh from."""
         if self.layout is None:
             return self.line.s, self.zones
-        return self.layout._replace(rod=np.ones_like(self.layout.rod))
+        return self.layout.finest
 
     @property
     def cells(self) -> int:
@@ -187,6 +189,7 @@ def build(
         slack=getattr(scene.model, "slack", "stop"),
         inextensible=not compliance.any(),
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
+        on_base=LineOnBase(cable, layout.base) if layout is not None else None,
         plane=plane, corrected=corrected, follows_error=follows,
     )  # fmt: skip
 

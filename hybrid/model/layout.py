@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -11,43 +12,65 @@ from hybrid.kernels.state import Floats
 from hybrid.model.mesh import Zone
 
 
-class Layout(NamedTuple):
-    """Base cells and what they are now."""
-
+class _Fields(NamedTuple):
     base: Floats  # (n+1,) m, nodes that are always there
-    parts: np.ndarray  # (n,) rod cells in a base cell
+    parts: np.ndarray  # (n,) rod cells in a base cell, where they are shortest
     rod: np.ndarray  # (n,) bool
+    here: np.ndarray | None = None  # (K+1,) bool, nodes of the finest mesh that rods have; None: all of them
+
+
+class Layout(_Fields):
+    """Base cells and what they are now.  Its arrays do not change: what follows from them is computed once."""
 
     @property
-    def counts(self) -> np.ndarray:
-        """(n,) cells of each base cell now."""
-        return np.where(self.rod, self.parts, 1)
+    def finest(self) -> Layout:
+        """All rod, with the shortest cells."""
+        return self._replace(rod=np.ones_like(self.rod), here=None)
 
-    @property
+    @cached_property
+    def starts(self) -> np.ndarray:
+        """(n+1,) numbers of the base nodes on the finest mesh, which has starts[-1] cells."""
+        return np.concatenate([[0], np.cumsum(self.parts)])
+
+    @cached_property
+    def places(self) -> np.ndarray:
+        """(N+1,) numbers of the nodes on the finest mesh."""
+        there = np.append(np.repeat(self.rod, self.parts), True)
+        if self.here is not None:
+            there &= self.here
+        there[self.starts] = True
+        return np.flatnonzero(there)
+
+    @cached_property
     def first(self) -> np.ndarray:
         """(n+1,) number of the first cell (and node) of each base cell; the last is the number of all."""
-        return np.concatenate([[0], np.cumsum(self.counts)])
+        return np.searchsorted(self.places, self.starts)
 
-    @property
+    @cached_property
+    def counts(self) -> np.ndarray:
+        """(n,) cells of each base cell now."""
+        return np.diff(self.first)
+
+    @cached_property
     def nodes(self) -> Floats:
         """(N+1,) m."""
-        counts, first = self.counts, self.first
-        of = np.repeat(np.arange(counts.size), counts)
-        inside = (np.arange(of.size) - first[of]) / counts[of]
+        places = self.places[:-1]
+        of = self.base_of_cell
+        inside = (places - self.starts[of]) / self.parts[of]
         s = self.base[of] + inside * (self.base[of + 1] - self.base[of])
         return np.append(s, self.base[-1])
 
-    @property
+    @cached_property
     def base_of_cell(self) -> np.ndarray:
         """(N,) base cell of every cell."""
         return np.repeat(np.arange(self.rod.size), self.counts)
 
-    @property
+    @cached_property
     def rod_cells(self) -> np.ndarray:
         """(N,) bool."""
         return np.repeat(self.rod, self.counts)
 
-    @property
+    @cached_property
     def zones(self) -> tuple[Zone, ...]:
         """Rod and catenary zones in order."""
         return tuple(

@@ -14,6 +14,7 @@ import numpy as np
 
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
+from hybrid.kernels.extremes import fold_extremes
 from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
@@ -67,7 +68,7 @@ class Envelope:
     def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
         """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
         layout = model.layout if moves else None
-        nodes = model.line.s if layout is None else layout._replace(rod=np.ones_like(layout.rod)).nodes
+        nodes = model.line.s if layout is None else layout.finest.nodes
         marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
@@ -106,17 +107,18 @@ class Envelope:
         out, places = self._bounds.copy(), _doubled(nodes, self._marked)
         columns = np.arange(places.size) - np.cumsum(second := np.append(False, places[1:] == places[:-1]))
         columns[second] = nodes.size + np.arange(self._marked.size)
+        if places.size < self.s.size:
+            fold_extremes(places, self.s, columns, extremes, out)
+            return out
         now = extremes[:, :, columns]
-        here = np.searchsorted(self.s, places) + second
-        nearest = np.searchsorted(0.5 * (places[1:] + places[:-1]), self.s)
         for row in self._rows:
-            if not np.isfinite(now[:, row]).all():
-                continue  # no state of this mesh was computed yet
-            for bound, better in ((0, np.less), (1, np.greater)):
-                x, t = np.interp(self.s, places, now[bound, row]), now[2 + bound, row][nearest]
-                x[here], t[here] = now[bound, row], now[2 + bound, row]
-                found = better(x, out[bound, row])
-                out[bound, row][found], out[2 + bound, row][found] = x[found], t[found]
+            if np.isfinite(now[:, row]).all():  # else no state was computed yet
+                for bound, better in ((0, np.less), (1, np.greater)):
+                    found = better(now[bound, row], out[bound, row])
+                    out[bound, row][found], out[2 + bound, row][found] = (
+                        now[bound, row][found],
+                        now[2 + bound, row][found],
+                    )
         return out
 
     # --- checkpoints --------------------------------------------------------------------------------

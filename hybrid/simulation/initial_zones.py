@@ -54,7 +54,7 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, given_zones(scene, model.layout),
         model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
-        LEFT if model.corrected else 1.0,
+        LEFT if model.corrected else 1.0, model.on_base,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager

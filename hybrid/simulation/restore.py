@@ -127,13 +127,13 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
     """The model of a checkpoint; before it, one of the same mesh whose zones are all rod."""
     mesh, layout = saved["mesh"], None
     if isinstance(scene.model, AdaptiveModel):
-        template = {"base": np.zeros(0), "parts": np.zeros(0, int), "rod": np.zeros(0, bool)}
-        layout = Layout(**matched(mesh, template, "mesh"))
+        template = {"base": np.zeros(0), "parts": np.zeros(0, int), "rod": np.zeros(0, bool), "here": None}
+        layout = Layout(**matched({"here": None} | dict(mesh), template, "mesh"))
         _check_nodes(layout.base, scene)
         fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
         if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= MOST_PARTS):
             raise ValueError("base cells that no mesh has")
-        first = build(scene, resolution, layout._replace(rod=np.ones_like(layout.rod)))
+        first = build(scene, resolution, layout.finest)
         model = on_layout(first, layout)
     else:
         s, zones = matched(mesh, {"s": np.zeros(0), "zones": None}, "mesh").values()

@@ -138,7 +138,7 @@ def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
     """All nodes that the mesh may have, and which are there in rods alone: with the zones, the mesh of any time."""
     nodes, always = model.line.s, np.ones(model.line.s.size, np.int64)
     if model.layout is not None:
-        nodes = model.layout._replace(rod=np.ones_like(model.layout.rod)).nodes
+        nodes = model.layout.finest.nodes
         always = np.isin(nodes, model.layout.base).astype(np.int64)
     text = "1 where the node is always there, 0 where only while it lies in a rod zone"
     return [

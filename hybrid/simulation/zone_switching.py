@@ -10,23 +10,29 @@ import numpy as np
 
 from hybrid.adapt.manager import Change, DomainManager
 from hybrid.adapt.moment_joints import Joints
-from hybrid.adapt.state_transfer import Clamp, Remapped, remap
+from hybrid.adapt.state_transfer import Clamp, transfer_to
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
-from hybrid.kernels.energies import observe
-from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
+from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import STEEPEST
-from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.stiffness_ramp import soften
 from hybrid.kernels.zone_criteria import twist_of_rods
 from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, follow_zones
+from hybrid.kernels.zone_switch import (
+    AFTER,
+    BEFORE,
+    NUMBERS,
+    RELAXES,
+    TIME,
+    begin_switch,
+    blank_switch_job,
+    end_switch,
+)
+from hybrid.kernels.zone_transfer import Transfer, blank_transfer, transfer
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
-from hybrid.model.line import line_on
-from hybrid.model.plane import planar, untwist
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.store.named_arrays import matched
 
@@ -45,10 +51,8 @@ MOST_RESCUES = 20
 
 def on_layout(model: Model, layout: Layout) -> Model:
     """The same model with other zones; its start is not touched."""
-    more = model.line.bits & (SEABED | FRICTION)
-    line = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False, passes_torque=False)
-    if model.line.bits & PLANAR:
-        line = planar(line, model.line.plane)
+    assert model.on_base is not None
+    line = model.on_base.line(layout, model.line.bits, model.line.plane)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
 
 
@@ -59,7 +63,11 @@ class ZoneSwitching:
         """loaded: whether joints carry the moment of the catenary's curvature."""
         self.model, self.manager = model, manager
         self.joints = Joints(model.line) if loaded else None
-        self.table = Table(blank_zone_job())  # of the compiled run
+        self.table, self._switch_table = Table(blank_zone_job()), Table(blank_switch_job())  # of the compiled run
+        self._guided = np.array(model.cable.held_tangent, float)
+        base = manager.layout.base
+        self._kinks = np.zeros(base.size, bool)
+        self._kinks[model.cable.point_nodes(base)] = True
         self._take_line(model.line, model.line.h)
 
     def _take_line(self, line: Line, lengths: Floats) -> None:
@@ -191,100 +199,48 @@ class ZoneSwitching:
         line = model.line
         if self.joints is not None:
             self.joints.unload(line, np.zeros_like(state.r))
-        zones, relaxing = self.zones, bool(self.zones.counts[z.RELAXING])
-        soften(manager.stiffness_shares(), zones.stiff, line.kb)  # a step that was refused has left others
-        line.h[:] = zones.lengths
-        was = _energy(line, sea, ends, state)
+        before = self.zones
         changed = on_layout(model, new)
-        target = changed.line
-        carried = self._carried(old, new, line, target, ends, state)
-        if target.bits & PLANAR:
-            untwist(target, ends, model.cable.held_tangent, carried.state)
+        target, numbers = changed.line, np.zeros(NUMBERS)
+        transfer = self._transfer(old, new, line, target, ends, state)
+        numbers[TIME], numbers[RELAXES] = t, before.counts[z.RELAXING]
+        self._switch_table.bind(
+            transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values, zones=before, target_zones=before,
+            numbers=numbers, guided=self._guided,
+        )  # fmt: skip
+        begin_switch(self._switch_table.numbers)
+        self._give_twist(old, new, ends, transfer)
         manager.adopt_layout(new, change, t)
-        self._take_line(target, carried.lengths)
-        soften(manager.stiffness_shares(), self.zones.stiff, target.kb)
-        target.h[:] = carried.lengths
-        self._relax(zones if relaxing else None, old, new, line, t, state, carried)
+        self._switch_table.bind(target_zones=self.zones)
+        end_switch(self._switch_table.numbers)
+        self.zones.counts[z.RELAXING] = 1
         self.model = changed
         if self.joints is not None:
             self.joints = self.joints.on(target)
-        return changed, carried.state, _energy(target, changed.sea.values, ends, carried.state) - was
-
-    def _relax(
-        self, before: Zones | None, old: Layout, new: Layout, line: Line, t: float, state: State, carried: Remapped
-    ) -> None:
-        """Lengths on their way to true ones from t on; before: the zones of the old line, if its lengths were.
-
-        New cells go on with the length, and the change of length, that their ends and tension imply, but for what
-        tension makes of it.
-        """
-        zones, h = self.zones, carried.lengths
-        kept_now, kept_then = (np.repeat(old.rod == new.rod, x.counts) for x in (new, old))
-        elastic = _lengthening(state)
-        if before is not None:
-            elastic += (1.0 + line.ck * state.T) * _speed(before, t, LETTING_GO * self.manager.pace)
-        parts = h / np.diff(new.base)[new.base_of_cell]
-        elastic = np.add.reduceat(elastic, old.first[:-1])[new.base_of_cell] * parts
-        ck = self.manager.cable.ck[self.manager.cable.piece(0.5 * (new.nodes[:-1] + new.nodes[1:]))]
-        zones.lack[:], zones.since[:], zones.keeps[:] = zones.true - h, t, ~new.rod_cells
-        zones.rate[:] = (elastic - _lengthening(carried.state)) / (1.0 + ck * carried.state.T)
-        zones.rate[kept_now], zones.since[kept_now] = 0.0, -np.inf
-        if before is not None:  # what was on its way goes on
-            for name in ("lack", "rate", "since"):
-                getattr(zones, name)[kept_now] = getattr(before, name)[kept_then]
-        zones.counts[z.RELAXING] = 1
+        return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
 
     def release_joints(self, state: State) -> None:
         """Take what joints carry off the line, for another line to be put in its place."""
         if self.joints is not None:
             self.joints.unload(self.model.line, np.zeros_like(state.r))
 
-    def _carried(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Remapped:
-        """The state on the new nodes, with the twist that the cable has had since its ends lost each other."""
-        manager, cable = self.manager, self.model.cable
-        kinks = np.zeros(new.rod.size + 1, bool)
-        kinks[cable.point_nodes(new.base)] = True
+    def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
+        """What carries the state to the new nodes."""
+        cable = self.model.cable
         frames = ends.frame.reshape(2, 3, 3)
         clamps: list[Clamp | None] = [
             (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None
             for k in (0, 1)
         ]
-        twist = np.zeros(new.rod.size)
-        carried = remap(old, new, line, target, state, kinks, twist, clamps)
-        fresh = new.rod & ~old.rod
-        if not (manager.twisted and new.rod.all() and fresh.any()):
-            return carried
+        return transfer_to(old, new, line, target, state, self._kinks, np.zeros(new.rod.size), clamps)
+
+    def _give_twist(self, old: Layout, new: Layout, ends: Ends, job: Transfer) -> None:
+        """Give a line that is rod from end to end again the twist that it has had since its ends lost each other."""
+        manager, fresh = self.manager, new.rod & ~old.rod
+        if not (manager.twisted and new.rod.all() and fresh.any()) or job.target.bits & PLANAR:
+            return
         length = float(np.diff(new.base)[fresh].sum())
         for _ in range(2):  # in whole turns; what is between them the clamps say
-            missing = manager.total_twist - twist_of_rods(target, ends.frame, carried.state.e, carried.state.a1)
-            twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
-            carried = remap(old, new, line, target, state, kinks, twist, clamps)
-        return carried
-
-
-def _lengthening(state: State) -> Floats:
-    """Rate (N,) m/s at which cells grow longer."""
-    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
-    return np.asarray(np.einsum("ij,ij->i", d, np.diff(state.v, axis=0)))
-
-
-def _speed(zones: Zones, t: float, duration: float) -> Floats:
-    """Rate (N,) m/s at which what cells on their way to true lengths lack grows."""
-    x = np.clip((t - zones.since) / duration, 0.0, 1.0)
-    value = np.where(zones.keeps, 0.0, -30.0 * x * x * (1.0 - x) ** 2)
-    slope = (1.0 - x) ** 2 * (1.0 + 2.0 * x - 15.0 * x * x)
-    return np.asarray(zones.lack * value / duration + zones.rate * slope)
-
-
-def _observed(line: Line, ends: Ends, state: State) -> tuple[Floats, Floats]:
-    """Log strains (N+1, 3) rad of all elements, and energies (4,) J."""
-    n = line.h.size
-    M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
-    observe(line, ends, state.e, state.v, state.a1, state.w, M, strain, energy)
-    return strain, energy
-
-
-def _energy(line: Line, sea: Sea, ends: Ends, state: State) -> float:
-    """All energy of a state, J."""
-    contact = stored(line, sea, state.r) if line.bits & SEABED else 0.0
-    return float(_observed(line, ends, state)[1].sum() - np.sum(line.force * state.r) + contact)
+            missing = manager.total_twist - twist_of_rods(job.target, ends.frame, job.out.e, job.out.a1)
+            job.twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
+            transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)

@@ -58,6 +58,7 @@ class CompiledRun:
         self.clock[b.LEAST_PEAK] = np.inf
         self.count[b.VARIES] = varies
         self.states: tuple[State, State]
+        self._zones_address = 0  # of what follows zones; 0: not known yet
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
         self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
 
@@ -126,7 +127,9 @@ class CompiledRun:
 
     def follow(self, zones: Table, compiled: bool) -> None:
         """Zones move from now on (kernels.zone_step); compiled: every step asks them, not Python."""
-        self.table.bind(zones=follow_zones.address(zones.numbers) if compiled else 0, zone_table=zones.numbers)
+        if compiled and not self._zones_address:
+            self._zones_address = follow_zones.address(zones.numbers)
+        self.table.bind(zones=self._zones_address if compiled else 0, zone_table=zones.numbers)
 
     def watch_itself(self, table: np.ndarray, address: int) -> None:
         """From now on steps look how near the line comes to itself (kernels.self_distance)."""

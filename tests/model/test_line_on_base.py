@@ -1,0 +1,34 @@
+"""Lines on base cells, compiled, are those of the material on nodes, whatever is rod."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.forces import FRICTION, SEABED
+from hybrid.model.build import build
+from hybrid.model.line import line_on
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+ROUND = 4e-16  # a product and a sum may be one operation
+
+
+@pytest.mark.parametrize("name", ["touchdown", "rov_tether", "laying", "irregular_sea"])
+def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
+    """Sections, floats, end bodies, waves, a seabed with friction; any base cells rod, any of their nodes there."""
+    scene = hybrid.load_scene(EXAMPLES / f"{name}.yaml", ["model={kind: adaptive}"])
+    model = build(scene)
+    assert model.layout is not None and model.on_base is not None
+    random = np.random.default_rng(1)
+    for _ in range(3):
+        rod = random.random(model.layout.rod.size) < 0.5
+        layout = model.layout._replace(rod=rod, here=random.random(model.layout.starts[-1] + 1) < 0.5)
+        more = model.line.bits & (SEABED | FRICTION)
+        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False, passes_torque=False)
+        line = model.on_base.line(layout, same.bits)
+        for field, a, b in zip(line._fields, line, same, strict=True):
+            np.testing.assert_allclose(a, b, rtol=ROUND, atol=0.0, err_msg=field)
+        assert set(layout.base) <= set(layout.nodes.tolist()) and layout.nodes.size == line.s.size < model.line.s.size
