@@ -7,7 +7,7 @@
     eta      elevation of the surface above still water                m
 
 A motion adds r A sin(w t + p), a steady velocity times the integral of r, a travel, the surface that it follows, and
-the splines of a file.  Roll, pitch and yaw turn the given frame by Rz Ry Rx, a file turns it by exp(v).  Vectors are
+the splines of a file.  A load is r times a constant, or r times what is linear between the rows of its history.  Roll, pitch and yaw turn the given frame by Rz Ry Rx, a file turns it by exp(v).  Vectors are
 inertial.  scene.motion.EndMotion states the same laws in Python, for the second solver and for tests.
 """
 
@@ -233,6 +233,29 @@ def frame_at(t, k, moves):
 
 
 @inner
+def load_at(t, j, moves):
+    """Load j (N or N m) at t when it has grown: linear between the rows of its history, constant outside them."""
+    load, rows = moves.loads[j], moves.history
+    a, b = int(load[6]), int(load[7])
+    if a == b:
+        return load[2], load[3], load[4]
+    if t <= rows[a, 0]:
+        return rows[a, 1], rows[a, 2], rows[a, 3]
+    b -= 1
+    if t >= rows[b, 0]:
+        return rows[b, 1], rows[b, 2], rows[b, 3]
+    while b - a > 1:
+        m = (a + b) // 2
+        if rows[m, 0] <= t:
+            a = m
+        else:
+            b = m
+    x = (t - rows[a, 0]) / (rows[b, 0] - rows[a, 0])
+    y = 1.0 - x
+    return y * rows[a, 1] + x * rows[b, 1], y * rows[a, 2] + x * rows[b, 2], y * rows[a, 3] + x * rows[b, 3]
+
+
+@inner
 def ends_at(t, moves, sea, ends, velocity):
     """Write what both ends impose at t (s) into `ends`, and the velocity (2, 3) m/s of the held ends.
 
@@ -258,8 +281,9 @@ def ends_at(t, moves, sea, ends, velocity):
         k, target = int(moves.loads[j, 0]), ends.force
         if moves.loads[j, 1] == 1.0:
             target = ends.moment
+        load = load_at(when, j, moves)
         for i in range(3):
-            target[k, i] += part * moves.loads[j, 2 + i]
+            target[k, i] += part * load[i]
 
 
 # --- how far an end turns ------------------------------------------------------------------------

@@ -100,7 +100,9 @@ class Moves(NamedTuple):
     driven: NDArray[np.int8]  # (2, 2) 1 where the position, the frame, is set from outside, step by step
     paths: Floats  # (2, 26) of driven ends: from t to t' (s), position and velocity at both (m, m/s), then
     # the frame at t and the rotation vector to that at t', in the axes of the frame (rad)
-    loads: Floats  # (L, 6) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once
+    loads: Floats  # (L, 8) end; 0 force, 1 moment; N or N m (3); s, over which it grows, 0: at once; of `history` the
+    # first row and the one behind the last; equal: constant
+    history: Floats  # (H, 4) s, N or N m (3), linear between the rows of a load
 
 
 class Sea(NamedTuple):
@@ -306,7 +308,7 @@ def no_moves() -> Moves:
     z = np.zeros
     return Moves(
         z((2, 2), np.int8), z((2, 3)), z((2, 9)), z(2), z((0, 5)), z((2, 3)), z(2), z((2, 5)), z(2, np.int8),
-        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 6)),
+        z((2, 2), np.int64), z(0), z((0, 6, 4)), z((2, 4)), 1.0, z((2, 2), np.int8), z((2, 26)), z((0, 8)), z((0, 4)),
     )  # fmt: skip
 
 

@@ -14,6 +14,7 @@ from hybrid.scene.motion import MotionTerms
 
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6
+CONSTANT: Floats = np.zeros((0, 4))  # history of a load that has none
 
 
 def first_director(tangent: Sequence[float], normal: Sequence[float] | None = None) -> Floats:
@@ -60,6 +61,7 @@ class EndLoad(NamedTuple):
     """A force (N) or moment (N m) on end 0 or 1 that acts until a time (s).
 
     ramp: time (s) over which it grows from nothing; None: at once, unless the end is `brought_in`.
+    history: (R, 4) rows t, x, y, z, linear between them; `value` is then the largest of them; no rows: constant.
     """
 
     what: Literal["force", "moment"]
@@ -67,6 +69,23 @@ class EndLoad(NamedTuple):
     value: Floats
     until: float
     ramp: float | None
+    history: Floats = CONSTANT
+
+    def at(self, t: float) -> Floats:
+        """The load (3,) at t (s), when it has grown; at infinity: as at 0, as motions."""
+        if not len(self.history):
+            return self.value
+        t = t if np.isfinite(t) else 0.0
+        return np.array([np.interp(t, self.history[:, 0], column) for column in self.history[:, 1:].T])
+
+
+def end_load(
+    what: Literal["force", "moment"], end: int, values: Sequence[Sequence[float]], until: float, ramp: float | None,
+    rows: Sequence[Sequence[float]],
+) -> EndLoad:  # fmt: skip
+    """A load with all values (n, 3) that it takes, and the rows (R, 4) of its history, if it has one."""
+    largest = max(values, key=lambda v: float(np.dot(v, v)))
+    return EndLoad(what, end, np.array(largest, float), until, ramp, np.array(rows, float).reshape(-1, 4))
 
 
 class EndConditions:
@@ -111,6 +130,8 @@ class EndConditions:
         self._moves = None
         self._acting = [x for x in self._loads if t < x.until]
         self._growing_until = max((x.ramp or 0.0 for x in self._acting), default=0.0)
+        if any(len(x.history) for x in self._acting):
+            self._growing_until = np.inf
         self._grown = False
 
     def go_on_from(self, old: EndConditions, t: float) -> None:
@@ -238,11 +259,16 @@ class EndConditions:
             cubics.append(terms.cubics)
         for k, (axis, angle) in self._turns.items():
             missing[k] = [*axis, angle]
-        loads = [(x.end, x.what == "moment", *x.value, x.ramp or 0.0) for x in self._acting]
+        rows = np.cumsum([0, *(len(x.history) for x in self._acting)])
+        loads = [
+            (x.end, x.what == "moment", *x.value, x.ramp or 0.0, a, b)
+            for x, a, b in zip(self._acting, rows[:-1], rows[1:], strict=True)
+        ]
+        history = np.concatenate([CONSTANT, *(x.history for x in self._acting)])
         return Moves(
             prescribed, position, self._given[0].copy(), ramp, np.array(harmonics).reshape(-1, 5), velocity,
             velocity_ramp, travel, follows, file, np.concatenate(knots), np.concatenate(cubics), missing,
-            float(self._bring_in), driven, self._paths, np.array(loads, float).reshape(-1, 6),
+            float(self._bring_in), driven, self._paths, np.array(loads, float).reshape(-1, 8), history,
         )  # fmt: skip
 
     def _grow(self, t: float) -> None:
@@ -251,7 +277,7 @@ class EndConditions:
         self.values.moment[:] = 0.0
         for load in self._acting:
             part, _ = rise(t, load.ramp or 0.0)
-            (self.values.force if load.what == "force" else self.values.moment)[load.end] += part * load.value
+            (self.values.force if load.what == "force" else self.values.moment)[load.end] += part * load.at(t)
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""

@@ -10,7 +10,7 @@ from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
 from hybrid.kernels.state import Floats, Line, Sea
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
-from hybrid.model.ends import EndConditions, EndLoad, Motion, first_director, transported
+from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
 from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.scene.motion import EndMotion
@@ -265,8 +265,7 @@ def _end_conditions(
         frame[k] = base.ravel()
         position[k] = end.held_position or (0.0, 0.0, 0.0)
         loads += [
-            EndLoad(x.what, k, np.array(x.value, float), np.inf if x.until is None else x.until, x.ramp)
-            for x in end.loads
+            end_load(x.what, k, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in end.loads
         ]
         motion = end.prescribed_motion
         if motion is not None:

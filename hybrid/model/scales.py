@@ -46,7 +46,7 @@ def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fast
         candidates += [0.5 * fluid.density * x.drag_area * fastest**2 for _, x in attachments_at(scene)]
     for end in scene.ends.both:
         for load in end.loads:
-            candidates.append(float(np.abs(load.value).max()) / (length if load.what == "moment" else 1.0))
+            candidates.append(float(np.abs(load.values).max()) / (length if load.what == "moment" else 1.0))
         motion = end.prescribed_motion
         if motion is not None:
             candidates += [

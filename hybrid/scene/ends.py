@@ -6,7 +6,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 
 from __future__ import annotations
 
-from typing import Annotated, Any, Literal, NamedTuple, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
 
@@ -26,8 +26,8 @@ from hybrid.scene.base import (
     parallel,
     refuse,
     table_or_list,
-    value_or_table,
 )
+from hybrid.scene.end_loads import GivenLoad, Load, Loading, Triple
 
 SHIFTS = ("surge", "sway", "heave")
 TURNS = ("roll", "pitch", "yaw")
@@ -38,8 +38,6 @@ _TURNS = (
     "turns about the tangent by which this end is twisted against the other, right-handed, counted from `normal`, or "
     "from where the shape carries the frame; may be a fraction; both ends must hold the twist [-]"
 )
-
-Triple = tuple[float, float, float]
 
 
 def smooth_step(x: float) -> tuple[float, float]:
@@ -158,36 +156,6 @@ class Motion(Table):
         return self
 
 
-class Load(Table):
-    """A force or moment at an end, inertial frame, until a time or for good."""
-
-    value: Vector = Field(description="the force or the moment, inertial frame [N or N m]")
-    until: Positive | None = Field(default=None, description="time at which it is let go; absent: never [s]")
-    ramp: NonNegative | None = Field(
-        default=None,
-        description="time over which it grows from nothing; absent: at once, or with a tangent that is turned in [s]",
-    )
-
-
-Loading = Annotated[
-    Annotated[Vector, Tag("<value>")] | Annotated[Load, Tag("<table>")],
-    Discriminator(value_or_table),
-]
-
-
-class GivenLoad(NamedTuple):
-    """A force [N] or moment [N m] that a scene gives at an end, inertial frame.
-
-    key: its place below the end; until: time at which it stops [s], None: never; ramp: time over which it grows [s].
-    """
-
-    what: Literal["force", "moment"]
-    key: tuple[str, ...]
-    value: Triple
-    until: float | None
-    ramp: float | None
-
-
 _LOADS: dict[str, Literal["force", "moment"]] = {"force": "force", "moment": "moment", "thrust": "force"}
 
 
@@ -250,9 +218,10 @@ class EndTable(Table):
         for key, what in _LOADS.items():
             load = self._own(key)
             if isinstance(load, Load):
-                found.append(GivenLoad(what, (key, "value"), load.value, load.until, load.ramp))
+                given = next(name for name in ("value", "history", "file") if getattr(load, name) is not None)
+                found.append(GivenLoad(what, (key, given), load))
             elif load is not None:
-                found.append(GivenLoad(what, (key,), load, None, None))
+                found.append(GivenLoad(what, (key,), Load(value=load)))
         return tuple(found)
 
     @property
@@ -404,3 +373,9 @@ class Ends(Table):
     def bodies(self) -> dict[str, Body]:
         """The bodies at the ends, by name (`start`, `end`)."""
         return {name: end for name, end in self.named().items() if isinstance(end, Body)}
+
+    def files(self) -> list[str]:
+        """Files that motions and loads of the ends are read from."""
+        motions = [end.prescribed_motion.file for end in self.both if end.prescribed_motion is not None]
+        loads = [given.load.file for end in self.both for given in end.loads]
+        return sorted({path for path in (*motions, *loads) if path is not None})

@@ -15,6 +15,7 @@ from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
 from hybrid.scene.ends import SHIFTS, End, Ends, Harmonic, Motion
+from hybrid.scene.load_checks import load_findings, turning_times
 
 if TYPE_CHECKING:
     from hybrid.scene.motion_file import Record
@@ -56,6 +57,8 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
         if step is not None and not wrong:
             late += _unresolved(here, motion, record, environment, step)
+    for wrong_load in load_findings(ends, step):
+        (late if wrong_load.at[0] == "time" else found).append(wrong_load)
     if step is not None:
         late += _fastest_period(ends, environment, step)
     return found or late
@@ -196,13 +199,13 @@ def prescribed_twist(ends: Ends) -> float:
 
 
 def ramp_ends(scene: Scene) -> list[float]:
-    """Times, s, at which something stops growing or moving: a step should end there."""
+    """Times, s, at which something stops growing or moving, or a load turns: a step should end there."""
     fluid, ends = scene.environment.fluid, scene.ends
     moves = [m.travel for _, _, m in _motions(ends) if m.travel is not None]
     times = [m.ramp for _, _, m in _motions(ends)] + [t for m in moves for t in (m.begin, m.begin + m.over)]
     times += [getattr(x, "ramp", None) for x in ((fluid.current, fluid.waves) if fluid is not None else ())]
     times += [load.ramp for end in ends.both for load in end.loads]
-    return [t for t in times if t]
+    return [t for t in times if t] + turning_times(ends)
 
 
 def _unresolved(

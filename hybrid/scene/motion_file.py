@@ -6,8 +6,9 @@ import math
 import os
 import stat
 from array import array
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -93,7 +94,7 @@ def read_record(path: str | Path) -> Record:
     check_file(path)
     try:
         with Path(path).open(encoding="utf-8-sig") as lines:
-            header, values, precisions, numbers = _table(name, lines)
+            header, values, precisions, numbers = _table(name, lines, _checked_header)
     except (OSError, UnicodeDecodeError, ValueError):
         raise RecordRefused("a CSV text file", f"columns {COLUMNS}", f"{path}, which cannot be read") from None
     if len(numbers) < FEWEST_ROWS:
@@ -116,6 +117,40 @@ def read_record(path: str | Path) -> Record:
     return Record(times, shift, rotation, shift_unit, rotation_unit, name)
 
 
+def read_history(path: str | Path) -> tuple[tuple[float, float, float, float], ...]:
+    """Rows (t, x, y, z) of a file that gives a force or a moment (s, N or N m), columns in any order; RecordRefused."""
+    check_file(path)
+    status = os.stat(path)
+    return _history(str(path), status.st_mtime_ns, status.st_size)
+
+
+@lru_cache(maxsize=4)
+def _history(path: str, _changed: int, _size: int) -> tuple[tuple[float, float, float, float], ...]:
+    """The rows of a history, read once for as long as its file does not change."""
+    name = Path(path).name
+    try:
+        with Path(path).open(encoding="utf-8-sig") as lines:
+            header, values, _, numbers = _table(name, lines, _history_header)
+    except (OSError, UnicodeDecodeError, ValueError):
+        raise RecordRefused("a CSV text file", "columns t,x,y,z", f"{path}, which cannot be read") from None
+    if len(numbers) < 2:
+        raise RecordRefused("at least 2 rows", "value: [x, y, z] gives a constant load", f"{name}, {len(numbers)} rows")
+    table = np.array(values).reshape(len(numbers), len(header))[:, [header.index(c) for c in ("t", *SHIFT_COLUMNS)]]
+    times = table[:, 0]
+    for k in np.flatnonzero(np.diff(times) <= 0)[:1]:
+        given = f"{name}, line {numbers[k + 1]}: t = {times[k + 1]:.9g} after t = {times[k]:.9g}"
+        fix = "sort the rows; for a sudden change give two rows a time step apart"
+        raise RecordRefused("times that increase strictly", fix, given)
+    return tuple((t, x, y, z) for t, x, y, z in table.tolist())
+
+
+def _history_header(name: str, header: list[str]) -> list[str]:
+    if sorted(header) == ["t", *SHIFT_COLUMNS]:
+        return header
+    given = f"{name} with columns {', '.join(header)[:60]}"
+    raise RecordRefused("columns t,x,y,z, in any order", "name the columns in the first line of the file", given)
+
+
 def check_file(path: str | Path) -> None:
     """RecordRefused if there is no regular file of bounded size; nothing is opened, so that a pipe cannot wait."""
     try:
@@ -135,8 +170,13 @@ def check_file(path: str | Path) -> None:
         raise RecordRefused(f"a file of at most {LARGEST_FILE / 1e6:.0f} MB", fix, given)
 
 
-def _table(name: str, lines: Iterator[str]) -> tuple[list[str], array[float], list[Precision], array[int]]:
-    """Column names, values row by row, the precision of each column, and the line of each row."""
+def _table(
+    name: str, lines: Iterator[str], checked: Callable[[str, list[str]], list[str]]
+) -> tuple[list[str], array[float], list[Precision], array[int]]:
+    """Column names, values row by row, the precision of each column, and the line of each row.
+
+    checked: the column names as they are to be, RecordRefused where they cannot be.
+    """
     header: list[str] = []
     values, numbers = array("d"), array("q")
     precisions: list[Precision] = []
@@ -145,7 +185,7 @@ def _table(name: str, lines: Iterator[str]) -> tuple[list[str], array[float], li
             continue
         cells = [cell.strip() for cell in line.split(",")]
         if not header:
-            header = _checked_header(name, cells)
+            header = checked(name, cells)
             precisions = [Precision() for _ in header]
             continue
         if len(cells) != len(header):
@@ -156,7 +196,7 @@ def _table(name: str, lines: Iterator[str]) -> tuple[list[str], array[float], li
             precision.add(cell)
         numbers.append(i)
     if not header:
-        raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line", f"{name}, which is empty")
+        raise RecordRefused("a table", "name the columns in the first line, such as t,x,y,z", f"{name}, which is empty")
     return header, values, precisions, numbers
 
 

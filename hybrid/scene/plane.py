@@ -184,8 +184,9 @@ def _witnesses(environment: Environment, ends: Ends, initial: Initial) -> Iterat
         yield Witness(("initial", "direction"), "along", initial.direction)
     for name, end in ends.named().items():
         for load in end.loads:
-            if any(load.value):
-                yield Witness(("ends", name, *load.key), "normal" if load.what == "moment" else "along", load.value)
+            for value in load.values:
+                if any(value):
+                    yield Witness(("ends", name, *load.key), "normal" if load.what == "moment" else "along", value)
         if end.prescribed_motion is not None:
             yield from _moved(end.prescribed_motion, ("ends", name, "motion"))
     yield from _sea(environment)

@@ -9,6 +9,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from functools import cache
+from itertools import product
 from os import PathLike
 from pathlib import Path
 from typing import Any, get_type_hints
@@ -87,7 +88,7 @@ def _text_of(path: str | Path) -> str:
         if len(content) <= LARGEST_SCENE:
             return content.decode("utf-8-sig")
         given, expected = f"more than {LARGEST_SCENE / 1e6:g} MB", "a scene file of at most that"
-        fix = "time series go into a file of their own (motion.file), and `ratio` grades a mesh"
+        fix = "time series go into a file of their own (motion.file, force.file), and `ratio` grades a mesh"
         complaint = Complaint("scene", given, expected, fix)
     except FileNotFoundError:
         complaint = Complaint("scene", str(path), "a scene file that exists", "check the name and the folder")
@@ -184,10 +185,10 @@ def _text_in_yaml(dumper: Any, text: str) -> Any:
 
 
 def _resolve_motion_files(data: Any, folder: Path) -> None:
-    """Make the paths of motion files absolute, so that the scene can be used from anywhere."""
-    for end in ("start", "end"):
+    """Make the paths of files of motions and loads absolute, so that the scene can be used from anywhere."""
+    for end, table in product(("start", "end"), ("motion", "force", "moment", "thrust")):
         here = data
-        for key in ("ends", end, "motion"):
+        for key in ("ends", end, table):
             here = here.get(key) if isinstance(here, dict) else None
         name = here.get("file") if isinstance(here, dict) else None
         if isinstance(here, dict) and isinstance(name, str) and name and "\0" not in name:

@@ -37,7 +37,8 @@ from hybrid.scene.attachments import Attachment, Clump, Float, Modules
 from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Load, Motion, Pinned, Travel
+from hybrid.scene.end_loads import Load
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Motion, Pinned, Travel
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,

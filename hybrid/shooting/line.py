@@ -19,9 +19,7 @@ from hybrid.scene.schema import (
     Clamped,
     End,
     Environment,
-    Free,
     Guided,
-    Load,
     Pinned,
     RodModel,
     RodZone,
@@ -107,10 +105,10 @@ class Hold:
         return Target(*self.motion.at(t))
 
     def force(self, t: float) -> Array:
-        return _load(self.table.force, t) if isinstance(self.table, Guided | Free) else np.zeros(3)
+        return _loads(self.table, "force", t)
 
     def moment(self, t: float) -> Array:
-        return _load(self.table.moment, t) if isinstance(self.table, Free) else np.zeros(3)
+        return _loads(self.table, "moment", t)
 
 
 @dataclass(frozen=True)
@@ -124,14 +122,13 @@ class Line:
     scene: Scene
 
 
-def _load(load: tuple[float, float, float] | Load | None, t: float) -> Array:
+def _loads(table: End, what: str, t: float) -> Array:
     """Load (3,) at time t: on up to and including `until` (a step that ends there still feels it)."""
-    if load is None:
-        return np.zeros(3)
-    if isinstance(load, Load):
-        on = load.until is None or t <= load.until * (1.0 + 1.0e-12)
-        return np.array(load.value) if on else np.zeros(3)
-    return np.array(load)
+    total = np.zeros(3)
+    for load in table.loads:
+        if load.what == what and (load.until is None or t <= load.until * (1.0 + 1.0e-12)):
+            total += load.at(t)
+    return total
 
 
 def refuse(where: str, value: object, expected: str, fix: str) -> SceneError:

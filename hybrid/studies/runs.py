@@ -203,9 +203,8 @@ class RunStore:
 def key_of(scene: Scene, repeat: int, also: str = "") -> str:
     """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
-    for end in scene.ends.both:
-        if end.prescribed_motion is not None and end.prescribed_motion.file is not None:
-            digest.update(Path(end.prescribed_motion.file).read_bytes())
+    for path in scene.ends.files():
+        digest.update(Path(path).read_bytes())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):
         place = source.relative_to(package)

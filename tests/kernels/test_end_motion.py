@@ -129,6 +129,15 @@ LOADS = (
     EndLoad("moment", 1, np.array([1.0, 2.0, 3.0]), 9.0, 5.0),
     EndLoad("force", 1, np.array([0.0, 7.0, 3.0]), 4.0, None),
     EndLoad("force", 1, np.array([5.0, 7.0, 3.0]), math.inf, 20.0),
+    EndLoad(
+        "force",
+        0,
+        np.ones(3),
+        math.inf,
+        3.0,
+        np.array([[0.3, 1, 2, 3], [1.7, 2, 2, 0], [12, -9, 2, 0], [20, 1, 1, 1.0]]),
+    ),
+    EndLoad("moment", 1, np.ones(3), 9.0, None, np.array([[-1.0, 1, 2, 3], [5.5, 2, 2, 0]])),
 )
 
 
@@ -138,7 +147,7 @@ def test_loads_and_tangents_brought_in_compiled_are_python(motion: str) -> None:
     ends = conditions(KINDS["no ramp"], None, around, held=(False, True), loads=LOADS)
     for since in (0.0, 4.0, 9.0):
         ends.set_loads(since)
-        assert ends.moves().loads.shape[0] == {0.0: 4, 4.0: 3, 9.0: 2}[since]
+        assert ends.moves().loads.shape[0] == {0.0: 6, 4.0: 5, 9.0: 3}[since]
         check(ends, around, (*TIMES, math.inf))
     ends = conditions(KINDS[motion], None, around, loads=LOADS)
     chords = (np.array([0.0, 0.6, 0.8]), np.array([1.0, 0.0, 0.0]))

@@ -42,7 +42,17 @@ ends:
 initial: {kind: equilibrium}
 model: {kind: rod}
 """
+LOADED = """\
+cable: {sections: [{length: 10.0, mass: 1.0}]}
+ends:
+  start: {kind: pinned, position: [0.0, 0.0, 0.0]}
+  end: {kind: free, force: {history: [[0.0, 0.0, 0.0, 0.0], [2.0, 1.0, 0.0, -3.0], [5.0, 1.0, 0.0, 0.0]], ramp: 1.0}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+time: {duration: 10.0, step: 0.05}
+"""
 TEXTS = {
+    "loaded": LOADED,
     "adaptive": ADAPTIVE,
     "everything": EVERYTHING,
     "everything else": EVERYTHING_ELSE,
@@ -165,7 +175,20 @@ def _loaded(name: str) -> Any:
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
 SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "correct", "errors"}
-SIGNED |= {"z", "slope", "surface", "top", "bottom", "veer", "initial_guess", "thrust", "by", "shape", "turns"}
+SIGNED |= {
+    "z",
+    "slope",
+    "surface",
+    "top",
+    "bottom",
+    "veer",
+    "initial_guess",
+    "thrust",
+    "by",
+    "shape",
+    "turns",
+    "history",
+}
 
 
 @pytest.mark.parametrize("case", LEAVES, ids=_id)

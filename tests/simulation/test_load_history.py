@@ -1,0 +1,158 @@
+"""Forces and moments at ends as histories: impulse, work, files, resumed runs, and what is refused."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.scene.read import scene_text
+
+ROWS: list[list[float]] = [[0, 0, 0, 0], [0.5, 3, 0, -1], [0.7, -2, 0, 0], [1.4, 1, 0, 0]]
+
+
+def scene(force: object, step: float = 0.01, **changes: object) -> hybrid.Scene:
+    data = {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [{"length": 2.0, "mass": 0.5, "axial_stiffness": 2e3, "bending_stiffness": 0.4}]},
+        "ends": {"start": {"kind": "free"}, "end": {"kind": "free", "force": force}},
+        "initial": {"kind": "straight", "direction": [0, 0, 1], "origin": [0, 0, 0]},
+        "model": "rod", "mesh": {"cells": 16}, "time": {"duration": 2.0, "step": step}, "output": {"every": 0.1, "points": 17},
+    }  # fmt: skip
+    return hybrid.validate_scene(data | changes)
+
+
+def table(path: Path, header: str = "y,t,x,z") -> str:
+    """ROWS as a file, columns in another order."""
+    rows = np.array(ROWS, float)
+    np.savetxt(path, rows[:, [2, 0, 1, 3]], delimiter=",", header=header, comments="", fmt="%.17g")
+    return str(path)
+
+
+def impulse(t: float) -> np.ndarray:
+    """The integral of ROWS from 0 to t, exact: Simpson's rule between rows."""
+    rows = np.array(ROWS, float)
+    times = np.unique(np.append(rows[rows[:, 0] < t, 0], t))
+    values = np.stack([np.interp(times, rows[:, 0], column) for column in rows[:, 1:].T], axis=1)
+    return np.asarray((0.5 * (values[1:] + values[:-1]) * np.diff(times)[:, None]).sum(axis=0))
+
+
+def off_by(step: float, **time: float) -> np.ndarray:
+    """By how much the momentum of a cable that nothing else acts on differs from the impulse (n, 3) N s."""
+    mass = np.full(17, 0.5 * 2.0 / 16)
+    mass[[0, -1]] *= 0.5
+    with hybrid.run(scene({"history": ROWS}, step, **({"time": {"duration": 2.0, **time}} if time else {}))) as result:
+        return np.array([mass @ v - impulse(t) for t, v in zip(result.t, result.velocity[()], strict=True)])
+
+
+def test_momentum_is_the_impulse_to_second_order() -> None:
+    """1.4 N/s^2 dt^2 where the slope has just turned, and nothing when the force has ended where it began to turn."""
+    coarse, fine = off_by(0.01), off_by(0.005)
+    assert np.abs(coarse).max() < 1.5 * 0.01**2
+    np.testing.assert_allclose(fine[:15], coarse[:15] / 4, rtol=0, atol=1e-9)
+    assert np.abs(coarse[15:]).max() < 1e-12
+
+
+def test_steps_that_follow_the_motion_end_where_a_history_turns() -> None:
+    """A blow of 2 ms between steps of 20 ms and more is not missed: its impulse is 0.01 N s."""
+    rows = [[0.999, 0, 0, 0], [1.0, 10, 0, 0], [1.001, 0, 0, 0]]
+    time = {"duration": 2.0, "tolerance": 1e-6}
+    with hybrid.run(scene({"history": rows}, time=time)) as result:
+        mass = np.full(17, 0.5 * 2.0 / 16)
+        mass[[0, -1]] *= 0.5
+        assert {0.999, 1.0, 1.001} <= set(result.steps["t"].tolist())
+        assert mass @ result.velocity[-1] == pytest.approx([0.01, 0.0, 0.0], rel=0.05)
+
+
+def test_the_work_of_a_history_is_booked() -> None:
+    """Energy is the work of the force and what the scheme loses, which is of second order in the step."""
+    lost = []
+    for step in (0.01, 0.005):
+        with hybrid.run(scene({"history": ROWS}, step)) as result:
+            total = sum(result.energy.values())
+            assert np.abs(total - total[0] - sum(result.work.values())).max() < 1e-12
+            lost.append(float(np.abs(result.work["scheme"]).max() / total.max()))
+    assert lost[0] < 0.005 and lost[1] < 0.3 * lost[0], lost
+
+
+def test_a_constant_history_is_a_constant_force() -> None:
+    rows = [[0.0, 1.0, 0.5, 2.0], [1.0, 1.0, 0.5, 2.0]]
+    with hybrid.run(scene({"history": rows})) as one, hybrid.run(scene([1.0, 0.5, 2.0])) as other:
+        np.testing.assert_allclose(one.position, other.position, rtol=0, atol=1e-10)
+
+
+def test_a_file_is_the_list_in_any_order_of_columns(tmp_path: Path) -> None:
+    with hybrid.run(scene({"file": table(tmp_path / "f.csv")})) as one, hybrid.run(scene({"history": ROWS})) as other:
+        assert one.position[()].tolist() == other.position[()].tolist()
+
+
+def test_a_file_is_relative_to_its_scene(tmp_path: Path) -> None:
+    table(tmp_path / "f.csv")
+    text = scene_text(scene({"value": [0.0, 0.0, 1.0]}))
+    (tmp_path / "a.yaml").write_text(text.replace("value: [0.0, 0.0, 1.0]", "file: f.csv"))
+    found = hybrid.load_scene(tmp_path / "a.yaml").ends.end.loads[0]
+    assert found.at(0.6) == pytest.approx((0.5, 0.0, -0.5))
+
+
+def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch) -> None:
+    made = scene({"file": table(tmp_path / "f.csv")}, time={"duration": 2.0, "tolerance": 1e-4})
+    stopping = Stopping(monkeypatch)
+    hybrid.run(made, tmp_path / "whole.h5", progress=stopping).close()
+    assert went_on(made, tmp_path / "parts.h5", stopping, [stopping.heard // 3, stopping.heard // 3]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "parts.h5") == []
+
+
+def test_a_file_that_has_changed_is_not_resumed(tmp_path: Path, monkeypatch) -> None:
+    made = scene({"file": table(tmp_path / "f.csv")})
+    stopping = Stopping(monkeypatch)
+    stopping.left = 50
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.run(made, tmp_path / "a.h5", progress=stopping)
+    (tmp_path / "f.csv").write_text("t,x,y,z\n0,1,0,0\n3,2,0,0\n")
+    with pytest.raises(hybrid.ResultError, match=r"f\.csv: other than when the run began"):
+        hybrid.resume(tmp_path / "a.h5")
+
+
+def test_an_equilibrium_takes_the_load_at_the_start() -> None:
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": {"history": [
+        [0, 0, 0, -7], [1, 9, 0, -7]]}}}  # fmt: skip
+    with hybrid.static(scene([0, 0, 0], ends=ends, initial="equilibrium")) as result:
+        np.testing.assert_allclose(result.reaction_start[-1], [0, 0, 7], atol=1e-6)
+
+
+REFUSED = {
+    "nothing": ({"ramp": 1.0}, "value, history or file"),
+    "two": ({"value": [0, 0, 1], "history": ROWS}, "because value already gives the load"),
+    "order": ({"history": [ROWS[1], ROWS[0]]}, "a time after that of the row before, 0.5 s"),
+    "one row": ({"history": ROWS[:1]}, "2"),
+    "three numbers": ({"history": [[0, 1, 2], [1, 1, 2]]}, r"four numbers \[t, x, y, z\]"),
+    "no file": ({"file": "nowhere.csv"}, "which does not exist"),
+    "missed": ({"history": [[0, 0, 0, 0], [0.104, 0, 0, 0], [0.105, 9, 0, 0], [0.106, 0, 0, 0]]}, r"turns at t = 0\.105 s"),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_is_refused(name: str) -> None:
+    force, text = REFUSED[name]
+    with pytest.raises(hybrid.SceneError, match=text):
+        hybrid.run(scene(force))
+
+
+@pytest.mark.parametrize(
+    ("rows", "text"),
+    [("t,x,y\n0,1,2\n1,1,2\n", "columns t,x,y,z"), ("t,x,y,z\n0,1,2,3\n", "at least 2 rows"),
+     ("t,x,y,z\n0,1,2,3\n0,1,2,4\n", "line 3: t = 0 after t = 0"), ("t,x,y,z\n0,1,2,3\n1,1,nan,4\n", "line 3: y is no")],
+)  # fmt: skip
+def test_a_bad_file_is_refused_with_its_line(tmp_path: Path, rows: str, text: str) -> None:
+    (tmp_path / "f.csv").write_text(rows)
+    with pytest.raises(hybrid.SceneError, match=text):
+        hybrid.run(scene({"file": str(tmp_path / "f.csv")}))
+
+
+def test_a_force_out_of_the_plane_is_refused_in_two_dimensions() -> None:
+    rows = [[0, 1, 0, 0], [1, 0, 1, 0]]
+    with pytest.raises(hybrid.SceneError, match=r"ends\.end\.force\.history"):
+        hybrid.run(scene({"history": rows}, dimension=2))
