@@ -93,7 +93,7 @@ tangent by 27 turns against the other end, right-handed, from the twist of less 
 The rod is wound evenly before its equilibrium is sought, and what is found must have this twist to within half a turn;
 else the computation stops (a slack cable that forms loops, too few cells).
 The torque of a straight rod of length L is GJ 2π turns / L.
-Fixed catenary zones pass it on; while zones that move are catenary the turns have no effect, and an event says so.
+Catenary zones pass it on.
 Cells that are left to the program are short enough for the twist that `turns` and motions prescribe.
 
 ## Air and wind

@@ -13,7 +13,7 @@ from hybrid.kernels.zone_transfer import Transfer, blank_match, blank_transfer, 
 from hybrid.model.layout import Layout
 
 Clamp = tuple[Floats, Floats]  # first director and tangent
-states = Packed(blank_state)
+states = Packed(blank_state, given=("turn",))
 
 
 class Remapped(NamedTuple):
@@ -44,7 +44,7 @@ def transfer_to(
         if clamp is not None:
             held[k], frames[k] = True, clamp
     return Transfer(
-        line, target, state, states(target.h.size), old.places, new.places, new.base_of_cell, old.first, kinks, twist,
+        line, target, state, states(target.h.size, turn=np.zeros((len(target.torsion), 3))), old.places, new.places, new.base_of_cell, old.first, kinks, twist,
         frames, held, blank_match(line.h.size, target.h.size),
     )  # fmt: skip
 

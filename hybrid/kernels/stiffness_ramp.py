@@ -61,10 +61,11 @@ def length_defect(lack, rate, since, keeps, t, duration, true, h):
 
 @kernel
 def soften(part, stiff, kb):
-    """kb (N+1, 3) = part (N+1,) of stiff (N+1, 3)."""
+    """Bending in kb (N+1, 3) = part (N+1,) of stiff (N+1, 3); torsion is all there, so that no torque is lost."""
     for i in range(part.size):
-        for k in range(3):
+        for k in range(2):
             kb[i, k] = part[i] * stiff[i, k]
+        kb[i, 2] = stiff[i, 2]
 
 
 @kernel
@@ -75,7 +76,7 @@ def freed(kb, part, stiff, before, after):
     """
     total = 0.0
     for i in range(part.size):
-        for k in range(3):
+        for k in range(2):
             more = kb[i, k] - part[i] * stiff[i, k]
             total += more * (before[i, k] ** 2 + after[i, k] ** 2)
     return 0.25 * total

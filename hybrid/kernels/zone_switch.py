@@ -18,6 +18,7 @@ from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Sea, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import shares, soften
 from hybrid.kernels.zone_step import LETTING_GO, Zones, blank_zones
+from hybrid.kernels.zone_torque import twist_energy
 from hybrid.kernels.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
 
 # Numbers of a switch: J, J, s, 1 where lengths were on their way.
@@ -51,7 +52,7 @@ read = reader(blank_switch_job())
 def energy(line, sea, ends, state, zones):
     """All energy of a state, J; its strains into those of zones."""
     observe(line, ends, state.e, state.v, state.a1, state.w, zones.moment, zones.strain[1], zones.energy)
-    total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3]
+    total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3] + twist_energy(line, state)
     for i in range(state.r.shape[0]):
         total -= dot(get3(line.force, i), get3(state.r, i))
     return total + stored(line, sea, state.r) if line.bits & SEABED else total

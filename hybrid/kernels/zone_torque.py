@@ -29,7 +29,7 @@ from hybrid.kernels.forces import STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
-from hybrid.kernels.state import Line, Torsion, no_torsion
+from hybrid.kernels.state import Floats, Line, Torsion, no_torsion
 
 # Parts of `pass_torque`.
 BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
@@ -146,6 +146,16 @@ def find_torques(line, ends, state, torsion, finished):
         if b < n:
             passed[LOAD, b] = -torque
     return loss
+
+
+@inner
+def twist_energy(line, state):
+    """Energy, J, of the twist of zones."""
+    total = 0.0
+    for z in range(line.torsion.shape[0]):
+        twist = state.turn[z, TURN] - line.torsion[z, FREE]
+        total += 0.5 * twist * twist / line.torsion[z, COMPLIANCE]
+    return total
 
 
 @inner
@@ -312,3 +322,8 @@ def torsion_of(line: Line) -> Torsion:
         address=0, passed=passed, slope=z((n + 1, 3)), floating=floating, columns=z((unknowns, n + 1, SIZE)),
         right=z((n + 1, SIZE)), dense=z((unknowns, unknowns + 1)),
     )  # fmt: skip
+
+
+def torsion_energy(line: Line, turn: Floats) -> Floats:
+    """Energy, J, of the twist of zones; turn: (..., K) rad."""
+    return np.asarray(((turn - line.torsion[:, FREE]) ** 2 / (2.0 * line.torsion[:, COMPLIANCE])).sum(axis=-1))

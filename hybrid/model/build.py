@@ -154,8 +154,7 @@ def build(
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    # rods that come and go have no inertia of their sections
-    line = line_on(cable, s, rod, touch, sections_turn=layout is None, passes_torque=layout is None)
+    line = line_on(cable, s, rod, touch, sections_turn=layout is None)  # rods that come and go have no such inertia
     h, compliance = line.h, line.ck
 
     start = blank_state(n, len(line.torsion))

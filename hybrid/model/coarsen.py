@@ -37,7 +37,7 @@ def coarser(model: Model) -> Model | None:
     at = np.flatnonzero(kept)
     rod = line.spin[at[:-1]] == 1
     bits, turns = line.bits & (SEABED | FRICTION), bool(line.bits & ROTARY)
-    new = line_on(cable, line.s[at], rod, bits, sections_turn=turns, passes_torque=bool(line.torsion.size))
+    new = line_on(cable, line.s[at], rod, bits, sections_turn=turns)
     if line.bits & PLANAR:
         new = planar(new, line.plane)
     start = picked(new, model.start, at, _turns(line, new, model.start))

@@ -11,12 +11,10 @@ from hybrid.model.material import Material
 
 def line_on(
     material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True,
-    passes_torque: bool = True,
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
-    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia;
-    passes_torque: whether a torque passes through catenary zones between ends that hold the twist.
+    more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
     """
     h = np.diff(s)
     n = h.size
@@ -41,7 +39,7 @@ def line_on(
         footing[place[: material.footing.size]] = material.footing
     element, kb, k0, hn = _elements(material, h, rod, of)
     half = 0.5 * h
-    torsion = torsion_zones(material, h, rod, of) if passes_torque else NO_TORSION
+    torsion = torsion_zones(material, h, rod, of)
     return Line(
         s=s, h=h, ck=material.ck[of], mass=_to_nodes(h * material.mass[of]) + point["point_mass"], force=force,
         element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,

@@ -10,6 +10,7 @@ from hybrid.kernels.state import NO_PLANE, NO_TORSION, Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import NodeKinds, blank_kinds
 from hybrid.kernels.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.model.layout import Layout
+from hybrid.model.line import torsion_zones
 from hybrid.model.material import LEAST_TENSION, POINT, TENSION_FLOOR, Material
 
 lines = Packed(blank_line, given=("bits", "plane", "torsion"))
@@ -36,13 +37,19 @@ class LineOnBase:
         EI, w = material.mean_bending[of], np.abs(material.submerged_weight[of])
         self._cable = Cable(**per_length, EI=EI, w=w, points=self._points, blank=np.zeros(9), load=load, held=held)
         self._line_job, self._kinds_job = Table(blank_line_job()), Table(blank_kinds_job())
-        self._bits = -1
+        self._bits, self._of = -1, of
+        self._holds_twist = bool(held.all())
 
     def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE) -> Line:
         """The line on a layout; bits: all forces that are on."""
         if bits != self._bits:
             self._fill_points(bits)
-        line: Line = lines(layout.base_of_cell.size, bits=bits, plane=plane, torsion=NO_TORSION)
+        torsion = NO_TORSION
+        if self._holds_twist:
+            torsion = torsion_zones(
+                self._material, np.diff(layout.nodes), layout.rod_cells, self._of[layout.base_of_cell]
+            )
+        line: Line = lines(layout.base_of_cell.size, bits=bits, plane=plane, torsion=torsion)
         self._line_job.bind(
             cable=self._cable, nodes=layout.nodes, base_of_cell=layout.base_of_cell, rod=layout.rod_cells, line=line
         )

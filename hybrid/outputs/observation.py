@@ -19,7 +19,7 @@ from scipy.sparse import csr_array
 from hybrid.kernels.energies import observe
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
-from hybrid.kernels.zone_torque import COMPLIANCE, FREE, TORQUE, TURN
+from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, sum_down, touchdown
 from hybrid.solve.bending_corrector import Shift
@@ -367,9 +367,7 @@ class Observation:
         """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
         kinetic, bending, torsion, stretch = self._observed[2]
         if self.batch.turn.size:
-            of = self.line.torsion
-            twisted = self.batch.turn[:, :, TURN] - of[:, FREE]
-            torsion = torsion + (twisted**2 / (2.0 * of[:, COMPLIANCE])).sum(axis=1)
+            torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN])
         r = self._plain.r
         potential = -sum_down(self.line.force.reshape(-1, 1) * r.reshape(-1, r.shape[-1]))
         return {

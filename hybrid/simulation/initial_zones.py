@@ -9,7 +9,9 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
-from hybrid.kernels.state import Floats, Line, State
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.state import Ends, Line, State
+from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import picked
@@ -72,7 +74,9 @@ def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equ
     free = manager.given >= 0
     if not free.all():  # the most rod that the scene lets it have
         most = on_layout(model, model.layout._replace(rod=free))
-        equilibrium = _equilibrium(most, t, _on_fewer(found.state, model.layout.nodes, most.line), found.with_friction)
+        equilibrium = _equilibrium(
+            most, t, _on_fewer(found.state, model.line, most.line, model.ends.at(t)), found.with_friction
+        )
     assert most.layout is not None
     allowed = manager.tolerance
     try:
@@ -102,7 +106,7 @@ def zones_without_equilibrium(model: Model, manager: DomainManager) -> Model:
         return model
     new = on_layout(model, model.layout._replace(rod=free))
     manager.set_layout(model.layout._replace(rod=free))
-    return replace(new, start=_on_fewer(model.start, model.layout.nodes, new.line))
+    return replace(new, start=_on_fewer(model.start, model.line, new.line, model.ends.values))
 
 
 def _zones_within(
@@ -118,7 +122,7 @@ def _zones_within(
             return None
         layout = model.layout._replace(rod=rod)
         new = on_layout(model, layout)
-        answer = _equilibrium(new, t, _on_fewer(full, model.layout.nodes, new.line), found.with_friction)
+        answer = _equilibrium(new, t, _on_fewer(full, model.line, new.line, model.ends.at(t)), found.with_friction)
         manager.set_layout(layout)
         manager.evaluate_criteria(new.line, new.sea.at(t), new.ends.at(t), answer.state, 0.0)
         more = rod | manager.initial_rods(answer.state)
@@ -145,9 +149,11 @@ def _equilibrium(model: Model, t: float, start: State, with_friction: bool) -> E
     return solve_model(model, t, start, settle="start" if with_friction else "")
 
 
-def _on_fewer(state: State, s: Floats, line: Line) -> State:
-    """The state of nodes s at those of a line that has fewer of them.  ComputationError: it folds onto itself there."""
-    found = picked(line, state, np.searchsorted(s, line.s - 1e-9 * s[-1]))
+def _on_fewer(state: State, full: Line, line: Line, ends: Ends) -> State:
+    """The state of a line at the nodes of one that has fewer.  ComputationError: it folds onto itself there."""
+    found = picked(line, state, np.searchsorted(full.s, line.s - 1e-9 * full.s[-1]))
     if found is None:
         raise ComputationError(Outcome.NOT_CONVERGED, None, 0.0, "base nodes lie at the same place in the start")
+    if line.torsion.size and not line.bits & PLANAR:
+        carry_torque(full, line, ends, state, found, np.zeros(full.s.size + 1))
     return found

@@ -54,7 +54,7 @@ class StaticCase:
             diagnostics.equilibrium(found)
             report, work = np.zeros(REPORT_SIZE), np.zeros(len(POWERS))
             diagnostics.mesh(batch_of_one(0.0, ends, found.state, report, work, model.sea.values))
-            if switching is not None:
+            if switching is not None and not model.line.torsion.size:
                 manager = switching.manager
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)

@@ -229,7 +229,7 @@ class TimeLoop:
             return
         diagnostics.follow(model)
         stop = diagnostics.outputs(batch, values)
-        if switching is not None:
+        if switching is not None and not model.line.torsion.size:
             manager = switching.manager
             diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)
         run.events.write_to(self.recorder)

@@ -16,7 +16,7 @@ from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.report import SEABED_ENERGY
-from hybrid.kernels.state import State
+from hybrid.kernels.state import State, blank_state
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model, build
 from hybrid.model.plan import parts
@@ -79,7 +79,7 @@ class Transient:
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
-        self.set_model(model, model.start)
+        self.set_model(model, blank_state(model.cells, len(model.line.torsion)))  # until `begin` or `restore`
 
     def _set_control(self, resolution: Resolution) -> None:
         """How long steps may be."""

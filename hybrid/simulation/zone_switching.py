@@ -18,7 +18,7 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
-from hybrid.kernels.zone_criteria import twist_of_rods
+from hybrid.kernels.torque_transfer import carry_torque
 from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, follow_zones
 from hybrid.kernels.zone_switch import (
     AFTER,
@@ -30,7 +30,7 @@ from hybrid.kernels.zone_switch import (
     blank_switch_job,
     end_switch,
 )
-from hybrid.kernels.zone_transfer import Transfer, blank_transfer, transfer
+from hybrid.kernels.zone_transfer import Transfer
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
 from hybrid.solve.run import CompiledRun, Tried
@@ -209,7 +209,8 @@ class ZoneSwitching:
             numbers=numbers, guided=self._guided,
         )  # fmt: skip
         begin_switch(self._switch_table.numbers)
-        self._give_twist(old, new, ends, transfer)
+        if manager.twisted and not target.bits & PLANAR:
+            carry_torque(line, target, ends, state, transfer.out, np.zeros(line.s.size + 1))
         manager.adopt_layout(new, change, t)
         self._switch_table.bind(target_zones=self.zones)
         end_switch(self._switch_table.numbers)
@@ -233,14 +234,3 @@ class ZoneSwitching:
             for k in (0, 1)
         ]
         return transfer_to(old, new, line, target, state, self._kinks, np.zeros(new.rod.size), clamps)
-
-    def _give_twist(self, old: Layout, new: Layout, ends: Ends, job: Transfer) -> None:
-        """Give a line that is rod from end to end again the twist that it has had since its ends lost each other."""
-        manager, fresh = self.manager, new.rod & ~old.rod
-        if not (manager.twisted and new.rod.all() and fresh.any()) or job.target.bits & PLANAR:
-            return
-        length = float(np.diff(new.base)[fresh].sum())
-        for _ in range(2):  # in whole turns; what is between them the clamps say
-            missing = manager.total_twist - twist_of_rods(job.target, ends.frame, job.out.e, job.out.a1)
-            job.twist[fresh] += 2.0 * np.pi * np.round(missing / (2.0 * np.pi)) / length
-            transfer(Table(blank_transfer()._replace(**job._asdict())).numbers)

@@ -290,9 +290,7 @@ def twists() -> Iterator[Case]:
         if d["part"] > 1 and turns < 3:
             continue  # short of ten λ a clamped rod bears more than Greenhill's torque
         if d["part"] > 1:
-            must, cause = "warned or refused", "unstable|torque neglected|twist from one cell to the next"
-        elif d["model"] == "adaptive":
-            must, cause = "warned", "torque neglected"
+            must, cause = "warned or refused", "unstable|twist from one cell to the next"
         if angle / n > 2.0 and d["model"] == "rod":
             must, cause = "refused", "twist from one cell to the next"
         name = told(EI=EI, L=L, turns=turns, T=f"{T:.2g}", **{"M/Greenhill": d["part"]}, n=n, axis=d["axis"])

@@ -27,7 +27,7 @@ def test_a_line_on_base_cells_is_that_of_the_material(name: str) -> None:
         rod = random.random(model.layout.rod.size) < 0.5
         layout = model.layout._replace(rod=rod, here=random.random(model.layout.starts[-1] + 1) < 0.5)
         more = model.line.bits & (SEABED | FRICTION)
-        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False, passes_torque=False)
+        same = line_on(model.cable, layout.nodes, layout.rod_cells, more, sections_turn=False)
         line = model.on_base.line(layout, same.bits)
         for field, a, b in zip(line._fields, line, same, strict=True):
             np.testing.assert_allclose(a, b, rtol=ROUND, atol=0.0, err_msg=field)
