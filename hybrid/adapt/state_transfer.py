@@ -43,8 +43,9 @@ def transfer_to(
     for k, clamp in enumerate(clamps):
         if clamp is not None:
             held[k], frames[k] = True, clamp
+    out = states(target.h.size, turn=np.zeros((len(target.torsion), 3)))
     return Transfer(
-        line, target, state, states(target.h.size, turn=np.zeros((len(target.torsion), 3))), old.places, new.places, new.base_of_cell, old.first, kinks, twist,
+        line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
         frames, held, blank_match(line.h.size, target.h.size),
     )  # fmt: skip
 
