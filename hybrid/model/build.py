@@ -7,7 +7,7 @@ lists its contents: what is on and by which key, what is off.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Literal
 
@@ -207,7 +207,7 @@ def _nodes(
         edges = {min(x, scene.length) for stretch in wanted for x in stretch} - {0.0, scene.length}
         layout = _layout(scene, cable, sorted({*cuts, *edges}), resolution)
         return layout, layout.nodes, layout.zones
-    return None, *_placed(scene, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
+    return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
 
 
 def _spare_start(scene: Scene, r: Floats, line: Line, scale: float, sea: Surroundings) -> State:
@@ -225,8 +225,9 @@ BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
 GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier run
 # Twist, rad, that a cell takes of what the ends prescribe, at fineness 1: runs to compare with have cells four times as
-# long, and must stay below the twist at which a run stops (simulation.diagnostics).
-TWIST = 0.25
+# long, and must stay below the twist at which a run stops (simulation.diagnostics).  Beyond so many cells it is left
+# to that: it is more likely that a stiffness is in another unit.
+TWIST, MOST_FOR_TWIST = 0.25, 5000
 FEWEST_CELLS = 4  # of a zone, however little is asked
 
 
@@ -241,21 +242,37 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
     return given
 
 
+def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
+    """The most (K,) rad/m by which turns, motions and moments of the ends can twist a cable that is all rod, at s."""
+    twisted = prescribed_twist(scene.ends)
+    moments = [load.value for end in scene.ends.both for load in end.loads if load.what == "moment"]
+    if scene.dimension == 2 or not (twisted or moments):
+        return np.zeros(s.size)
+    give = 1.0 / cable.B[:, 2]
+    torque = twisted / float(give @ np.diff(cable.bounds)) + sum(float(np.linalg.norm(x)) for x in moments)
+    return np.asarray(np.minimum(torque * give, MOST_FOR_TWIST * TWIST / scene.length)[cable.piece(s)])
+
+
 def _placed(
-    scene: Scene, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution, usual: int
-) -> tuple[Floats, tuple[Zone, ...]]:
+    scene: Scene, cable: Material, plans: tuple[ZonePlan, ...], cuts: Sequence[float], resolution: Resolution,
+    usual: int,
+) -> tuple[Floats, tuple[Zone, ...]]:  # fmt: skip
     """Nodes and zones; usual: cells of a line whose scene does not say."""
     mesh, free = scene.mesh, mesh_is_free(scene)
-    twisted = prescribed_twist(scene.ends) / TWIST if scene.model.kind == "rod" else 0.0  # cells, at fineness 1
+    carries = all(plan.kind == "rod" for plan in plans) and not isinstance(scene.model, AdaptiveModel)
     if free and resolution.grading is not None:
         bounds = np.concatenate([[0.0], np.cumsum([plan.length for plan in plans])])
         bounds[-1] = scene.length
         zones = tuple(Zone(plan.kind, float(a), float(b)) for plan, (a, b) in zip(plans, pairwise(bounds), strict=True))
         seen = resolution.grading
-        dense = Grading(seen.s, np.maximum(seen.density, twisted / scene.length))
+        dense = seen
+        if carries:
+            dense = replace(seen, density=np.maximum(seen.density, twist_rate(scene, cable, seen.s) / TWIST))
         return dense.nodes(sorted({*bounds.tolist(), *cuts}), resolution.fineness), zones
     if free:
-        cells = max(round(max(usual, twisted) * resolution.fineness), FEWEST_CELLS * len(plans))
+        twisted = twist_rate(scene, cable, 0.5 * (cable.bounds[1:] + cable.bounds[:-1])).max() if carries else 0.0
+        number = max(usual, twisted * scene.length / TWIST)
+        cells = max(round(number * resolution.fineness), FEWEST_CELLS * len(plans))
         return place_nodes(plans, cuts, None, None, cells)
     if mesh is not None and mesh.nodes is not None:
         s, zones = given_nodes(mesh.nodes, plans, cuts)
@@ -271,9 +288,13 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     """Base cells, all rod."""
     model = scene.model
     assert isinstance(model, AdaptiveModel)
-    base, _ = _placed(scene, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
+    base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
     middle = 0.5 * (base[:-1] + base[1:])
-    cell = rod_cells(scene, cable, middle, resolution.grading) / resolution.fineness
+    cell = rod_cells(scene, cable, middle, resolution.grading)
+    cell = (
+        np.minimum(cell, TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length))
+        / resolution.fineness
+    )
     parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(base.size - 1, bool))
 
@@ -288,7 +309,10 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
     if asked:
         return np.full(s.size, asked)
     bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(s)]
-    return np.asarray(ROD_CELL * bend if grading is None else np.minimum(grading.cell(s), GRADED_ROD_CELL * bend))
+    if grading is None:
+        return np.asarray(ROD_CELL * bend)
+    cell = np.minimum(grading.cell(s), GRADED_ROD_CELL * bend)
+    return np.asarray(cell if grading.rods is None else np.minimum(cell, np.interp(s, grading.s, grading.rods)))
 
 
 def _exact_lengths(start: State, h: Floats, stiff: np.ndarray, scene: Scene) -> None:

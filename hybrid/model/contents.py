@@ -11,7 +11,14 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import FORCES
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
-from hybrid.model.resolution import USUAL, first_resolution, mesh_is_free, requested_accuracy, wants_errors
+from hybrid.model.resolution import (
+    USUAL,
+    first_resolution,
+    mesh_is_free,
+    requested_accuracy,
+    wants_errors,
+    wants_survey,
+)
 from hybrid.model.sea import current_table
 from hybrid.model.sections import weight
 from hybrid.scene.schema import AdaptiveModel, Scene
@@ -102,11 +109,10 @@ def _accuracy(scene: Scene) -> Iterator[Entry]:
         yield Entry("steps that follow the motion", True, f"{why}; {resolution.step:.3g} s at most")
     elif time is not None:
         yield Entry("steps that follow the motion", False, "time.step fixes them")
-    graded = want is not None and mesh_is_free(scene) and time is not None
-    why = (
-        "the scene places the cells" if not mesh_is_free(scene) else "no motion" if want else "no accuracy is asked for"
-    )
-    yield Entry("cells graded by bends", graded, "accuracy; as a first, coarse run shows them" if graded else why)
+    graded = wants_survey(scene)
+    why = "no accuracy is asked for" if mesh_is_free(scene) else "the scene places the cells"
+    by = "accuracy" if scene.resolution is None else "resolution.cells_per_layer"
+    yield Entry("cells graded by bends", graded, f"{by}; as a first, coarse run shows them" if graded else why)
     wants = wants_errors(scene)
     by = "output.errors" if scene.output.errors is not None else "accuracy"
     why = f"{by}; several coarser runs beside it" if wants else "output.errors: true, or accuracy"

@@ -19,6 +19,8 @@ FEWEST = 12.0  # cells of a straight cable, at fineness 1
 # Cells to a length sqrt(EI/T) beside what disturbs a rod, and over how many such lengths: bending fades as exp(-x).
 LAYER, LAYER_WIDTH = 3.0, 2.0
 GROWTH = 0.25  # of the length of cells per length of cable: neighbours differ by about a quarter
+# Cells at a place to those in the fade length next to it, by that exponential.
+AT_PLACE = 1.0 / (LAYER_WIDTH * (1.0 - np.exp(-1.0 / LAYER_WIDTH)))
 SAMPLES = 2000  # places at which the density is known
 LEAST_PIECE = 2  # cells of a stretch between two places where a node must lie
 
@@ -29,6 +31,7 @@ class Grading:
 
     s: Floats
     density: Floats
+    rods: Floats | None = None  # (K,) m, cells of rods that come and go, at fineness 1; None: as for any cable
 
     def count(self, a: float, b: float, fineness: float) -> int:
         """Cells of the stretch [a, b]."""
@@ -55,18 +58,27 @@ class Grading:
         return np.asarray(np.interp(x, self.s, whole))
 
 
-def grading(s: Floats, curvature: Floats, fade: Floats, disturbed: Sequence[float], length: float) -> Grading:
-    """The density for a curvature (K,) 1/m found at s (K,) m.
+def layers(x: Floats, s: Floats, fade: Floats, disturbed: Sequence[float], cells: float = LAYER) -> Floats:
+    """Cells per length (M,) 1/m at x (M,) m beside what disturbs a rod, so many at the place itself to a fade length.
 
-    fade: (K,) m, sqrt(EI/T) where the cable is a rod, zero where it is not; disturbed: m, clamps, joints and point
-    loads, beside which a rod bends within that length.
+    fade: (K,) m at s (K,) m, sqrt(EI/T) where the cable is a rod, zero where it is not; disturbed: m, clamps, joints
+    and point loads, beside which a rod bends within that length.
     """
-    x = np.linspace(0.0, length, SAMPLES)
-    density = np.interp(x, s, curvature) / TURN + FEWEST / length
+    out = np.zeros(x.size)
     for place in disturbed:
         width = float(np.interp(place, s, fade))
         if width > 0.0:
-            density += LAYER / width * np.exp(-np.abs(x - place) / (LAYER_WIDTH * width))
+            out += cells / width * np.exp(-np.abs(x - place) / (LAYER_WIDTH * width))
+    return out
+
+
+def grading(s: Floats, curvature: Floats, beside: Floats, length: float) -> Grading:
+    """The density for a curvature (K,) 1/m found at s (K,) m.
+
+    beside: (SAMPLES,) 1/m, further cells at places that are evenly spread over the length.
+    """
+    x = np.linspace(0.0, length, SAMPLES)
+    density = np.interp(x, s, curvature) / TURN + FEWEST / length + beside
     cell = 1.0 / density
     step = x[1] - x[0]
     for i in range(1, SAMPLES):

@@ -27,6 +27,7 @@ DISTURBED = 4.0
 
 # Kind of the event that says what was chosen, and what it is called there.
 CHOSEN = "model chosen"
+REST = "an equilibrium of rods costs next to nothing and leaves nothing out"
 WORDS = {"rod": "rods everywhere", "catenary": "catenaries everywhere", "adaptive": "zones that move"}
 
 
@@ -55,13 +56,14 @@ class Cost(NamedTuple):
 
 
 class Demand(NamedTuple):
-    """What rods have shown of a line, at places s (K,) m: largest curvature 1/m, least and largest tension N."""
+    """What rods have shown of a line, at places s (K,) m: largest curvature 1/m, least, largest, mean tension N."""
 
     s: Floats
     curvature: Floats
     bent: Floats  # (K,) 1/N m, largest curvature over tension
     least: Floats
     largest: Floats
+    mean: Floats
 
 
 def with_model(scene: Scene, kind: str) -> Scene:

@@ -42,6 +42,8 @@ class RequestedAccuracy:
     tension: float | None
     of_end_force: float | None
     of_curvature: float | None = None  # a part of the largest
+    of_moment: float | None = None  # the same of the bending moment
+    of_tension: float | None = None  # the same of the tension along the line
     instant: bool = False  # at every output, also where a motion is irregular
 
     @property
@@ -52,8 +54,8 @@ class RequestedAccuracy:
             parts.append(f"{self.tension:.3g} N of the end forces")
         if self.of_end_force is not None:
             parts.append(f"{100 * self.of_end_force:.3g} % of the end forces")
-        if self.of_curvature is not None:
-            parts.append(f"{100 * self.of_curvature:.3g} % of the curvature")
+        along = (self.of_curvature, "curvature"), (self.of_moment, "bending moment"), (self.of_tension, "line tension")
+        parts += [f"{100 * part:.3g} % of the {name}" for part, name in along if part is not None]
         return ", ".join(parts) + ", at every instant" * self.instant
 
 
@@ -111,8 +113,12 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
     if accuracy.tension is not None:
         what, size = amount(accuracy.tension)
         tension, of_end_force = (None, size) if what == "part" else (size, None)
-    of_curvature = amount(accuracy.curvature)[1] if accuracy.curvature is not None else None
-    return RequestedAccuracy(position, tension, of_end_force, of_curvature, accuracy.instant is not None)
+    curvature, moment, line_tension = (
+        amount(x)[1] if x is not None else None
+        for x in (accuracy.curvature, accuracy.bending_moment, accuracy.line_tension)
+    )
+    instant = accuracy.instant is not None
+    return RequestedAccuracy(position, tension, of_end_force, curvature, moment, line_tension, instant)
 
 
 def is_irregular(scene: Scene) -> bool:
@@ -134,18 +140,25 @@ def mesh_is_free(scene: Scene) -> bool:
     return scene.mesh is None and not any(zone.cells or zone.ratio for zone in zones)
 
 
+def wants_survey(scene: Scene) -> bool:
+    """Whether a coarse run comes first that shows where cells should be short."""
+    return mesh_is_free(scene) and (requested_accuracy(scene) is not None or scene.resolution is not None)
+
+
 def zones_are_free(scene: Scene) -> bool:
     """Whether the program chooses the tolerance of zones."""
     return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None
 
 
-def model_is_free(scene: Scene) -> bool:
-    """Whether the program chooses the model by a pre-run: of a cable that bends, in motion, whose scene names no model.
+def model_is_free(scene: Scene, moves: bool = True) -> bool:
+    """Whether the program chooses the model of a cable that bends, whose scene names none.
+
+    moves: in motion, by a pre-run; else an equilibrium.
 
     Where the scene gives steps and asks for no accuracy, places the cells, or wants criteria as fields, zones move.
     """
     named = "model" in scene.model_fields_set or not isinstance(scene.model, AdaptiveModel)
-    wants = scene.time is not None and requested_accuracy(scene) is not None and mesh_is_free(scene)
+    wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
     return wants and not named and not scene.output.criteria and scene.solver == "elimination"
 
 
@@ -157,7 +170,8 @@ def first_resolution(scene: Scene) -> Resolution:
     if want is not None:
         tension, position = want.of_end_force or ONE, (want.position or ONE * scene.length) / scene.length
         which = [(tension, FOR_TENSION, STEP_FOR_TENSION)] if want.of_end_force or want.tension else []
-        which += [(want.of_curvature, FOR_TENSION, STEP_FOR_TENSION)] if want.of_curvature else []
+        along = (want.of_curvature, want.of_moment, want.of_tension)
+        which += [(x, FOR_TENSION, STEP_FOR_TENSION) for x in along if x]
         which += [(position, FOR_POSITION, STEP_FOR_POSITION)] if want.position else []
         part = min(x for x, _, _ in which)
         local = min(step * (x / ONE) ** 1.5 for x, _, step in which) * scene.length

@@ -20,6 +20,8 @@ UNITS = {
 _AMOUNT = re.compile(r"\s*([0-9]*\.?[0-9]+(?:[eE][-+]?[0-9]+)?)\s*(%|[a-zA-Z]+)\s*")
 # Beyond a tenth nothing is computed that deserves the name; below a millionth round-off of long runs begins to show.
 ROUGHEST, FINEST = 0.1, 1e-6
+# What may be asked as a part of its largest alone.
+ALONG = "curvature", "bending_moment", "line_tension"
 _EXAMPLES = "a part or a size, such as 1%, 3 cm or 50 N"
 
 
@@ -76,6 +78,12 @@ class Accuracy(Table):
     curvature: Amount | None = Field(
         default=None, description="of every output point: a part of the largest curvature, such as 5%"
     )
+    bending_moment: Amount | None = Field(
+        default=None, description="of every output point: a part of the largest bending moment, such as 5%"
+    )
+    line_tension: Amount | None = Field(
+        default=None, description="of the tension at every output point: a part of the largest, such as 2%"
+    )
     instant: Amount | None = Field(
         default=None,
         description="as `accuracy: 1%`, of every output also where the motion is irregular (jonswap waves, or values "
@@ -90,10 +98,13 @@ class Accuracy(Table):
             if text is not None and amount(text)[0] not in ("part", name):
                 other = f"{amount(text)[0]}: {text}"
                 found.append(Finding((name,), f"a part (%) or a size in {_units(name)}", f"write {other}"))
-        if self.curvature is not None and amount(self.curvature)[0] != "part":
-            found.append(Finding(("curvature",), "a part (%) of the largest curvature", "5%"))
-        if self.position is None and self.tension is None and self.curvature is None:
-            found.append(Finding((), "position, tension or curvature", "accuracy: 1% stands for the first two"))
+        for name in ALONG:
+            text = getattr(self, name)
+            if text is not None and amount(text)[0] != "part":
+                found.append(Finding((name,), f"a part (%) of the largest {name.replace('_', ' ')}", "5%"))
+        if all(getattr(self, name) is None for name in ("position", "tension", *ALONG)):
+            names = f"position, tension, {', '.join(ALONG[:-1])} or {ALONG[-1]}"
+            found.append(Finding((), names, "accuracy: 1% stands for the first two"))
         refuse(found)
         return self
 

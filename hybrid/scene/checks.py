@@ -22,6 +22,7 @@ from hybrid.scene.analysis import (
     Mesh,
     Model,
     Output,
+    Resolution,
     RodModel,
     RodZone,
     Time,
@@ -194,6 +195,15 @@ def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
+def _moment_is_there(accuracy: Accuracy | None, model: Model) -> Iterator[Finding]:
+    if accuracy is None or accuracy.bending_moment is None:
+        return
+    zones = model.zones if isinstance(model, ZonesModel) else ()
+    if isinstance(model, CatenaryModel) or (zones and all(isinstance(zone, CatenaryZone) for zone in zones)):
+        expected = "nothing, because a catenary (model) has no bending moment"
+        yield Finding(("accuracy", "bending_moment"), expected, "leave it out, or write `model: rod`")
+
+
 def _rod_over(cable: Cable, model: Model, i: int) -> str:
     """Which rod covers section `i`, in words; empty if none does."""
     if isinstance(model, AdaptiveModel):
@@ -242,6 +252,27 @@ def _mesh_spans(cable: Cable, mesh: Mesh | None) -> Iterator[Finding]:
             yield Finding(("mesh", "nodes", index), f"{target:.12g} m, {name}", f"{target:.12g}")
 
 
+def _layers_are_meshed(
+    resolution: Resolution | None, model: Model, mesh: Mesh | None, solver: str
+) -> Iterator[Finding]:
+    """Cells to a layer are for rods whose cells the program places."""
+    if resolution is None:
+        return
+    zones = model.zones if isinstance(model, ZonesModel) else ()
+    rods = isinstance(model, RodModel | AdaptiveModel) or any(isinstance(zone, RodZone) for zone in zones)
+    why = ""
+    if solver == "shooting":
+        why = "shooting (solver) places no cells by layers"
+    elif mesh is not None or any(zone.cells or zone.ratio for zone in zones):
+        why = f"{'mesh' if mesh is not None else 'model.zones'} already says where the cells are"
+    elif isinstance(model, AdaptiveModel) and model.rod_cell is not None:
+        why = "model.rod_cell already says how long the cells of rods are"
+    elif not rods:
+        why = "no part of the cable is a rod (model), and bending fades in rods alone"
+    if why:
+        yield Finding(("resolution", "cells_per_layer"), f"nothing, because {why}", "leave out the one or the other")
+
+
 def _output_on_cable(cable: Cable, output: Output) -> Iterator[Finding]:
     length = cable.length
     for key in ("points", "history"):
@@ -279,9 +310,11 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _arbiter_steps,
     _tolerance_is_felt,
     _accuracy_has_errors,
+    _moment_is_there,
     _sections_that_come_and_go,
     _in_a_plane,
     _turns_are_held,
     _mesh_spans,
+    _layers_are_meshed,
     _output_on_cable,
 )

@@ -26,6 +26,7 @@ from hybrid.scene.analysis import (
     Model,
     Output,
     Points,
+    Resolution,
     RodModel,
     RodZone,
     Straight,
@@ -58,8 +59,8 @@ __all__ = [
     "CorrectedModel", "CorrectedZone", "Current", "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends",
     "Environment", "Equilibrium", "Float", "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial",
     "JonswapWaves", "Load", "Mesh", "Model", "Modules", "Motion", "Output", "Pinned", "Points", "PowerLawCurrent",
-    "RegularWaves", "RodModel", "RodZone", "Scene", "Seabed", "Section", "Straight", "Table", "Time", "Travel",
-    "UniformCurrent", "Vector", "Waves", "ZonesModel", "missing_time",
+    "RegularWaves", "Resolution", "RodModel", "RodZone", "Scene", "Seabed", "Section", "Straight", "Table", "Time",
+    "Travel", "UniformCurrent", "Vector", "Waves", "ZonesModel", "missing_time",
 ]  # fmt: skip
 
 
@@ -78,6 +79,9 @@ class Scene(Table):
         "adaptive (rod, if it bends differently in two directions or has a rotary_inertia); of others catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the cable is cut into cells; absent: chosen")
+    resolution: Resolution | None = Field(
+        default=None, description="how fine the mesh is that is chosen; absent: what accuracy asks for"
+    )
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     output: Output = Field(default=Output(), description="what is kept")
     accuracy: AskedAccuracy | None = Field(

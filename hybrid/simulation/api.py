@@ -14,13 +14,12 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
-from hybrid.model.model_costs import NAMED, ModelChoice, with_model
+from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
@@ -29,6 +28,7 @@ from hybrid.model.resolution import (
     model_is_free,
     requested_accuracy,
     wants_errors,
+    wants_survey,
     zones_are_free,
 )
 from hybrid.scene.motion_checks import check_motions
@@ -39,7 +39,7 @@ from hybrid.simulation.error_control import ErrorController, comparison_resoluti
 from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.first_use import compile_beside
 from hybrid.simulation.mesh_survey import survey_resolution
-from hybrid.simulation.model_choice import choose_model, rods_instead
+from hybrid.simulation.model_choice import choose_model, rods_instead, surveyed
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.restart import RemainingRun, remaining_run
@@ -114,12 +114,14 @@ def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: boo
     case, begin = StaticCase(scene), clock.process_time()
     target, resolution = _target(output, overwrite), first_resolution(scene)
     with locked(_path(output)):
+        choice, resolution = _surveyed_at_rest(case, resolution)
+        scene = case.scene
         if not wants_errors(scene):
             case.record(resolution, target)
             return written_result(target)
         compute = _replacing(target, case.record, case.record)
         free = _free(scene)._replace(steps=False)
-        control = ErrorController(requested_accuracy(scene), free, False, case.sample, compute)
+        control = ErrorController(requested_accuracy(scene), free, False, case.sample, compute, choice=choice)
         result, errors = control.start(resolution)
         write_errors(target, scene, control, result, errors, clock.process_time() - begin)
     return written_result(target)
@@ -186,7 +188,7 @@ def _compute(
 
     resolution = first_resolution(case.scene) if remaining is None else remaining.resolution
     if not wants_errors(case.scene):
-        first(resolution, target)
+        first(_surveyed(case, resolution)[1] if remaining is None else resolution, target)
         return
     kept = False
     case.beside_result = target if isinstance(target, Path) else None
@@ -245,12 +247,21 @@ def _controller(case: Case, compute: Callable[[Resolution], RunSample], choice: 
 
 def _surveyed(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
     """The model, if the scene names none, and cells by a pre-run, if an accuracy is asked for."""
-    surveys = requested_accuracy(case.scene) is not None and mesh_is_free(case.scene)
+    surveys = wants_survey(case.scene)
     _expect(case, resolution, surveys)
     if surveys and case.criterion is None and model_is_free(case.scene):
-        choice, grading = choose_model(case, resolution)
-        return choice, replace(resolution, grading=grading)
-    return NAMED, replace(resolution, grading=case.grading(resolution)) if surveys else resolution
+        return choose_model(case, resolution)
+    return NAMED, surveyed(case, resolution) if surveys else resolution
+
+
+def _surveyed_at_rest(case: StaticCase, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
+    """The same of an equilibrium, whose model is rods where the scene names none and asks for an accuracy."""
+    if not wants_survey(case.scene):
+        return NAMED, resolution
+    choice = NAMED
+    if model_is_free(case.scene, moves=False):
+        choice, case.scene = ModelChoice("rod", REST), with_model(case.scene, "rod")
+    return choice, surveyed(case, resolution)
 
 
 def _free(scene: Scene) -> Free:

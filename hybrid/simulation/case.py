@@ -17,11 +17,10 @@ from hybrid.errors import OTHER_PROGRAM, ComputationError, ResultError
 from hybrid.kernels.books import OUTPUT
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
-from hybrid.model.build import Model, build, rod_cells
-from hybrid.model.mesh_grading import Grading
+from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free, requested_accuracy, wants_errors
+from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
@@ -43,7 +42,7 @@ from hybrid.simulation.run_sample import (
     NOT_ESTIMATED,
     Notes,
     RunSample,
-    catenary_length,
+    catenary_share,
     compared_cells,
     rows_key,
     split_outputs,
@@ -245,7 +244,7 @@ class Case:
                 if resolution.local is not None:
                     notes = damped_vibrations(result)
                 if run.switching is not None:
-                    catenary = np.array([catenary_length(x) for x in result.zones])
+                    catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
             resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes, forces=forces,
             catenary=catenary,
@@ -306,24 +305,20 @@ class Case:
         )
 
     def survey(self, resolution: Resolution) -> Survey | None:
-        """A coarse run that shows where cells should be short; None: it failed."""
+        """A coarse run that shows where cells should be short; None: it failed.
+
+        ComputationError: it failed in steps as short as those of the result too, and the scene gives cells to a layer.
+        """
         coarse = survey_resolution(resolution)
-        model = build(self.scene, coarse)
-        s = np.linspace(0.0, model.length, POINTS)
+        s = np.linspace(0.0, self.scene.length, POINTS)
         try:
             found = self.sample(coarse, s).values
         except ComputationError:
-            return None
-        return Survey.of(model, s, {name: np.asarray(x) for name, x in found.items()})
-
-    def grading(self, resolution: Resolution) -> Grading | None:
-        """Where cells should be short; None: the pre-run that would show it failed, or the scene says where they go."""
-        found = self.survey(resolution) if mesh_is_free(self.scene) else None
-        if found is None:
-            return None
-        if found.model.layout is None:
-            return found.grading()
-        return found.grading_of_moving_zones(rod_cells(self.scene, found.model.cable, found.demand.s))
+            if self.scene.resolution is None:
+                return None
+            coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
+            found = self.sample(coarse, s).values
+        return Survey.of(self.scene, resolution, build(self.scene, coarse), s, found)
 
     # --- parts of a run -------------------------------------------------------------------------
 

@@ -37,6 +37,9 @@ STALLED = 0.8
 MOST_CPU = 600.0
 # Refinements that may follow the first result.
 MOST_REFINEMENTS = 3
+# The same of an equilibrium, which takes milliseconds, and until when: s.  Its errors need not fall evenly: cells lie
+# now so, now otherwise beside an edge of contact.
+REFINEMENTS_AT_REST, CPU_AT_REST = 6, 5.0
 # The same of an irregular motion, and how much finer it may be: chance is soon more than cells and steps are.
 IRREGULAR_REFINEMENTS, IRREGULAR_FINER = 1, 2.0
 # Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
@@ -139,17 +142,13 @@ class ErrorController:
                 if self.estimate is None:
                     raise
                 return self.without_refinement(f"a finer run failed: {str(error).splitlines()[0]}")
-            stricter = False
-            if self.estimate is not None:
-                stricter = resolution.zones < self.estimate.run.resolution.zones
-                self.estimate.update(result)
-                if self.statistics:
-                    found = statistics_of(result, self._every)
-                    for name, estimate in self.statistics.items():
-                        estimate.update(found[name])
-            elif not self._first_estimate(result):
-                return result, None
-            if self.estimate is not None and (stricter or self.estimate.lacks_model_errors()):
+            if self.estimate is None:
+                if not self._first_estimate(result):
+                    return result, None
+            else:
+                self._next_estimate(self.estimate, resolution, result)
+            assert self.estimate is not None
+            if self.estimate.lacks_model_errors():
                 self._renew_model_errors(self.estimate, resolution)
             self.next = self._next_resolution()
         assert self.estimate is not None
@@ -236,6 +235,21 @@ class ErrorController:
         self.estimate, self.comparisons = estimate, None
         return True
 
+    def _next_estimate(self, estimate: Estimate, resolution: Resolution, result: RunSample) -> None:
+        """Take over a finer result; where its zones are others, runs to compare with are computed anew."""
+        stricter = resolution.zones < estimate.run.resolution.zones
+        if stricter and estimate.differs_in_zones(result):
+            self.comparisons = self._compute_comparisons(resolution)
+            if self.comparisons is not None and self._first_estimate(result):
+                return
+        estimate.update(result)
+        if self.statistics:
+            found = statistics_of(result, self._every)
+            for name, of_statistic in self.statistics.items():
+                of_statistic.update(found[name])
+        if stricter:
+            self._renew_model_errors(estimate, resolution)
+
     def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:
         """Estimate the errors of extremes and standard deviations, by the outputs that all runs have."""
         if not self.moves or not (self.irregular or (self.asked is not None and not self.asked.instant)):
@@ -270,14 +284,20 @@ class ErrorController:
             verdict, before = self._verdict(self.asked), np.inf
         self._ratio, falls = verdict.ratio, verdict.ratio / before  # 0 for the first
         self._judged += 1
-        left = (IRREGULAR_REFINEMENTS if self.irregular else MOST_REFINEMENTS) + 1 - self._judged
-        hopeless = left <= 0 or falls > STALLED or verdict.ratio * falls**left > 1.0
+        most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
+        left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
+        stalls = falls > STALLED or verdict.ratio * falls**left > 1.0
+        hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
         met = verdict.ratio <= 1.0 and not (run.unresolved and self.free.mesh)
         if met or hopeless or sum(self.runs) > MOST_CPU:
             return None
         if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
             return refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
-        return refined(run.resolution, verdict, self.free)
+        found = refined(run.resolution, verdict, self.free)
+        if found is None or self.moves or found.fineness == run.resolution.fineness:
+            return found
+        # cells that are hardly shorter lie otherwise beside edges of contact: their change says little of what is left
+        return replace(found, fineness=max(found.fineness, COARSER * run.resolution.fineness))
 
     def _leaves_out(self, verdict: Verdict, falls: float) -> bool:
         """Whether what misses does not converge, and is not judged from now on: every instant, then a largest force."""

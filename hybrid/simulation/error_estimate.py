@@ -163,6 +163,12 @@ class Estimate:
         self._model_every = coarse.every
         self._model_of = coarse.cells, coarse.every, coarse.catenary
 
+    def differs_in_zones(self, result: RunSample) -> bool:
+        """Whether a finer result has other zones than this one by more than OTHER_ZONES of its catenaries or rods."""
+        before, after = self.run.catenary, result.catenary
+        most = OTHER_ZONES * np.minimum(before, 1.0 - before)
+        return before.size == after.size and bool((np.abs(before - after) > most).any())
+
     def lacks_model_errors(self) -> bool:
         """Whether zones of the result have moved otherwise than those of the run that its model error is known by, or
 

@@ -2,26 +2,52 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from hybrid.kernels.state import Floats
-from hybrid.model.build import Model
-from hybrid.model.mesh_grading import Grading, grading
+from hybrid.model.build import Model, rod_cells
+from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
-from hybrid.model.resolution import Resolution
+from hybrid.model.resolution import RequestedAccuracy, Resolution, requested_accuracy, zones_are_free
+from hybrid.scene.schema import AdaptiveModel, Scene
+from hybrid.simulation.run_sample import Outputs
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
 CELLS, STEPS, POINTS = 2.0, 4.0, 201
 # Rod cells in a base cell of zones that move.
 MOST_PARTS = 24.0
+# Share of an error of curvature, moment or tension along the line that zones may make.
+OF_ALONG = 0.5
 
 
 def survey_resolution(resolution: Resolution) -> Resolution:
     """How finely the pre-run is computed."""
     return resolution.coarser(CELLS, STEPS)
+
+
+def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> Resolution:
+    """With cells where a pre-run shows that they should be, and zones as it shows that curvature needs them."""
+    if survey is None:
+        return resolution
+    zones = resolution.zones
+    if zones_are_free(scene):
+        zones = min(zones, allowed(scene, survey) / scene.length)
+    return replace(resolution, grading=survey.grading_for(scene), zones=zones)
+
+
+def allowed(scene: Scene, survey: Survey) -> float:
+    """Error of position, m, up to which zones may leave bending out, by what a scene asks of values along the line."""
+    asked = requested_accuracy(scene)
+    return survey.tolerance(asked) if asked is not None else np.inf
+
+
+def asks_along(scene: Scene) -> bool:
+    """Whether curvature, moment or tension along the line is asked."""
+    asked = requested_accuracy(scene)
+    return asked is not None and any((asked.of_curvature, asked.of_moment, asked.of_tension))
 
 
 @dataclass(frozen=True)
@@ -30,34 +56,106 @@ class Survey:
 
     model: Model
     demand: Demand
+    given: float | None  # cells to a length sqrt(EI/T), at fineness 1, where the scene says
+    along: bool  # whether curvature, moment or tension along the line is asked
 
     @classmethod
-    def of(cls, model: Model, s: Floats, run: Mapping[str, np.ndarray]) -> Survey:
-        """From curvature and tension (nt, K) of a run at s (K,) m."""
-        curvature, tension = run["curvature"], run["tension"]
+    def of(cls, scene: Scene, resolution: Resolution, model: Model, s: Floats, run: Mapping[str, Outputs]) -> Survey:
+        """From curvature and tension (nt, K) of a run at s (K,) m; resolution: of the result that comes first."""
+        curvature, tension = np.asarray(run["curvature"]), np.asarray(run["tension"])
         low = np.maximum(tension, 1e-9 * model.tension_scale)
-        found = curvature.max(axis=0), (curvature / low).max(axis=0), tension.min(axis=0), tension.max(axis=0)
-        return cls(model, Demand(s, *found))
+        ends = tension.min(axis=0), tension.max(axis=0), tension.mean(axis=0)
+        given = None
+        if scene.resolution is not None:
+            given = AT_PLACE * scene.resolution.cells_per_layer / resolution.fineness
+        demand = Demand(s, curvature.max(axis=0), (curvature / low).max(axis=0), *ends)
+        return cls(model, demand, given, asks_along(scene))
+
+    def _layers(self, rod: np.ndarray, joints: Sequence[float]) -> Floats:
+        """Cells (SAMPLES,) 1/m beside what disturbs rods; rod: (K,) where the line is one; joints: m."""
+        model, demand, material = self.model, self.demand, self.model.cable
+        low = np.maximum(demand.least if self.given is None else demand.mean, 1e-3 * model.tension_scale)
+        fade = np.where(rod, np.sqrt(material.weakest_bending[material.piece(demand.s)] / low), 0.0)
+        disturbed = [*joints, *model.attached]
+        disturbed += [x for x, held in zip((0.0, model.length), material.held_tangent, strict=True) if held]
+        x = np.linspace(0.0, model.length, SAMPLES)
+        found = layers(x, demand.s, fade, disturbed, LAYER if self.given is None else self.given)
+        if self.along:  # as short where curvature changes within such a length, as where contact begins
+            part = np.sqrt(self._jumps() / demand.curvature.max(initial=1e-300))
+            found = found + np.interp(x, demand.s, LAYER * part / np.maximum(fade, self._reach))
+        return found
+
+    @property
+    def _square(self) -> Floats:
+        """EI/T (K,) m2, the square of the length over which bending fades."""
+        low = np.maximum(self.demand.least, 1e-3 * self.model.tension_scale)
+        return np.asarray(self.model.cable.mean_bending[self.model.cable.piece(self.demand.s)] / low)
+
+    @property
+    def _reach(self) -> Floats:
+        """Its root (K,) m, or what the pre-run can show."""
+        return np.maximum(np.sqrt(self._square), 2.0 * self.model.length / (self.demand.s.size - 1))
+
+    def _beside(self) -> tuple[Floats, Floats]:
+        """Curvature (K,) 1/m at this distance before and after every place."""
+        s, reach = self.demand.s, self._reach
+        before, after = (np.interp(s + x, s, self.demand.curvature) for x in (-reach, reach))
+        return before, after
+
+    def _jumps(self) -> Floats:
+        """By how much curvature (K,) 1/m bends over that distance: what a catenary lacks of it, about."""
+        before, after = self._beside()
+        return np.asarray(np.abs(before - 2.0 * self.demand.curvature + after) * self._smeared)
+
+    @property
+    def _smeared(self) -> Floats:
+        """How much sharper a bend of that length is than cells of the pre-run show (K,)."""
+        line = self.model.line
+        cell = np.interp(self.demand.s, 0.5 * (line.s[1:] + line.s[:-1]), line.h)
+        return np.maximum(1.0, 0.5 * cell / np.sqrt(np.maximum(self._square, 1e-300)))
+
+    def tolerance(self, asked: RequestedAccuracy) -> float:
+        """Error of position, m, up to which zones may leave bending out for what is asked of values along the line.
+
+        A catenary lacks what curvature changes by within sqrt(EI/T), and has EI curvature^2/2 of tension too much.
+        Where this is more than a share of what is asked the line must be rod; infinite where it is so nowhere.
+        """
+        demand, must = self.demand, np.zeros(self.demand.s.size, bool)
+        sharpest = np.maximum(demand.curvature, np.maximum(*self._beside())) + self._jumps() * (
+            1.0 - 1.0 / self._smeared
+        )
+        parts = [x for x in (asked.of_curvature, asked.of_moment) if x]
+        if parts:
+            must |= self._jumps() > OF_ALONG * min(parts) * demand.curvature.max()
+        if asked.of_tension:
+            less = 0.5 * self._square * demand.least * sharpest**2
+            must |= less > OF_ALONG * asked.of_tension * demand.largest.max()
+        return float(np.min(OF_ALONG * (self._square * sharpest)[must], initial=np.inf))
+
+    def grading_for(self, scene: Scene) -> Grading:
+        """Cells for the model of a scene; the pre-run was of that model, or of rods."""
+        if not isinstance(scene.model, AdaptiveModel):
+            return self.grading()
+        return self.grading_of_moving_zones(rod_cells(scene, self.model.cable, self.demand.s))
 
     def grading(self) -> Grading:
         """Cells of a line whose zones stay what they are, those of the pre-run."""
         model, demand = self.model, self.demand
         middle = 0.5 * (model.line.s[:-1] + model.line.s[1:])
         rod = np.interp(demand.s, middle, model.line.spin.astype(float)) > 0.5
-        low = np.maximum(demand.least, 1e-3 * model.tension_scale)
-        material = model.cable
-        fade = np.where(rod, np.sqrt(material.weakest_bending[material.piece(demand.s)] / low), 0.0)
-        disturbed = [z.s_b for z in model.zones[:-1]] + list(model.attached)
-        disturbed += [x for x, held in zip((0.0, model.length), material.held_tangent, strict=True) if held]
-        return grading(demand.s, demand.curvature, fade, disturbed, model.length)
+        beside = self._layers(rod, [z.s_b for z in model.zones[:-1]])
+        return grading(demand.s, demand.curvature, beside, model.length)
 
     def grading_of_catenary(self) -> Grading:
         """Cells of a line that is catenary everywhere."""
-        demand = self.demand
-        return grading(demand.s, demand.curvature, np.zeros(demand.s.size), [], self.model.length)
+        return grading(self.demand.s, self.demand.curvature, np.zeros(SAMPLES), self.model.length)
 
     def grading_of_moving_zones(self, rod_cell: Floats) -> Grading:
         """Base cells of a line whose zones move; rod_cell: (K,) m, length of the cells of its rods."""
         found = self.grading_of_catenary()
-        most = MOST_PARTS * np.interp(found.s, self.demand.s, rod_cell)
-        return replace(found, density=np.maximum(found.density, 1.0 / most))
+        rods = np.interp(found.s, self.demand.s, rod_cell)
+        exact = self.given is not None or self.along
+        if exact:
+            rods = 1.0 / (1.0 / rods + self._layers(np.ones(self.demand.s.size, bool), []))
+        density = np.maximum(found.density, 1.0 / (MOST_PARTS * rods))
+        return replace(found, density=density, rods=rods if exact else None)

@@ -24,21 +24,25 @@ from hybrid.model.model_costs import (
     with_model,
 )
 from hybrid.model.resolution import Resolution
+from hybrid.scene.schema import AdaptiveModel
 from hybrid.simulation.case import Case
 from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.mesh_survey import allowed, asks_along, with_survey
+from hybrid.simulation.static_case import StaticCase
 
 
-def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Grading | None]:
-    """Give the scene of a case the model that costs least; where its cells should be short, None: not known."""
+def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resolution]:
+    """Give the scene of a case the model that costs least; with cells, and zones, as a pre-run of rods asks for."""
     scene = case.scene
     case.scene = with_model(scene, "rod")
     survey = case.survey(resolution)
     if survey is None:
-        return ModelChoice("rod", "the pre-run that would show what others cost failed"), None
+        return ModelChoice("rod", "the pre-run that would show what others cost failed"), resolution
+    resolution = replace(resolution, zones=min(resolution.zones, allowed(scene, survey) / scene.length))
     model, demand = survey.model, survey.demand
     moving = with_model(scene, "adaptive")
     bend = rod_cells(moving, model.cable, demand.s)
-    gradings = {
+    gradings: dict[str, Grading] = {
         "rod": survey.grading(),
         "catenary": survey.grading_of_catenary(),
         "adaptive": survey.grading_of_moving_zones(bend),
@@ -55,7 +59,19 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Gradi
     if kind != "rod":
         case.scene = with_model(scene, kind)
         compile_beside(case.scene)
-    return ModelChoice(kind, reasons(each)), gradings[kind]
+    return ModelChoice(kind, reasons(each)), replace(resolution, grading=gradings[kind])
+
+
+def surveyed(case: Case | StaticCase, resolution: Resolution) -> Resolution:
+    """With cells, and zones, as a pre-run asks for: of rods, which alone show what zones would leave out of a bend."""
+    scene = case.scene
+    if isinstance(scene.model, AdaptiveModel) and asks_along(scene):
+        case.scene = with_model(scene, "rod")
+    try:
+        survey = case.survey(resolution)
+    finally:
+        case.scene = scene
+    return with_survey(resolution, scene, survey)
 
 
 def rods_instead(case: Case, resolution: Resolution, why: str) -> tuple[ModelChoice, Resolution]:

@@ -10,7 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.model.resolution import RequestedAccuracy, Resolution
-from hybrid.scene.accuracy import ROUGHEST
+from hybrid.outputs.probes import SIDED_ERRORS as RIGHT_OF
+from hybrid.scene.accuracy import ALONG, ROUGHEST
 from hybrid.simulation.error_estimate import Errors
 from hybrid.simulation.run_sample import END_FORCES, RunSample
 
@@ -59,33 +60,43 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
             bounds.append((name, "N", asked.tension, None))
         if asked.of_end_force is not None:
             bounds.append((name, "N", asked.of_end_force * run.largest_end_force, run.largest_end_force))
-    if asked.of_curvature is not None and "curvature" in run.values:
-        sharpest = float(np.asarray(run.values["curvature"]).max())
-        bounds.append(("curvature", "1/m", asked.of_curvature * sharpest, sharpest))
+    for name, unit, part in (
+        ("curvature", "1/m", asked.of_curvature), ("bending_moment", "N m", asked.of_moment),
+        ("tension", "N", asked.of_tension),
+    ):  # fmt: skip
+        if part is not None and name in run.values:
+            largest = float(np.asarray(run.values[name]).max())
+            bounds.append((name, unit, part * largest, largest))
     worst, reached = Verdict(0.0, 0.0, 0.0, 0.0, "nothing is asked"), dict[str, tuple[float, str]]()
     for name, unit, bound, most in bounds:
         if bound <= 0.0 or name in skip:
             continue
-        total = errors.largest("total", name)
-        key = {"position": "position", "curvature": "curvature"}.get(name, "tension")
+        total = _largest(errors, "total", name)
+        key = "tension" if name in END_FORCES.values() else "line_tension" if name == "tension" else name
         if total > max(bound, reached.get(key, (0.0, ""))[0]):
             reached[key] = total, _reached(key, unit, total, most)
         if total / bound >= worst.ratio:
-            model = errors.largest("model", name)
-            mesh, time = (errors.largest(cause, name) / bound for cause in ("mesh", "time"))
-            quantity = name.replace("end_force_", "force at the ")
+            model = _largest(errors, "model", name)
+            mesh, time = (_largest(errors, cause, name) / bound for cause in ("mesh", "time"))
+            quantity = name.replace("end_force_", "force at the ").replace("_", " ")
             text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text, name=name)
     return replace(worst, reached=", ".join(text for _, text in reached.values()))
 
 
+def _largest(errors: Errors, cause: str, name: str) -> float:
+    """Largest error of a quantity on either side of points where it has two values."""
+    sides = (name, f"right_{name}") if name in RIGHT_OF else (name,)
+    return max(errors.largest(cause, side) for side in sides)
+
+
 def _reached(key: str, unit: str, total: float, most: float | None) -> str:
     """An accuracy that an error of `total` meets, with a tenth to spare; most: that of which a part is asked."""
     amount = 1.1 * total
-    if most is not None and (amount <= ROUGHEST * most or key == "curvature"):
+    if most is not None and (amount <= ROUGHEST * most or key in ALONG):
         amount, unit = 100.0 * amount / most, "%"
         if amount > 100.0 * ROUGHEST:
-            return f"curvature: none, its error is {100.0 * total / most:.2g}%"
+            return f"{key}: none, its error is {100.0 * total / most:.2g}%"
     digit = 10.0 ** (floor(log10(amount)) - 1) if amount > 0.0 else 1.0
     return f"{key}: {ceil(amount / digit) * digit:.6g} {unit}".replace(" %", "%")
 

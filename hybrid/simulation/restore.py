@@ -72,7 +72,7 @@ def resolution_tree(resolution: Resolution) -> Tree:
     """An resolution for a checkpoint."""
     tree = {x.name: getattr(resolution, x.name) for x in fields(resolution)}
     grading = resolution.grading
-    return tree | {"grading": grading and {"s": grading.s, "density": grading.density}}
+    return tree | {"grading": grading and vars(grading)}
 
 
 def resolution_from(tree: Any, scene: Scene) -> Resolution:
@@ -87,10 +87,15 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
             raise ValueError(f"{name} = {is_:g}, where the scene asks for {asked:g}")
     grading = saved["grading"]
     if grading is not None:
-        grading = Grading(**matched(grading, {"s": np.zeros(0), "density": np.zeros(0)}, "grading"))
+        template = {"s": np.zeros(0), "density": np.zeros(0)}
+        if grading.get("rods") is not None:
+            template["rods"] = np.zeros(0)
+        grading = Grading(**matched({k: x for k, x in grading.items() if x is not None}, template, "grading"))
         s, density = grading.s, grading.density
         ordered = s.ndim == density.ndim == 1 and 1 < s.size == density.size and bool((np.diff(s) > 0.0).all())
         within = ordered and 0.0 <= s[0] < s[-1] <= scene.length * (1 + 1e-9) and density.min() > 0.0
+        if grading.rods is not None and not (grading.rods.shape == s.shape and grading.rods.min() > 0.0):
+            raise ValueError("cells of rods that no mesh has")
         if not within or saved["fineness"] * density.max() * scene.length > MOST_CELLS:
             raise ValueError("cells that no mesh has")
     if not (saved["fineness"] * 100 <= MOST_CELLS and 1 <= saved["every"] <= FARTHEST):

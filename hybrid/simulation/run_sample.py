@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, fields
 from pathlib import Path
 from typing import Any
@@ -51,7 +51,7 @@ class RunSample:
     notes: Notes = ()  # that the result should carry
     rows: Tree = field(default_factory=dict)  # what store.stored_rows keeps of the outputs; {}: they are in memory
     forces: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))  # of all steps: s; N, at start and end
-    catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) m at outputs, of zones that move
+    catenary: np.ndarray = field(default_factory=lambda: np.zeros(0))  # (nt,) part of the line, of zones that move
 
     def some(self, name: str, numbers: np.ndarray) -> np.ndarray:
         """The values of an output with these numbers, which increase."""
@@ -77,9 +77,9 @@ def compared_cells(model: Model) -> int:
     return model.cells if model.layout is None else int(model.layout.rod.size)
 
 
-def catenary_length(zones: Iterable[Zone | ZoneRow]) -> float:
-    """How much of a line is catenary, m."""
-    return float(sum(zone.s_b - zone.s_a for zone in zones if zone.kind == "catenary"))
+def catenary_share(zones: Sequence[Zone | ZoneRow]) -> float:
+    """Part of a line that is catenary."""
+    return float(sum(zone.s_b - zone.s_a for zone in zones if zone.kind == "catenary") / zones[-1].s_b)
 
 
 def every_of(count: int, step: int) -> np.ndarray:
@@ -107,8 +107,8 @@ def restored_sample(tree: Any, scene: Scene, shape: tuple[int, int, int], result
     saved = matched(older | tree, blank | free, "run")
     if saved["forces"].ndim != 2 or saved["forces"].shape[1] != 3 or not np.isfinite(saved["forces"]).all():
         raise ValueError("forces of steps that no run has")
-    if not (saved["catenary"].ndim == 1 and (saved["catenary"] >= 0.0).all()):
-        raise ValueError("lengths of catenary that no run has")
+    if not (saved["catenary"].ndim == 1 and (abs(saved["catenary"] - 0.5) <= 0.5).all()):
+        raise ValueError("a part of a line that no run has")
     resolution = resolution_from(saved["resolution"], scene)
     if saved["rows"] and result is not None:
         found = rows_from(saved["rows"], rows_path(result, rows_key(resolution)))

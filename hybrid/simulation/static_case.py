@@ -13,7 +13,7 @@ from hybrid.errors import ComputationError
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.seabed import stored
-from hybrid.kernels.state import batch_of_one
+from hybrid.kernels.state import Floats, batch_of_one
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
@@ -27,8 +27,9 @@ from hybrid.simulation.envelope import Envelope, of_equilibrium
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution
 from hybrid.simulation.result_file import result_recorder
-from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_length, compared_cells
+from hybrid.simulation.run_sample import COMPARED, MODEL_ERRORS, RunSample, catenary_share, compared_cells
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import POWERS
@@ -78,6 +79,23 @@ class StaticCase:
         values = _values(model, found, self._observer(model, COMPARED))
         return _sample(resolution, model, values, clock.process_time() - begin)
 
+    def survey(self, resolution: Resolution) -> Survey | None:
+        """A coarse equilibrium that shows where cells should be short; None: there is none.
+
+        ComputationError: there is none, and the scene gives cells to a layer.
+        """
+        coarse = survey_resolution(resolution)
+        s = np.linspace(0.0, self.scene.length, POINTS)
+        try:
+            model, found, _ = self._equilibrium(coarse)
+        except ComputationError:
+            if self.scene.resolution is not None:
+                raise
+            return None
+        values = _values(model, found, self._observer(model, COMPARED, s))
+        run = {name: np.asarray(values[name])[None] for name in ("curvature", "tension")}
+        return Survey.of(self.scene, resolution, model, s, run)
+
     def _equilibrium(self, resolution: Resolution) -> tuple[Model, Equilibrium, ZoneSwitching | None]:
         model = build(self.scene, resolution)
         if model.layout is None:
@@ -86,8 +104,10 @@ class StaticCase:
         assert found is not None
         return model, found, switching
 
-    def _observer(self, model: Model, only: Sequence[str] | None = None) -> Observer:
-        s, jumps = output_points(self.scene)
+    def _observer(self, model: Model, only: Sequence[str] | None = None, at: Floats | None = None) -> Observer:
+        """at: places, m, instead of the output points."""
+        points, jumps = output_points(self.scene)
+        s = points if at is None else at
         errors = model.follows_error and wants_errors(self.scene)
         return Observer(
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
@@ -113,5 +133,5 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
 def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:
     kept = {name: np.array(values[name])[None] for name in COMPARED if name in values}
     left = {k.removeprefix(MODEL_ERRORS): np.array(x)[None] for k, x in values.items() if k.startswith(MODEL_ERRORS)}
-    catenary = np.array([catenary_length(model.zones)]) if model.layout is not None else np.zeros(0)
+    catenary = np.array([catenary_share(model.zones)]) if model.layout is not None else np.zeros(0)
     return RunSample(resolution, kept, compared_cells(model), 1, cpu, 1, False, left, catenary=catenary)

@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.adapt.user_criterion import UserCriterion
-from hybrid.errors import ComputationError, SceneError
+from hybrid.errors import Complaint, ComputationError, SceneError
 from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
@@ -82,6 +82,10 @@ class Simulation:
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])
         check_motions(self.scene)
+        if self.scene.resolution is not None:
+            expected = "nothing, because a cable that is stepped from outside has no coarse run that shows its layers"
+            given = f"{self.scene.resolution.cells_per_layer:g}"
+            raise SceneError([Complaint("resolution.cells_per_layer", given, expected, "place cells by `mesh`")])
         self._target: Path | io.BytesIO = io.BytesIO()
         if output is not None:
             self._target = Path(output).expanduser().resolve()

@@ -39,7 +39,8 @@ class MemoryRecorder:
             if not finite.all():
                 raise ResultError(f"{name} is not finite at t = {times[np.argmin(finite)]:.9g} s")
         self.times += times.tolist()
-        self._catenary += [sum((b - a for kind, a, b in zones if kind == "catenary"), 0.0)] * len(times)
+        share = sum((b - a for kind, a, b in zones if kind == "catenary"), 0.0) / zones[-1][2] if zones else 0.0
+        self._catenary += [share] * len(times)
         self._keep(values)
 
     def _keep(self, values: Mapping[str, np.ndarray]) -> None:
@@ -60,7 +61,7 @@ class MemoryRecorder:
 
     @property
     def catenary(self) -> np.ndarray:
-        """(nt,) m of the line that were catenary at the outputs."""
+        """(nt,) part of the line that was catenary at the outputs."""
         return np.array(self._catenary)
 
     def event(self, t: float, s_a: float, s_b: float, kind: str, text: str, **more: Any) -> None:

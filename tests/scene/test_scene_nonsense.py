@@ -26,13 +26,15 @@ ADAPTIVE = (
         "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
         "force_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
     )
-    + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%}\n"
+    + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%, "
+    "bending_moment: 5%, line_tension: 2%}\n"
 )
 CORRECTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0}]}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: zones, zones: [{corrected: 4.0}, {rod: 6.0}]}
+resolution: {cells_per_layer: 4.0}
 """
 TWISTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]}
@@ -102,7 +104,7 @@ LISTABLE = {"surge", "sway", "heave", "roll", "pitch", "yaw"}
 
 REQUIRED = {
     "length", "mass", "kind", "amplitude", "period", "density", "duration", "rod", "catenary", "z",
-    "at", "over", "range", "significant_height", "peak_period", "stiffness",
+    "at", "over", "cells_per_layer", "range", "significant_height", "peak_period", "stiffness",
 }  # fmt: skip
 WORDS = {"title", "kind", "slack", "guess", "solver", "follow", "dimension"}
 

@@ -9,7 +9,7 @@ import pytest
 
 import hybrid
 from hybrid.errors import SceneError
-from hybrid.model.mesh_grading import GROWTH, grading
+from hybrid.model.mesh_grading import GROWTH, SAMPLES, grading, layers
 from hybrid.model.resolution import RequestedAccuracy, Resolution, first_resolution, wants_errors
 from hybrid.scene.accuracy import amount
 from hybrid.simulation import error_estimate
@@ -207,7 +207,8 @@ def test_graded_cells():
     """Short where it bends and beside a clamp, neighbours alike, cuts kept, as many times more as asked."""
     s = np.linspace(0.0, 100.0, 201)
     curvature = np.where(np.abs(s - 30.0) < 2.0, 0.5, 0.001)
-    found = grading(s, curvature, np.full(201, 0.5), [100.0], 100.0)
+    x = np.linspace(0.0, 100.0, SAMPLES)
+    found = grading(s, curvature, layers(x, s, np.full(201, 0.5), [100.0]), 100.0)
     nodes = found.nodes([0.0, 61.7, 100.0], 1.0)
     h = np.diff(nodes)
     assert 61.7 in nodes and nodes[0] == 0.0 and nodes[-1] == 100.0 and (h > 0).all()

@@ -72,3 +72,68 @@ def test_tension_beside_a_float_in_a_catenary(cells):
     corrected = hybrid.static(scene | {"model": "corrected", "mesh": {"cells": 1600}})
     worst = [float(np.abs(x["tension"] - truth["tension"]).max()) for x in (result, corrected)]
     assert worst[1] < 0.5 * worst[0]
+
+
+TOUCHDOWN = {
+    "environment": {"gravity": 10.0, "seabed": {"z": 0, "stiffness": 1e9}},
+    "cable": {"sections": [{"length": 37.520597, "mass": 1.0, "bending_stiffness": 4.0}]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [33.371257775207795, 0, 10.0]},
+    },
+    "initial": "equilibrium",
+    "output": {"points": 2001},
+}
+
+
+@pytest.mark.parametrize("model", [None, "adaptive"])
+def test_curvature_asked_alone_is_met(model):
+    """At rest on a hard bed curvature begins within sqrt(EI/T) = 0.15 m: catenaries lack all of it (25 %, once)."""
+    truth = hybrid.static(TOUCHDOWN | {"model": "rod", "mesh": {"cells": 8000}})
+    asked = TOUCHDOWN | {"accuracy": {"curvature": "1%"}} | ({"model": model} if model else {})
+    result = hybrid.static(asked)
+    assert not [e for e in result.events if e.kind == "accuracy missed"]
+    error = np.abs(result["curvature"] - truth["curvature"]).max()
+    assert error <= 0.01 * truth["curvature"].max()
+    if model is None:
+        assert SHARP[0] <= effectivity(result, truth, "curvature") <= SHARP[1]
+    assert ("model chosen" in {e.kind for e in result.events}) == (model is None)
+    assert any(zone.kind == "rod" for zone in result.zones[0])
+
+
+def test_a_moment_asked_of_a_catenary_is_refused():
+    with pytest.raises(hybrid.SceneError, match="no bending moment"):
+        hybrid.static(TOUCHDOWN | {"accuracy": {"bending_moment": "1%"}, "model": "catenary"})
+
+
+def test_cells_to_a_layer():
+    """As many cells as asked to sqrt(EI/T) beside a clamp, whatever the accuracy."""
+    T, EI = 1000.0, 10.0
+    scene = {
+        "cable": {"sections": [{"length": 10, "mass": 1, "bending_stiffness": EI}]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0.2]},
+            "end": {"kind": "free", "force": [T, 0, 0]},
+        },
+        "initial": "equilibrium", "model": "rod",
+    }  # fmt: skip
+    layer = np.sqrt(EI / T)
+    for cells in (2.0, 8.0):
+        for more in ({}, {"accuracy": "1%"}):
+            result = hybrid.static(scene | {"resolution": {"cells_per_layer": cells}} | more)
+            first = int((result.mesh[0].s <= layer).sum()) - 1
+            assert 0.7 * cells <= first <= 1.5 * cells + 1, (cells, more)
+
+
+def test_cells_show_a_twist_by_a_moment():
+    """A moment on the end of a shaft twists it by 40 rad: no more than 2 rad to a cell, which stops a run."""
+    result = hybrid.static({
+        "cable": {"sections": [{"length": 20, "mass": 1, "bending_stiffness": 1, "torsional_stiffness": 1}]},
+        "ends": {
+            "start": {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]},
+            "end": {"kind": "free", "moment": [2.0, 0, 0], "force": [2000.0, 0, 0]},
+        },
+        "initial": "equilibrium", "model": "rod", "environment": {"gravity": 0.0},
+    })  # fmt: skip
+    assert result.attributes["cells"] >= 160
+    np.testing.assert_allclose(result["twist"][0], 2.0, rtol=1e-3)
