@@ -11,13 +11,15 @@ from types import FunctionType
 from typing import Any
 
 import numba
+import numpy as np
 from filelock import FileLock, Timeout
 from numba import config
+from numba.core.caching import FunctionCache
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.registry import CPUDispatcher
 
-from hybrid.kernels import references  # noqa: F401  (arguments of kernels)
+from hybrid.kernels import references
 from hybrid.kernels.cache import cache_folder, prune
 
 # numba's "contract" lets a*b+c become one fused instruction; no other relaxation is
@@ -34,6 +36,13 @@ class _Kernel(CPUDispatcher):
     def get_call_template(self, args: Any, kws: Any) -> Any:
         """A constant counts as any other value of its type: f(x, 0) and f(x, 1) are compiled once."""
         return super().get_call_template([numba.types.unliteral(x) for x in args], kws)
+
+    def typeof_pyval(self, value: Any) -> Any:
+        if type(value) is not np.ndarray:
+            return super().typeof_pyval(value)
+        kind = references.type_of(value)
+        self._types_active_call.add(kind)
+        return kind
 
     def compile(self, sig: Any) -> Any:
         """Compile, or load from disk, without searches for garbage: a fifth of the time."""
@@ -61,7 +70,7 @@ class _Entry(_Kernel):
     def compile_unless_busy(self, *args: Any) -> None:
         """Compile for arguments of the types of these, unless another process is doing it."""
         with suppress(Timeout, OSError), self._lock.acquire(timeout=0):
-            self.compile(tuple(numba.typeof(x) for x in args))
+            self.compile(tuple(references.type_of(x) for x in args))
 
     @cached_property
     def _lock(self) -> FileLock:
@@ -79,7 +88,7 @@ class _Entry(_Kernel):
 
     def address(self, *args: Any) -> int:
         """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
-        sig = tuple(numba.typeof(x) for x in args)
+        sig = tuple(references.type_of(x) for x in args)
         if sig not in self._addresses:
             self.compile(sig)
             made: Any = self.overloads[sig]
@@ -91,6 +100,16 @@ class _Entry(_Kernel):
 
     def get_overload(self, sig: Any) -> Any:
         return self.part.get_overload(sig)
+
+
+class _Cache(FunctionCache):
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        """Load from disk without the registries of numba, which bring scipy.linalg and a compilation of their own.
+
+        A compilation brings them itself.
+        """
+        with self._guard_against_spurious_io_errors():
+            return self._load_overload(sig, target_context)
 
 
 class _Inner(_Kernel):
@@ -189,6 +208,7 @@ def kernel(function: Callable[..., Any]) -> Any:
     finally:
         config.CACHE_DIR = before  # type: ignore[attr-defined]  # the user's own numba functions keep their own cache
     made.__class__ = _Entry
+    made._cache.__class__ = _Cache
     return made
 
 

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 from llvmlite import ir
-from numba import typeof, types
+from numba import from_dtype, typeof, types
 from numba.core import cgutils
 from numba.core.imputils import lower_getattr_generic
 from numba.core.typing.templates import AttributeTemplate
@@ -31,11 +31,18 @@ class Reference(types.Type):
         super().__init__(name=f"Reference({of.__module__}.{of.__qualname__})")
 
 
+def type_of(value: Any) -> Any:
+    """As numba's typeof, which asks of an array whether it is a masked one, and imports numpy.ma for that."""
+    if type(value) is np.ndarray and value.flags.c_contiguous and value.flags.aligned and value.ndim:
+        return types.Array(from_dtype(value.dtype), value.ndim, "C", readonly=not value.flags.writeable)
+    return typeof(value)
+
+
 def by_reference(example: Any) -> Reference:
     """Keep NamedTuples of a class by reference; all of them have the types of the example."""
     fields, at = {}, 0
     for name, value in example._asdict().items():
-        kind = by_reference(value) if _has_arrays(value) else typeof(value)
+        kind = by_reference(value) if _has_arrays(value) else type_of(value)
         fields[name] = at, kind
         at += size(kind)
     found = Reference(type(example))
@@ -59,8 +66,8 @@ def size(kind: Any) -> int:
 
 def _checked(kind: Reference, value: Any) -> Reference:
     for (name, (_, expected)), each in zip(_fields[kind.of].items(), value, strict=True):
-        if isinstance(each, np.ndarray) and typeof(each) != expected:
-            raise TypeError(f"{kind.of.__name__}.{name}: {typeof(each)}, expected {expected}")
+        if isinstance(each, np.ndarray) and type_of(each) != expected:
+            raise TypeError(f"{kind.of.__name__}.{name}: {type_of(each)}, expected {expected}")
     return kind
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 
 import numpy as np
@@ -197,16 +198,20 @@ def _arc(start: Floats, end: Floats, s: Floats, side: float) -> Floats:
     if span >= length:
         return np.asarray(start + (s / length)[:, None] * chord)
     part = min(span / length, 1.0 - 1e-12)
-    half = np.pi  # half the arc's angle; a full circle when the ends coincide
-    if part > 0.0:
-        from scipy.optimize import brentq  # slow to import
-
-        half = float(brentq(lambda x: np.sinc(x / np.pi) - part, 0.0, np.pi))
+    half = _half_angle(part)
     radius = 0.5 * length / half
     angle = half * (2.0 * s / length - 1.0)
     x = radius * (np.sin(angle) + np.sin(half))
     y = radius * (np.cos(angle) - np.cos(half))
     return np.asarray(start + x[:, None] * along + y[:, None] * bulge)
+
+
+def _half_angle(part: float) -> float:
+    """Half the angle of an arc whose chord is a part of its length, rad: sin(x)/x = part, by bisection to round-off."""
+    low, high = 0.0, math.pi  # a full circle when the ends coincide
+    while low < (x := 0.5 * (low + high)) < high:
+        low, high = (x, high) if math.sin(x) > part * x else (low, x)
+    return high
 
 
 def corners(scene: Scene) -> list[float]:

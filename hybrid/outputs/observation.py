@@ -14,7 +14,6 @@ from copy import copy
 from functools import cached_property
 
 import numpy as np
-from scipy.sparse import csr_array
 
 from hybrid.kernels.energies import observe
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
@@ -47,11 +46,6 @@ def size(a: Floats) -> Floats:
 def last(x: Floats) -> Floats:
     """A copy with the first axis, the outputs, moved to the end."""
     return np.ascontiguousarray(x.transpose(*range(1, x.ndim), 0))
-
-
-def on_grid(matrix: csr_array, x: Floats) -> Floats:
-    """A matrix of output_grid applied along the first axis."""
-    return np.asarray((matrix @ x.reshape(x.shape[0], -1)).reshape(matrix.shape[0], *x.shape[1:]))
 
 
 class Observation:
@@ -149,8 +143,8 @@ class Observation:
             else:
                 force = self.reaction(k) if k else -self.reaction(k)
                 ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
-        found = on_grid(self.grid.held, np.concatenate([ends[:1], self.T, ends[1:]]))
-        return found if self.shift is None else found - on_grid(self.grid.sides, self._borne_by_bending(self.shift))
+        found = self.grid.held @ np.concatenate([ends[:1], self.T, ends[1:]])
+        return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
 
     def _borne_by_bending(self, shift: Shift) -> Floats:
         """Tension (n sides, nb), N, that a catenary has and the rod in its place has not: M^2/(2 EI) of an elastica,
@@ -168,7 +162,7 @@ class Observation:
     @cached_property
     def tangent(self) -> Floats:
         """(ns, 3, nb)."""
-        t = on_grid(self.grid.cells, self.d)
+        t = self.grid.cells @ self.d
         length = size(t)
         if length.min() < 1e-9:  # in the very middle of a fold the two sides cancel: take the nearest cell's
             middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
@@ -195,13 +189,13 @@ class Observation:
     @cached_property
     def moment(self) -> Floats:
         """(ns, 3, nb) N m, inertial."""
-        return on_grid(self.grid.sides, self.node_moment[self.grid.side_nodes])
+        return self.grid.sides @ self.node_moment[self.grid.side_nodes]
 
     @cached_property
     def torque(self) -> Floats:
         """(ns, nb) N m, about the tangent."""
         torque = dot(self.moment, self.tangent)
-        return torque + on_grid(self.grid.sides, self._passed) if self.batch.turn.size else torque
+        return torque + self.grid.sides @ self._passed if self.batch.turn.size else torque
 
     @cached_property
     def _passed(self) -> Floats:
@@ -233,7 +227,7 @@ class Observation:
         V = cross(self.d, np.diff(self.node_moment, axis=0)) / self.length[:, None]
         if self.shift is None:
             V[self.line.spin == 0] = 0.0
-        return size(on_grid(self.grid.cells, V))
+        return size(self.grid.cells @ V)
 
     # ---- curvature and twist ------------------------------------------------------------------
 
@@ -243,7 +237,7 @@ class Observation:
         strains = self._plain._strains
         if self.shift is not None:
             strains = np.stack([self._curvature_of_moment(self.shift), strains[:, 1]], axis=1)
-        return on_grid(self.grid.sides, strains)
+        return self.grid.sides @ strains
 
     @cached_property
     def _strains(self) -> Floats:
@@ -354,8 +348,8 @@ class Observation:
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
-        p = on_grid(self.grid.chords, self._depth)
-        return contact_pressure(self.sea, p, on_grid(self.grid.chords, -along(self.sea.normal, self._plain.v)))
+        p = self.grid.chords @ self._depth
+        return contact_pressure(self.sea, p, self.grid.chords @ -along(self.sea.normal, self._plain.v))
 
     @property
     def contact_force(self) -> Floats:

@@ -5,24 +5,45 @@ Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn acro
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from functools import cached_property
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
-from scipy.sparse import csr_array
+from numpy.typing import NDArray
 
+from hybrid.kernels.sparse_rows import add_rows
 from hybrid.kernels.state import Floats
 from hybrid.model.mesh import Zone
 
 
-def _sparse(columns: np.ndarray, weights: Floats, width: int) -> csr_array:
+class Rows(NamedTuple):
+    """A sparse matrix by rows: row i has weights[begin[i] : begin[i+1]] in the columns of the same places."""
+
+    begin: NDArray[np.int64]
+    columns: NDArray[np.int64]
+    weights: Floats
+
+    def __matmul__(self, x: Floats) -> Floats:
+        """The product with x (n, ...), along its first axis."""
+        out = np.zeros((self.begin.size - 1, math.prod(x.shape[1:])))
+        x = np.require(x, float, ("C", "W"))
+        add_rows(self.begin, self.columns, self.weights, x.reshape(x.shape[0], out.shape[1]), out)
+        return out.reshape(-1, *x.shape[1:])
+
+
+def _sparse(columns: np.ndarray, weights: Floats) -> Rows:
     """One row per output point: its weights (ns, k) at their columns; those at the same column add up, and zeros go."""
-    rows, each = weights.shape
-    out = csr_array((weights.ravel(), columns.ravel(), each * np.arange(rows + 1)), shape=(rows, width))
-    out.sum_duplicates()
-    out.eliminate_zeros()
-    return out
+    order = np.argsort(columns, axis=1, kind="stable")
+    columns, weights = np.take_along_axis(columns, order, 1), np.take_along_axis(weights, order, 1)
+    for k in range(1, columns.shape[1]):
+        same = columns[:, k] == columns[:, k - 1]
+        weights[same, k] += weights[same, k - 1]
+        weights[same, k - 1] = 0.0
+    kept = weights != 0.0
+    return Rows(np.append(0, np.cumsum(kept.sum(axis=1))), columns[kept].astype(np.int64), weights[kept])
 
 
 def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
@@ -113,27 +134,27 @@ class Grid:
         return np.asarray(0.5 * (self._x[:-1] + self._x[1:]))
 
     @cached_property
-    def nodes(self) -> csr_array:
-        return _sparse(*_cubic(self._x, self.s, self._first, self._last), self._x.size)
+    def nodes(self) -> Rows:
+        return _sparse(*_cubic(self._x, self.s, self._first, self._last))
 
     @cached_property
-    def cells(self) -> csr_array:
-        return _sparse(*_linear(self._middles, self.s, self._first, self._last - 1), self._x.size - 1)
+    def cells(self) -> Rows:
+        return _sparse(*_linear(self._middles, self.s, self._first, self._last - 1))
 
     @cached_property
-    def chords(self) -> csr_array:
+    def chords(self) -> Rows:
         n, first = self._x.size, np.zeros_like(self._first)
-        return _sparse(*_linear(self._x, self.s, first, np.full_like(first, n - 1)), n)
+        return _sparse(*_linear(self._x, self.s, first, np.full_like(first, n - 1)))
 
     @cached_property
-    def held(self) -> csr_array:
+    def held(self) -> Rows:
         """Columns: start, cells, end; next to an end its value takes part."""
         x, middles = self._x, self._middles
         start = np.where(self.s < middles[0], 0, self._first + 1)
         end = np.where(self.s > middles[-1], x.size, self._last)
-        return _sparse(*_linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end), x.size + 1)
+        return _sparse(*_linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end))
 
     @cached_property
-    def sides(self) -> csr_array:
+    def sides(self) -> Rows:
         node, share = _linear(self._x, self.s, self._first, self._last)
-        return _sparse(node + self._stretch[:, None], share, len(self.side_nodes))
+        return _sparse(node + self._stretch[:, None], share)

@@ -12,7 +12,7 @@ from hybrid.kernels.forces import PLANAR, SEABED
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
-from hybrid.outputs.observation import Observation, on_grid, size
+from hybrid.outputs.observation import Observation, size
 from hybrid.outputs.output_grid import Grid
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
@@ -37,8 +37,8 @@ class Probe:
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 MAY_BE_NAN = ("touchdown", "touchdown_position")  # of a line that touches nothing
 PROBES: dict[str, Probe] = {
-    "position": Probe("m", "position of the centreline", _SX, lambda v: on_grid(v.grid.nodes, v.r), frame="inertial"),
-    "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: on_grid(v.grid.nodes, v.v), frame="inertial"),
+    "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
+    "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
     "tension": Probe("N", "tension (effective tension in a fluid)", _S, lambda v: v.tension),
     "theta": Probe("rad", "angle of the tangent to the z axis", _S, lambda v: v.theta),
     "phi": Probe("rad", "azimuth of the tangent from the x axis", _S, lambda v: v.phi),
@@ -110,7 +110,7 @@ SIDED_ERRORS = tuple(name for name in MODEL_ERRORS if name in SIDED)
 def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats]:
     """MODEL_ERRORS on the output grid: how far what is corrected for bending is from what is not."""
     out = {
-        "position": size(on_grid(plain.grid.nodes, corrected.r - plain.r)),
+        "position": size(plain.grid.nodes @ (corrected.r - plain.r)),
         "tension": np.abs(corrected.tension - plain.tension),
         "curvature": np.abs(corrected.curvature_twist[:, 0] - plain.curvature_twist[:, 0]),
         "bending_moment": np.abs(corrected.bending_moment - plain.bending_moment),

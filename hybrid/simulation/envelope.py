@@ -91,7 +91,7 @@ class Envelope:
 
     def count_from(self, model: Model, r: Floats) -> None:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
-        self._start = np.asarray(Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r)
+        self._start = Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r
 
     def start_of(self, nodes: Floats) -> Floats:
         """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""

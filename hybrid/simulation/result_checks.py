@@ -32,16 +32,14 @@ def undersampled_end_forces(
     t = result.forces[:, 0]
     if len(times) < 4 or len(t) <= len(times):
         return out
-    from scipy.interpolate import CubicSpline  # slow to import
-
     largest = float(result.forces[:, 1:].max())
     for end, force in (("start", result.forces[:, 1]), ("end", result.forces[:, 2])):
         name = f"end_force_{end}"
         if name not in errors or f"reaction_{end}" not in result.values:
             continue
-        seen = CubicSpline(times, np.linalg.norm(np.asarray(result.values[f"reaction_{end}"]), axis=1))
+        outputs = np.linalg.norm(np.asarray(result.values[f"reaction_{end}"]), axis=1)
         inside = (t >= times[1]) & (t <= times[-2])  # at the first and last output the curve has one side only
-        off = np.where(inside, np.abs(force - seen(t)), 0.0)
+        off = np.where(inside, np.abs(force - cubic_spline(times, outputs, t)), 0.0)
         i = int(off.argmax())
         error = errors[name]
         if off[i] > max(TIMES_THE_ERROR * error, PART * largest):
@@ -56,6 +54,33 @@ def undersampled_end_forces(
                 text += f"; zones that change (t = {shaken[-1]:.4g} s) may have shaken it: model: rod has none"
             out.append(("end force between outputs", text))
     return out
+
+
+def cubic_spline(x: Floats, y: Floats, at: Floats) -> Floats:
+    """The cubic spline through four or more points (not-a-knot: its first two pieces are one, and its last two)."""
+    h, slope = np.diff(x), np.diff(y) / np.diff(x)
+    # below, diagonal, above, right-hand side of the second derivatives at the inner points
+    a, b, c, d = h[:-1].copy(), 2.0 * (h[:-1] + h[1:]), h[1:].copy(), 6.0 * np.diff(slope)
+    b[0] += h[0] * (1.0 + h[0] / h[1])
+    c[0] -= h[0] * h[0] / h[1]
+    b[-1] += h[-1] * (1.0 + h[-1] / h[-2])
+    a[-1] -= h[-1] * h[-1] / h[-2]
+    lower, diagonal, upper, m = (v.tolist() for v in (a, b, c, d))
+    for i in range(1, len(m)):
+        w = lower[i] / diagonal[i - 1]
+        diagonal[i] -= w * upper[i - 1]
+        m[i] -= w * m[i - 1]
+    m[-1] /= diagonal[-1]
+    for i in range(len(m) - 2, -1, -1):
+        m[i] = (m[i] - upper[i] * m[i + 1]) / diagonal[i]
+    first = m[0] + (m[0] - m[1]) * h[0] / h[1]
+    last = m[-1] + (m[-1] - m[-2]) * h[-1] / h[-2]
+    M = np.array([first, *m, last])
+    k = np.clip(np.searchsorted(x, at, side="right") - 1, 0, len(h) - 1)
+    p, l = at - x[k], h[k]
+    return np.asarray(
+        y[k] + p * (slope[k] - l * (2.0 * M[k] + M[k + 1]) / 6.0 + p * (0.5 * M[k] + p * (M[k + 1] - M[k]) / (6.0 * l)))
+    )
 
 
 def damped_vibrations(result: Result) -> tuple[tuple[str, str], ...]:

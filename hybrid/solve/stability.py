@@ -13,6 +13,7 @@ from hybrid.kernels.block_elimination_plane import WIDE
 from hybrid.kernels.entry import block_rows, workspace
 from hybrid.kernels.forces import DRAG, PLANAR
 from hybrid.kernels.out_of_plane import BAND, REACH, wrong_pivots_at_rest
+from hybrid.kernels.sparse_rows import is_definite
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 
 # What drifts freely (a line between two buoys) is held where it starts by springs of this part of tension scale over
@@ -59,8 +60,6 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray,
     axial: (N, 3, 3) N/m, of each cell; held nodes and cells without spin are left out.  plane: (3, 3) rows p, q,
     normal, where the rows are those of a line in that plane.
     """
-    from scipy.linalg import cholesky_banded  # slow to import
-
     K = _stiffness(rows, axial, plane)
     n, _, m, _ = K.shape
     free = np.ones((n, m), bool)
@@ -82,11 +81,7 @@ def positive_definite(rows: Floats, axial: Floats, ends: Ends, spin: np.ndarray,
     for j in range(reach + 1):
         band[j, : m * n - j] *= ~(held[: m * n - j] | held[j:])
     band[0, held] = 1.0
-    try:
-        cholesky_banded(band, lower=True, check_finite=False)
-    except np.linalg.LinAlgError:
-        return False
-    return True
+    return bool(is_definite(band))
 
 
 def is_judged(line: Line, ends: Ends, length: float) -> bool:

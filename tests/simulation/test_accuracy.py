@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.interpolate import CubicSpline
 
 import hybrid
 from hybrid.errors import SceneError
@@ -16,6 +17,7 @@ from hybrid.simulation import error_estimate
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import ORDERS, Errors, Estimate
 from hybrid.simulation.refinement import Free, Verdict, judge, refined
+from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
@@ -523,3 +525,11 @@ def test_a_pull_that_outputs_do_not_show_is_said():
     assert [e.kind for e in often.events if e.kind == "end force between outputs"] == []
     said = [e.text for e in rare.events if e.kind == "end force between outputs"]
     assert len(said) == 2 and all("leaves the curve" in x and "output.every: 0.06" in x for x in said)
+
+
+@pytest.mark.parametrize("count", [4, 5, 30])
+def test_the_spline_through_outputs_is_that_of_scipy(count):
+    g = np.random.default_rng(count)
+    x, y = np.cumsum(g.uniform(0.1, 1.0, count)), g.normal(size=count)
+    at = np.append(g.uniform(x[0], x[-1], 40), x)
+    np.testing.assert_allclose(cubic_spline(x, y, at), CubicSpline(x, y)(at), rtol=0.0, atol=1e-12)
