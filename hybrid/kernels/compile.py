@@ -41,7 +41,7 @@ class _Kernel(CPUDispatcher):
         if type(value) is not np.ndarray:
             return super().typeof_pyval(value)
         kind = references.type_of(value)
-        self._types_active_call.add(kind)
+        self._types_active_call.add(kind)  # type: ignore[attr-defined]  # numba keeps it alive
         return kind
 
     def compile(self, sig: Any) -> Any:
