@@ -357,7 +357,8 @@ def march(line, sea, ends, r, state, cv, ca, work):
     n = line.h.shape[0]
     u, W, X, report, rows = work.u, work.W, work.X, work.report, work.rows
     kept, next_kept = 0, 0
-    if X.shape[0] > (n + 1) * ROW:
+    known = work.torsion.known
+    if X.shape[0] > (n + 1) * ROW and (known.shape[0] == 0 or known[2] + known[3] > 0.0):
         kept, next_kept = (n + 1) * ROW, KEPT
     for j in range(ASSEMBLED):
         report[j] = 0.0

@@ -60,7 +60,7 @@ def workspace_of(line: Line, keep: bool = False) -> Work:
     """Arrays for a line, with what a torque through its catenary zones takes; keep: as of `workspace`."""
     work = workspace(line.h.size, keep or bool(line.torsion.size))
     if line.torsion.size and not line.bits & PLANAR:
-        torsion = torsion_of(line)
+        torsion = torsion_of(line, keep)
         work = work._replace(torsion=torsion)
         address = pass_torque.address(line, no_ends(), blank_state(line.h.size), work, 0, 0.0)
         work = work._replace(torsion=torsion._replace(address=address))

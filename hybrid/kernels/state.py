@@ -223,10 +223,15 @@ class Torsion(NamedTuple):
 
     address: int  # of kernels.zone_torque.pass_torque; 0: there is none
     passed: Floats  # (2, N) N m of cells of rods beside zones: torque on their spin; stiffness that holds it meanwhile
-    slope: Floats  # (N+1, 3) how the turn of the zone answers to the directions of the two chords of a node
+    slope: Floats  # (N, 3) 1/m, how the turn of the zone of a cell, or beside it, answers to its chord
+    directions: Floats  # (K, 2, 3) how it answers to the directions of ends that hold the zone
     floating: NDArray[np.int64]  # (F,) cells that are held meanwhile: one of each rod that no end holds
     columns: Floats  # (K+F, N+1, 5) how the line answers to the torque of each zone, to a torque on each such cell
+    # (4,) cv of the columns, 1/s (< 0: they are not known); how often they have served; whether they are made anew, from
+    # factors that the march keeps; whether it keeps them in any case; empty: it keeps them where there is room
+    known: Floats
     right: Floats  # (N+1, 5) a right-hand side
+    coupling: Floats  # (K+F, K+F) how turns and those spins answer to the columns
     dense: Floats  # (K+F, K+F+1) equations of the torques and of those spins
 
 
@@ -246,7 +251,9 @@ class Work(NamedTuple):
 def no_torsion() -> Torsion:
     """No torque passes through catenary zones."""
     z = np.zeros
-    return Torsion(0, z((2, 0)), z((0, 3)), z(0, np.int64), z((0, 0, 5)), z((0, 5)), z((0, 1)))
+    return Torsion(
+        0, z((2, 0)), z((0, 3)), z((0, 2, 3)), z(0, np.int64), z((0, 0, 5)), z(0), z((0, 5)), z((0, 0)), z((0, 1))
+    )
 
 
 def blank_state(n_cells: int, zones: int = 0) -> State:

@@ -36,6 +36,9 @@ BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
 TURN, TORQUE, POWER = 0, 1, 2  # columns of State.turn
 FIRST, LAST, COMPLIANCE, FREE, TAU = range(5)  # columns of Line.torsion
 LOAD, HOLD = 0, 1  # rows of Torsion.passed
+# Iterations of steps of one length for which the answers to torques serve: they are mostly those of torsion, which does
+# not change, and torques themselves are those of the configuration, so that this touches convergence alone.
+SERVES = 24
 
 
 @inner
@@ -67,19 +70,33 @@ def carry(a, d, dn):
 
 
 @inner
-def find_turn(line, ends, state, torsion, a, b):
-    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1; its slopes into `torsion`."""
+def find_turn(line, ends, state, slope, a, b):
+    """Turn (rad, less than half a turn) of the frame after the cells a to b - 1, its slopes by their chords, and
+
+    those by the directions of ends that hold the zone.
+    """
     director, d = frame_before(line, ends, state, a)
-    slope = torsion.slope
+    none = (0.0, 0.0, 0.0)
+    before, at_start, il = none, none, 0.0
+    if a > 0:
+        il = chord(get3(state.e, a - 1))[2]
     for i in range(a, b):
-        dn, _, _ = chord(get3(state.e, i))
+        dn, _, iln = chord(get3(state.e, i))
         director, c = carry(director, d, dn)
-        slope[i, 0], slope[i, 1], slope[i, 2] = c
-        d = dn
+        if i > 0:
+            p = scale(il, add(before, c))
+            slope[i - 1, 0], slope[i - 1, 1], slope[i - 1, 2] = p
+        else:
+            at_start = c
+        before, d, il = c, dn, iln
     last, dn = frame_after(line, ends, state, b)
     director, c = carry(director, d, dn)
-    slope[b, 0], slope[b, 1], slope[b, 2] = c
-    return math.atan2(dot(cross(director, last), dn), dot(director, last))
+    p = scale(il, add(before, c))
+    slope[b - 1, 0], slope[b - 1, 1], slope[b - 1, 2] = p
+    if b < line.h.shape[0]:
+        p = scale(chord(get3(state.e, b))[2], c)
+        slope[b, 0], slope[b, 1], slope[b, 2] = p
+    return math.atan2(dot(cross(director, last), dn), dot(director, last)), at_start, c
 
 
 @inner
@@ -92,59 +109,71 @@ def rate_of_ends(ends, k):
 
 
 @inner
-def turn_rates(line, ends, state, torsion, a, b):
-    """Rate of the turn of the zone of cells a to b - 1: by spins, and by chords (1/s)."""
-    n, slope, v = line.h.shape[0], torsion.slope, state.v
-    before, after, by_chords = 0.0, 0.0, 0.0
+def by_chords(slope, x, first, a, b):
+    """Change of a turn by the shifts x[:, first:first+3] of the nodes of cells a to b - 1."""
+    total = 0.0
+    for i in range(a, b):
+        total += (
+            slope[i, 0] * (x[i + 1, first] - x[i, first])
+            + slope[i, 1] * (x[i + 1, first + 1] - x[i, first + 1])
+            + slope[i, 2] * (x[i + 1, first + 2] - x[i, first + 2])
+        )
+    return total
+
+
+@inner
+def turn_rates(line, ends, state, torsion, z):
+    """Rate of the turn of zone z: by spins, and by chords (1/s)."""
+    n, slope, at_ends = line.h.shape[0], torsion.slope, torsion.directions[z]
+    a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+    bent = by_chords(slope, state.v, 0, max(a - 1, 0), min(b + 1, n))
     if a > 0:
         before = state.w[a - 1]
     else:
         before, t1 = rate_of_ends(ends, 0)
-        by_chords += dot(get3(slope, a), t1)
+        bent += dot(get3(at_ends, 0), t1)
     if b < n:
         after = state.w[b]
     else:
         after, t1 = rate_of_ends(ends, 1)
-        by_chords += dot(get3(slope, b), t1)
-    for i in range(max(a - 1, 0), min(b + 1, n)):
-        _, _, il = chord(get3(state.e, i))
-        c = (0.0, 0.0, 0.0)
-        if i >= a:
-            c = get3(slope, i)
-        if i < b:
-            c = add(c, get3(slope, i + 1))
-        by_chords += il * dot(c, sub(get3(v, i + 1), get3(v, i)))
-    return after - before, by_chords
+        bent += dot(get3(at_ends, 1), t1)
+    return after - before, bent
 
 
 @inner
-def find_torques(line, ends, state, torsion, finished):
-    """Turn and torque of every zone, and what rods beside them feel; finished: the power of a step as well.
-
-    Returns what damping takes out of the torsion of the zones (W).
-    """
-    passed, loss = torsion.passed, 0.0
+def find_torques(line, ends, state, torsion):
+    """Turn and torque of every zone, and what rods beside them feel."""
+    passed = torsion.passed
     n = line.h.shape[0]
     for z in range(line.torsion.shape[0]):
         a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
-        turn = find_turn(line, ends, state, torsion, a, b)
+        turn, at_start, at_end = find_turn(line, ends, state, torsion.slope, a, b)
         turn += 2.0 * math.pi * math.floor((state.turn[z, TURN] - turn) / (2.0 * math.pi) + 0.5)
         torque = turn - line.torsion[z, FREE]
-        damped = line.bits & STIFFNESS_DAMPING and line.torsion[z, TAU] > 0.0
-        by_chords = 0.0
-        if finished or damped:
-            by_spins, by_chords = turn_rates(line, ends, state, torsion, a, b)
-            if damped:
-                late = line.torsion[z, TAU] * (by_spins + by_chords)
-                loss += late * (by_spins + by_chords) / line.torsion[z, COMPLIANCE]
-                torque += late
+        slope = torsion.directions[z]
+        for k in range(3):
+            slope[0, k], slope[1, k] = at_start[k], at_end[k]
+        if line.bits & STIFFNESS_DAMPING and line.torsion[z, TAU] > 0.0:
+            spun, bent = turn_rates(line, ends, state, torsion, z)
+            torque += line.torsion[z, TAU] * (spun + bent)
         torque /= line.torsion[z, COMPLIANCE]
-        state.turn[z, TURN], state.turn[z, TORQUE], state.turn[z, POWER] = turn, torque, torque * by_chords
+        state.turn[z, TURN], state.turn[z, TORQUE] = turn, torque
         if a > 0:  # of a rod of one cell the zone before has written
             beside = z > 0 and int(line.torsion[z - 1, LAST]) == a - 1
             passed[LOAD, a - 1] = torque + (passed[LOAD, a - 1] if beside else 0.0)
         if b < n:
             passed[LOAD, b] = -torque
+
+
+@inner
+def finish(line, ends, state, torsion):
+    """Power that each torque gains because its zone bends without it; what damping takes out of their torsion (W)."""
+    loss = 0.0
+    for z in range(line.torsion.shape[0]):
+        spun, bent = turn_rates(line, ends, state, torsion, z)
+        state.turn[z, POWER] = state.turn[z, TORQUE] * bent
+        if line.bits & STIFFNESS_DAMPING:
+            loss += line.torsion[z, TAU] * (spun + bent) ** 2 / line.torsion[z, COMPLIANCE]
     return loss
 
 
@@ -197,32 +226,24 @@ def solve_columns(line, work):
 
 
 @inner
-def turn_by(line, state, torsion, z, x):
+def turn_by(line, torsion, z, x):
     """Change (rad) of the turn of zone z by a correction x (N+1, 5)."""
-    n, slope = line.h.shape[0], torsion.slope
+    n = line.h.shape[0]
     a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
-    total = 0.0
+    total = by_chords(torsion.slope, x, 1, max(a - 1, 0), min(b + 1, n))
     if a > 0:
         total -= x[a - 1, 4]
     if b < n:
         total += x[b, 4]
-    for i in range(max(a - 1, 0), min(b + 1, n)):
-        _, _, il = chord(get3(state.e, i))
-        c = (0.0, 0.0, 0.0)
-        if i >= a:
-            c = get3(slope, i)
-        if i < b:
-            c = add(c, get3(slope, i + 1))
-        total += il * (c[0] * (x[i + 1, 1] - x[i, 1]) + c[1] * (x[i + 1, 2] - x[i, 2]) + c[2] * (x[i + 1, 3] - x[i, 3]))
     return total
 
 
 @inner
-def unknown_of(line, state, torsion, j, x):
+def unknown_of(line, torsion, j, x):
     """What the correction x makes of unknown j: the change of the turn of a zone, or the spin of a cell that is held."""
     zones = line.torsion.shape[0]
     if j < zones:
-        return turn_by(line, state, torsion, j, x)
+        return turn_by(line, torsion, j, x)
     return x[torsion.floating[j - zones], 4]
 
 
@@ -252,14 +273,21 @@ def correct(line, state, work, cv):
     """Correct the march's solution work.x for the torques that change with it."""
     torsion, x = work.torsion, work.x
     zones, m = line.torsion.shape[0], torsion.columns.shape[0]
-    if not solve_columns(line, work):
-        x[0, 1] = math.nan
-        return
+    known = torsion.known
+    if known[2] > 0.0:
+        known[0], known[1] = cv, 0.0
+        if not solve_columns(line, work):
+            x[0, 1] = math.nan
+            return
+        for j in range(m):
+            for k in range(m):
+                torsion.coupling[j, k] = unknown_of(line, torsion, j, torsion.columns[k])
+    known[1] += 1.0
     A = torsion.dense
     for j in range(m):
         for k in range(m):
-            A[j, k] = unknown_of(line, state, torsion, j, torsion.columns[k])
-        A[j, m] = unknown_of(line, state, torsion, j, x)
+            A[j, k] = torsion.coupling[j, k]
+        A[j, m] = unknown_of(line, torsion, j, x)
         size = 1.0
         if j < zones:
             size = line.torsion[j, COMPLIANCE]
@@ -272,6 +300,12 @@ def correct(line, state, work, cv):
         for i in range(x.shape[0]):
             for k in range(SIZE):
                 x[i, k] -= y * column[i, k]
+    for z in range(zones):  # of the configuration that the correction leads to, but for what is not linear
+        state.turn[z, TORQUE] += A[z, m]
+        change = A[z, m] * line.torsion[z, COMPLIANCE]
+        if line.bits & STIFFNESS_DAMPING:
+            change /= 1.0 + cv * line.torsion[z, TAU]
+        state.turn[z, TURN] += change
 
 
 @kernel
@@ -280,18 +314,22 @@ def pass_torque(line, ends, state, work, part, cv):
 
     BEFORE_MARCH  the torques of the configuration, for the march
     CORRECT       its solution work.x with the torques that change with it; the march has kept its factors
-    AFTER_STEP    turns, torques and powers of the configuration found, and what it reports: moments of the ends, loss
+    AFTER_STEP    powers of the configuration found, and what it reports: moments of the ends, loss
 
     A line that is catenary from end to end feels nothing of its torque: that is found after the step.
     """
     felt = line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
     if part == AFTER_STEP:
-        work.report[STIFFNESS_DAMPING_POWER] += find_torques(line, ends, state, work.torsion, True)
+        if not felt:
+            find_torques(line, ends, state, work.torsion)
+        work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)
         report_end_moments(line, ends, state, work.report)
     elif felt and part == CORRECT:
         correct(line, state, work, cv)
     elif felt:
-        find_torques(line, ends, state, work.torsion, False)
+        known = work.torsion.known
+        known[2] = 1.0 if cv == 0.0 or known[0] != cv or known[1] >= SERVES else 0.0
+        find_torques(line, ends, state, work.torsion)
     return 0
 
 
@@ -307,8 +345,8 @@ def floating_rods(line: Line, held: np.ndarray) -> np.ndarray:
     return np.array(found, np.int64)
 
 
-def torsion_of(line: Line) -> Torsion:
-    """What a torque through the catenary zones of a line takes; the kernel is compiled if it has not been."""
+def torsion_of(line: Line, keep: bool) -> Torsion:
+    """What a torque through the catenary zones of a line takes; keep: the march keeps its factors every time."""
     zones = line.torsion.shape[0]
     if not zones:
         return no_torsion()
@@ -319,8 +357,9 @@ def torsion_of(line: Line) -> Torsion:
     passed = z((2, n))
     passed[HOLD, floating] = 1.0 / line.torsion[:, COMPLIANCE].min()
     return Torsion(
-        address=0, passed=passed, slope=z((n + 1, 3)), floating=floating, columns=z((unknowns, n + 1, SIZE)),
-        right=z((n + 1, SIZE)), dense=z((unknowns, unknowns + 1)),
+        address=0, passed=passed, slope=z((n, 3)), directions=z((zones, 2, 3)), floating=floating,
+        columns=z((unknowns, n + 1, SIZE)), known=np.array([-1.0, 0.0, 1.0, float(keep)]), right=z((n + 1, SIZE)),
+        coupling=z((unknowns, unknowns)), dense=z((unknowns, unknowns + 1)),
     )  # fmt: skip
 
 

@@ -8,7 +8,7 @@ from hybrid.kernels.block_elimination import SIZE, WIDTH
 from hybrid.kernels.configuration import update
 from hybrid.kernels.entry import assembly, block_rows, correction, workspace, workspace_of
 from hybrid.kernels.forces import MASS_DAMPING, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.zone_torque import AFTER_STEP, pass_torque
+from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, pass_torque
 
 # Elements at nodes 0 to N, and the zones that follow.
 LINES = {
@@ -61,9 +61,17 @@ def test_the_corrected_solution_solves_the_derivative_of_the_residual(name, bits
     J = -differences(lambda x: residual(line, sea, ends, st, work, x)[0], 5 * (N + 1))
     missing = [0] + [5 * i + 4 for i in range(N + 1) if i == N or not line.spin[i]]
     J[missing, missing] = 1.0
+    first = st.copy()
     assert correction(line, sea, ends, st, CV, CA, work) == -1
     x = np.linalg.solve(J, rhs)
     np.testing.assert_allclose(work.x.ravel(), x, atol=2e-6 * np.abs(x).max())
+    # and the turns that it foresees are those of the configuration, to first order
+    t = 1e-4
+    turns = [residual(line, sea, ends, first, work, k * t * work.x)[1] for k in (-1, 1)]
+    if name != "all of the line":  # found after a step
+        before = residual(line, sea, ends, first, work, 0.0 * work.x)[1]
+        scale = np.abs(x).max()
+        np.testing.assert_allclose(st.turn[:, 0] - before, (turns[1] - turns[0]) / (2.0 * t), atol=1e-4 * scale)
     if name != "all of the line":  # and the torque is what makes it so
         other = workspace(N, keep=True)
         line, st = line._replace(torsion=np.zeros((0, 5))), st._replace(turn=np.zeros((0, 3)))
@@ -75,6 +83,7 @@ def test_the_corrected_solution_solves_the_derivative_of_the_residual(name, bits
 def test_rate_of_the_turn(name):
     """By spins and by chords, against the difference of the turn over a short time in which all moves and ends turn."""
     line, _, ends, st, work = twisted_case(name, 0)
+    pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
     pass_torque(line, ends, st, work, AFTER_STEP, 0.0)
     torque, power = st.turn[:, 1].copy(), st.turn[:, 2].copy()
     np.testing.assert_allclose(torque * line.torsion[:, 2], st.turn[:, 0] - 0.1, rtol=1e-12)
@@ -90,6 +99,7 @@ def test_rate_of_the_turn(name):
             K = np.cross(q / size, np.eye(3)).T if size else np.zeros((3, 3))
             turn = np.eye(3) + np.sin(size) * K + (1 - np.cos(size)) * K @ K
             e.frame[k] = (turn @ ends.frame[k].reshape(3, 3)).ravel()
+        pass_torque(line, e, s, moved, BEFORE_MARCH, 0.0)
         pass_torque(line, e, s, moved, AFTER_STEP, 0.0)
         return s.turn[:, 0]
 
@@ -106,10 +116,10 @@ def test_rate_of_the_turn(name):
 def test_turns_are_counted_on():
     """A frame that goes round and round, a quarter at a time, ten times."""
     line, _, ends, st, work = twisted_case("between rods", 0)
-    pass_torque(line, ends, st, work, AFTER_STEP, 0.0)
+    pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
     first = st.turn[0, 0]
     d = st.e[5] / np.linalg.norm(st.e[5])
     for _ in range(40):
         st.a1[5] = np.cross(d, st.a1[5])
-        pass_torque(line, ends, st, work, AFTER_STEP, 0.0)
+        pass_torque(line, ends, st, work, BEFORE_MARCH, 0.0)
     assert st.turn[0, 0] - first == pytest.approx(20.0 * np.pi, rel=1e-12)
