@@ -245,6 +245,12 @@ class DomainManager:
             self.ask_user(line, state, t)
         return float(self.loudest)
 
+    def release(self, k: int, cable: Material) -> None:
+        """End k holds its tangent and its twist no longer; cable: as that leaves it."""
+        self.cable = cable
+        self.zones.clamped[k], self.zones.tangents[k] = 0, 0.0
+        self.zones.counts[z.HOLDS_TWIST] = 0
+
     def ask_user(self, line: Line, state: State, t: float) -> None:
         """Raise the ratios to those of the user's criterion."""
         assert self.user is not None

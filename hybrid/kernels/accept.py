@@ -19,6 +19,7 @@ from hybrid.kernels.books import (
     LAST_DT,
     LEAST_PEAK,
     LEAVES_PLANE,
+    LETS_GO,
     MEASURED,
     MOVED,
     NOW,
@@ -29,6 +30,8 @@ from hybrid.kernels.books import (
     PUSH_DIED,
     PUSH_GROWN,
     PUSH_START,
+    RELEASE_END,
+    RELEASE_START,
     REPEATS,
     ROWS,
     SAMPLE,
@@ -170,7 +173,7 @@ def remember_worst(line, old, new, books, t, dt):
 
 
 @inner
-def watch(line, old, new, books, report, t, dt):
+def watch(line, ends, old, new, books, report, t, dt):
     """What there is to look at after a step, as bits; and how far the line has moved, how its peak tension varies."""
     clock, flags = books.clock, 0
     peak, before, stretched, slack = new.T[0], old.T[0], False, False
@@ -192,6 +195,10 @@ def watch(line, old, new, books, report, t, dt):
         flags |= BENT
     if slack:
         flags |= SLACKENED
+    if pull(ends, new, report, books.loaded, 0) > clock[RELEASE_START]:
+        flags |= LETS_GO
+    if pull(ends, new, report, books.loaded, 1) > clock[RELEASE_END]:
+        flags |= LETS_GO
     return flags
 
 

@@ -48,8 +48,9 @@ from hybrid.kernels.state import Floats
     SLACK_STEP,  # of the last step that was; 0: none was
     MUTE_SLACK,  # 1 when an event has told of that
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
-) = range(38)  # fmt: skip
-CLOCK_SIZE = 38
+    RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
+) = range(40)  # fmt: skip
+CLOCK_SIZE = 40
 
 # --- count -----------------------------------------------------------------------------------------
 
@@ -87,6 +88,7 @@ AT_STOP, PAUSED, TRYING, TRIED, STEPPED, SAMPLED, FAILED = range(7)
 STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SLACK = 1, 2, 4, 8, 16, 32, 64, 128
 UNKNOWN_ERROR = 256
 IS_BENT, MEETS_ITSELF = 512, 1024
+LETS_GO = 2048
 
 # --- powers and work --------------------------------------------------------------------------------
 

@@ -167,7 +167,7 @@ def conclude(job, old, new):
         return FAILED
     if verdict > 0:
         accept(line, ends, old, new, books, work, clock[TRY_END], dt)
-        count[FLAGS] = watch(line, old, new, books, work.report, clock[NOW], dt)
+        count[FLAGS] = watch(line, ends, old, new, books, work.report, clock[NOW], dt)
         if job.was.shape[0] > 0:
             count[FLAGS] |= watch_push(clock, work.report)
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:

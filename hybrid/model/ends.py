@@ -15,6 +15,7 @@ from hybrid.scene.motion import MotionTerms
 # A prescribed tangent within this angle (rad) of the cable's own counts as the same: round-off of typed numbers.
 SAME_DIRECTION = 1e-6
 CONSTANT: Floats = np.zeros((0, 4))  # history of a load that has none
+NEVER = (np.inf, np.inf), (np.inf, np.inf)  # time and force at which the start and the end are let go
 
 
 def first_director(tangent: Sequence[float], normal: Sequence[float] | None = None) -> Floats:
@@ -101,7 +102,9 @@ class EndConditions:
         frame: Floats,
         loads: Sequence[EndLoad],
         motions: Mapping[int, Motion | DrivenEnd],
+        release: tuple[Sequence[float], Sequence[float]] = NEVER,
     ) -> None:
+        """release: times (s) and end forces (N) at which the ends are let go; infinite: never."""
         zero = np.zeros((2, 3))
         self.values = Ends(np.array(held, np.int8), position.copy(), frame.copy(), zero, zero.copy(), zero.copy())
         self.velocity = np.zeros((2, 3))
@@ -111,6 +114,8 @@ class EndConditions:
         self._turns: dict[int, tuple[Floats, float]] = {}  # end -> axis and angle still to go at t = 0
         self._bring_in = 1.0  # s
         self._moves: Moves | None = None  # made when first asked for
+        self.release_times, self.release_forces = release
+        self.released = np.zeros(2, int)  # 1 where an end was held and has been let go
         self._set: set[tuple[str, int]] = set()  # loads that are set from outside
         self._paths = np.zeros((2, PATH))  # of ends that are set from outside
         self.set_loads(0.0)
@@ -145,6 +150,21 @@ class EndConditions:
         self.set_loads(t)
         self.at(t)
 
+    def released_at(self, k: int, t: float) -> EndConditions:
+        """The same from t (s) on with end k free; its motion and its direction are over."""
+        held, position = self.values.held.tolist(), self.values.position.copy()
+        held[k], position[k] = 0, 0.0
+        motions = {j: motion for j, motion in self.motions.items() if j != k}
+        release = self.release_times, self.release_forces
+        out = EndConditions(held, position, self._given[0], self._loads, motions, release)
+        out.released[:] = self.released
+        out.released[k] = 1
+        out._turns, out._bring_in = {j: x for j, x in self._turns.items() if j != k}, self._bring_in
+        out._set, out._paths, out.breaks = set(self._set), self._paths, self.breaks
+        out.set_loads(t)
+        out.at(t)
+        return out
+
     def take_frames(self, old: EndConditions) -> None:
         """Stand at rest as other conditions do: what no scene says of a frame hangs on the shape it started from."""
         self._stand_at(old._given[0])
@@ -162,7 +182,7 @@ class EndConditions:
             turns[k] = [*axis, angle]
         ramps = np.array([x.ramp or 0.0 for x in self._loads])
         given = {"frame": self._given[0], "turns": turns, "bring_in": self._bring_in, "ramps": ramps}
-        return given | {"position": self.values.position}
+        return given | {"position": self.values.position, "released": self.released.copy()}
 
     def restore(self, saved: Mapping[str, Any], t: float) -> float:
         """Go on at t (s) as `checkpoint` has said; ValueError where that cannot be.
@@ -171,6 +191,8 @@ class EndConditions:
         """
         if not (saved["bring_in"] > 0.0 and saved["ramps"].min(initial=0.0) >= 0.0):
             raise ValueError("a time that is not positive")
+        if not np.array_equal(saved["released"], self.released):
+            raise ValueError("other ends are let go than were")
         self._stand_at(saved["frame"])
         self._turns = {k: (x[:3], float(x[3])) for k, x in enumerate(saved["turns"]) if x[3]}
         self._bring_in = saved["bring_in"]

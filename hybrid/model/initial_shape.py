@@ -276,4 +276,7 @@ def _end_conditions(
         if motion is not None:
             motions[k] = EndMotion(motion, end.held_position, base, around.elevation)
     held = [end.held_position is not None for end in scene.ends.both]
-    return EndConditions(held, position, frame, loads, motions)
+    when = [end.release for end in scene.ends.both]
+    times = [x.time if x is not None and x.time is not None else np.inf for x in when]
+    forces = [x.tension if x is not None and x.tension is not None else np.inf for x in when]
+    return EndConditions(held, position, frame, loads, motions, (times, forces))

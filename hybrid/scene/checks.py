@@ -167,6 +167,17 @@ def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) ->
         yield Finding(("time", "step"), "a fixed step, because shooting has no other", "add `step: ...` (s)")
 
 
+def _releases(ends: Ends, time: Time | None, solver: str) -> Iterator[Finding]:
+    """Ends that are let go never, or by a solver that cannot."""
+    for name, end in ends.named().items():
+        release = end.release
+        if release is not None and solver == "shooting":
+            yield Finding(("solver",), f"elimination, because ends.{name} is let go (release_at)", "leave solver out")
+        if release is not None and release.time is not None and time is not None and release.time >= time.duration:
+            expected = f"a time before time.duration, {time.duration:g} s"
+            yield Finding(("ends", name, "release_at", "time"), expected, "a longer duration, or leave it out")
+
+
 def _tolerance_is_felt(cable: Cable, time: Time | None) -> Iterator[Finding]:
     if time is None or time.tolerance is None:
         return
@@ -308,6 +319,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _stretches_on_cable,
     _zones_that_move,
     _arbiter_steps,
+    _releases,
     _tolerance_is_felt,
     _accuracy_has_errors,
     _moment_is_there,

@@ -159,6 +159,25 @@ class Motion(Table):
 _LOADS: dict[str, Literal["force", "moment"]] = {"force": "force", "moment": "moment", "thrust": "force"}
 
 
+class Release(Table):
+    """When a held end is let go: at a time, or after the first step with so large a force; whichever comes first."""
+
+    time: Positive | None = Field(default=None, description="time at which it is let go [s]")
+    tension: Positive | None = Field(
+        default=None, description="force between the end and what holds it at which it is let go [N]"
+    )
+
+    @model_validator(mode="after")
+    def _says_when(self) -> Release:
+        if self.time is None and self.tension is None:
+            fix = "time: 12 (s) or tension: 50e3 (N), or leave release_at out"
+            refuse([Finding((), "time or tension", fix)])
+        return self
+
+
+_RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
+
+
 class EndTable(Table):
     """What the program asks of an end, whatever its kind: by the keys of the kind, or by what it overrides."""
 
@@ -212,6 +231,12 @@ class EndTable(Table):
         return motion
 
     @property
+    def release(self) -> Release | None:
+        """When what is held is let go."""
+        release: Release | None = self._own("release_at")
+        return release
+
+    @property
     def loads(self) -> tuple[GivenLoad, ...]:
         """Forces and moments given at the end."""
         found = []
@@ -246,6 +271,7 @@ class Pinned(EndTable):
     )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
+    release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @model_validator(mode="after")
     def _turning_is_free(self) -> Pinned:
@@ -266,6 +292,7 @@ class Clamped(EndTable):
     turns: Number = Field(default=0.0, description=_TURNS)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
+    release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @property
     def holds_twist(self) -> bool:

@@ -20,6 +20,7 @@ from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
+from hybrid.model.release import check_releases
 from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
@@ -325,6 +326,7 @@ class Case:
     def _start(self, resolution: Resolution) -> tuple[Model, Equilibrium | None, ZoneSwitching | None]:
         """The model, its equilibrium if it starts from one, and what moves its zones if they move."""
         model = build(self.scene, resolution)
+        check_releases(self.scene, model)
         if model.layout is not None:
             return zones_at_start(self.scene, model, resolution, 0.0, self.criterion)
         found = equilibrium_of(self.scene, model, 0.0) if self.scene.initial.kind == "equilibrium" else None

@@ -26,6 +26,7 @@ from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plane import in_space, planar
+from hybrid.model.release import released_as
 from hybrid.model.resolution import Resolution, first_resolution
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
@@ -151,7 +152,19 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         first = model = build(scene, resolution, (s, zones))
     plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None
     line = in_space(model.line) if plane is None else planar(model.line, plane)
-    return first, replace(model, line=line, plane=plane)
+    released = _released(saved)
+    return released_as(first, released, 0.0), released_as(replace(model, line=line, plane=plane), released, 0.0)
+
+
+def _released(saved: Mapping[str, Any]) -> np.ndarray:
+    """(2,) 1 where an end had been let go; a checkpoint before 0.7 does not say, and none had."""
+    ends, none = saved["ends"], np.zeros(2, int)
+    if not isinstance(ends, Mapping) or "released" not in ends:
+        return none
+    found = np.asarray(matched(ends["released"], none, "released"))
+    if not np.isin(found, (0, 1)).all():
+        raise ValueError(f"ends that are let go: {found}")
+    return found
 
 
 def _check_nodes(s: np.ndarray, scene: Scene) -> None:
@@ -177,6 +190,8 @@ def restored_parts(
         # as at the start of the run, whatever loads came later: its times and tensions are those of the first scene
         start = first if not changes else build(scenes[0], resolution, first.layout)
         manager = manager_for(scene, start, resolution, criterion)
+        for k in np.flatnonzero(model.ends.released).tolist():
+            manager.release(k, model.cable)
         manager.load(model.ends.moments)
         manager.set_layout(model.layout)
         switching = ZoneSwitching(model, manager, loaded=scene.model.joint == "curvature")

@@ -152,6 +152,7 @@ class Simulation:
         except ComputationError as error:
             self._failed = str(error)
             raise
+        self._forget_released()
         return self.t
 
     def _step_to(self, until: float) -> None:
@@ -217,6 +218,31 @@ class Simulation:
             conditions.load("moment", k, _vector(moment, "moment"), self.t)
         self._loop.run.run.move(conditions.moves())
 
+    def release(self, end: str) -> None:
+        """Let a held end go now: it is free from here on, and `set_force` acts on it.
+
+        end: "start" or "end".  ValueError: it is not held, or a torque passes through it into catenary zones.
+        """
+        self._check_open()
+        k, model = self._end(end), self._loop.run.model
+        if not model.ends.values.held[k]:
+            raise ValueError(f"ends.{end} is not held: there is nothing to release")
+        if len(model.line.torsion):
+            raise ValueError(f"ends.{end} is the end of a twisted catenary: give it swivel: true in the scene")
+        self._recorder.commit_old()
+        try:
+            self._loop.release(k, "by Simulation.release")
+        except StepFailed as failed:
+            self._loop.fail(failed.tried, failed.dt)
+        self._forget_released()
+
+    def _forget_released(self) -> None:
+        """Ends that are free now are no longer set."""
+        held = self._loop.run.model.ends.values.held
+        for k in [k for k, end in self._driven.items() if end.held and not held[k]]:
+            self._driven.pop(k)
+            self._next.pop(k, None)
+
     def forces(self) -> EndForces:
         """Forces and moments of the cable on what holds its ends, now."""
         report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
@@ -257,7 +283,7 @@ class Simulation:
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
         loads = run.model.ends.keep_loads()
-        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads)
+        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model)
 
     def restore(self, saved: Any) -> None:
         """Back to what `save` returned.  ValueError: a later `save` has made final what came after it."""
@@ -270,7 +296,11 @@ class Simulation:
             self._loop.recorder = self._recorder
         else:
             run = self._loop.run
+            if run.model is not saved.model:  # an end has been released since
+                run.set_model(saved.model, run.state.copy())
             run.run.bring_back(saved.state)
+            ends = saved.model.ends.motions
+            self._driven = {k: end for k, end in ends.items() if isinstance(end, DrivenEnd)}
             for k, path in saved.paths.items():
                 self._driven[k].path[:] = path
             run.model.ends.bring_back_loads(saved.loads, saved.t)
@@ -338,6 +368,7 @@ class _Saved(NamedTuple):
     watch: Mapping[str, Any]
     paths: Mapping[int, Floats]
     loads: Any
+    model: Model
 
 
 def _vector(x: Sequence[float] | Floats, name: str) -> Floats:

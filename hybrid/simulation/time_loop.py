@@ -18,6 +18,7 @@ from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, Stop
 from hybrid.simulation.failure import explanation, failed_node, first_remedy, snapshot
+from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
 from hybrid.simulation.transient import StepFailed, Transient
@@ -135,8 +136,9 @@ class TimeLoop:
     def until(self, end: float, exact: bool) -> None:
         """Steps end where ends are let go, and, if their length is controlled, where loads have grown."""
         run = self.run
+        self._release_due()
         breaks = run.model.ends.breaks
-        stops = {end, *(t for t in breaks if t < end)}
+        stops = {end, *(t for t in (*breaks, *run.model.ends.release_times) if t < end)}
         if run.controlled:
             stops |= {t for t in ramp_ends(run.scene) if t < end}
         if exact:
@@ -148,6 +150,19 @@ class TimeLoop:
             if any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
                 run.restart()
                 self._settle()
+            self._release_due()
+
+    def _release_due(self) -> None:
+        """Let ends go whose time has come; a run that is resumed may stand just before that."""
+        for k in due(self.run.model, self.run.t, self.run.resolution.step):
+            self.release(k, f"at t = {self.run.t:.6g} s (release_at.time)")
+
+    def release(self, k: int, why: str) -> None:
+        """Let end k (0 or 1) go now; why: for the event."""
+        self.write_down(everything=True)
+        self.run.release(k, why)
+        self.run.events.write_to(self.recorder)
+        self._settle()
 
     def go_to(self, stop: float) -> None:
         """Steps up to `stop` (s), where one ends; StepFailed or ComputationError: they stop before."""

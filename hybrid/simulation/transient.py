@@ -21,6 +21,7 @@ from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model, build
 from hybrid.model.plan import parts
 from hybrid.model.plane import in_space, planar
+from hybrid.model.release import released_as
 from hybrid.model.resolution import Resolution
 from hybrid.model.scales import wave_step
 from hybrid.scene.schema import Scene
@@ -29,6 +30,7 @@ from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
+from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
@@ -75,6 +77,7 @@ class Transient:
         self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
+        self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
         self._leaves, self._rescues = False, (0, 0)  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
@@ -136,7 +139,7 @@ class Transient:
     def unchanging(self) -> bool:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
         joints = self.switching is not None and self.switching.joints is not None
-        return not (self._pending is not None or self._leaves or joints)
+        return not (self._pending is not None or self._leaves or self._overloaded or joints)
 
     # --- the start ------------------------------------------------------------------------------
 
@@ -181,7 +184,7 @@ class Transient:
             )
             self.events.event(0.0, s, s, "end rotated in", text)
 
-    def _find_accelerations(self) -> None:
+    def _find_accelerations(self, new_leg: bool = True) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
         ends, run = self.model.ends, self.run
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
@@ -193,7 +196,8 @@ class Transient:
         run.move(ends.moves())
         run.clock[b.LAST_DT] = 0.0
         self._restart_books()
-        self.begin_leg()
+        if new_leg:
+            self.begin_leg()
 
     def _restart_books(self) -> None:
         """The report of the state has been made anew: powers follow from it, and what the seabed stores."""
@@ -204,10 +208,16 @@ class Transient:
         run.clock[b.PREVIOUS] = run.clock[b.NOW]
         run.count[b.PHASE], run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.START, b.SAMPLE, 1
 
-    def restart(self) -> None:
+    def release(self, k: int, why: str, new_leg: bool = True) -> None:
+        """End k (0 or 1) is let go now; new_leg: whether equal steps are counted from here."""
+        model = let_go(self, k, why)
+        self.set_model(model, self.state.copy())
+        self.restart(new_leg)
+
+    def restart(self, new_leg: bool = True) -> None:
         """A load has just stopped, or others act: accelerations jump."""
         self.model.ends.set_loads(self.t)
-        self._find_accelerations()
+        self._find_accelerations(new_leg)
         clock = self.run.clock
         if self.controlled:
             clock[b.NEXT_DT] = max(clock[b.NEXT_DT] / FIRST, clock[b.SHORTEST])
@@ -264,7 +274,7 @@ class Transient:
         count, switching, asks = self.run.count, self.switching, 0
         if self._leaves:
             asks |= b.ASK_STEPS
-        if self._leaves or self._pending is not None or self.asks_samples:
+        if self._leaves or self._overloaded or self._pending is not None or self.asks_samples:
             asks |= b.ASK_SAMPLES
         if switching is not None and not switching.compiled:
             asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
@@ -307,10 +317,12 @@ class Transient:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:
             self._leaves = self.plane_monitor.must_leave(run, self._note)
+        if flags & b.LETS_GO:
+            self._overloaded = overloaded(run)
         if self.switching is not None:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
-        changes = self._pending is not None or self._leaves
+        changes = self._pending is not None or self._leaves or bool(self._overloaded)
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
         outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
@@ -358,6 +370,9 @@ class Transient:
             state = self.state.copy()
             self.set_model(self.plane_monitor.leave(self.model, self.run, state), state)
             self.evaluate_forces()
+        released, self._overloaded = self._overloaded, {}
+        for k, why in released.items():
+            self.release(k, why, new_leg=False)
 
     def evaluate_forces(self) -> None:
         """The forces and the powers of a state that has changed between two steps."""
@@ -393,6 +408,7 @@ class Transient:
         if self.switching is not None:
             model = on_layout(model, self.switching.manager.layout)
             self.switching.release_joints(state)
+        model = released_as(model, old.ends.released, self.t)
         model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
         model.ends.go_on_from(old.ends, self.t)
         self.scene, self.changes = scene, self.changes + 1
@@ -433,6 +449,7 @@ class Transient:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)
             self.envelope.itself.attach(model, self.run)
         self.plane_monitor.attach(self.run, model.line)
+        watch_forces(self.run, model)
         if self.switching is not None:
             self.switching.attach(self.run, self.resolution.every)
 

@@ -60,6 +60,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {name: x for name, x in saved.items() if name != "correction"}
     if isinstance(saved.get("state"), dict) and "turn" not in saved["state"] and not model.line.torsion.size:
         saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
+    if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
+        saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]
@@ -81,6 +83,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         raise ValueError(moved)
     compiled.move(model.ends.moves())
     books.velocity[:] = model.ends.velocity
+    ends = model.ends.values  # outputs within the next step lie between these and those at its end
+    books.imposed[0] = np.hstack([ends.position, ends.frame, ends.spin, ends.force, ends.moment])
     if saved["control"] is not None:
         _restore_control(run, saved["control"])
     if saved["push"] is not None:

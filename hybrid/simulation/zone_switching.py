@@ -220,6 +220,12 @@ class ZoneSwitching:
             self.joints = self.joints.on(target)
         return changed, transfer.out, float(numbers[AFTER] - numbers[BEFORE])
 
+    def release(self, k: int, model: Model) -> None:
+        """End k (0 or 1) has been let go."""
+        self.manager.release(k, model.cable)
+        self.zones.stiff[-k] = model.line.kb[-k]
+        self.model = model
+
     def release_joints(self, state: State) -> None:
         """Take what joints carry off the line, for another line to be put in its place."""
         if self.joints is not None:

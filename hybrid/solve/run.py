@@ -55,7 +55,7 @@ class CompiledRun:
         self.clock, self.count = self.books.clock, self.books.counts
         self.keeps_extremes, self._room = extremes, np.zeros(0)
         self.clock[b.RHO], self.clock[b.ALLOWED] = rho, np.inf
-        self.clock[b.LEAST_PEAK] = np.inf
+        self.clock[b.LEAST_PEAK] = self.clock[b.RELEASE_START] = self.clock[b.RELEASE_END] = np.inf
         self.count[b.VARIES] = varies
         self.states: tuple[State, State]
         self._zones_address = 0  # of what follows zones; 0: not known yet

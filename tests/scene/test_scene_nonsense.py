@@ -47,7 +47,7 @@ model: {kind: rod}
 LOADED = """\
 cable: {sections: [{length: 10.0, mass: 1.0}]}
 ends:
-  start: {kind: pinned, position: [0.0, 0.0, 0.0]}
+  start: {kind: pinned, position: [0.0, 0.0, 0.0], release_at: {time: 4.0, tension: 50.0}}
   end: {kind: free, force: {history: [[0.0, 0.0, 0.0, 0.0], [2.0, 1.0, 0.0, -3.0], [5.0, 1.0, 0.0, 0.0]], ramp: 1.0}}
 initial: {kind: equilibrium}
 model: {kind: catenary}

@@ -1,0 +1,50 @@
+"""A line whose end is let go in mid-motion: what held the end is off, and everything else stays as it is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.state import Line
+from hybrid.model.build import Model
+from hybrid.scene.schema import Scene
+
+NAMES = ("start", "end")
+
+
+def without_hold(model: Model, k: int, t: float) -> Model:
+    """The same model with end k (0 or 1) free from t (s) on; its motion is over.  The old one is as it was."""
+    tangent, twist = model.cable.held_tangent, model.cable.held_twist
+    cable = replace(
+        model.cable,
+        held_tangent=(tangent[0] and k != 0, tangent[1] and k != 1),
+        held_twist=(twist[0] and k != 0, twist[1] and k != 1),
+    )
+    return replace(model, line=_without_clamp(model.line, -k), cable=cable, ends=model.ends.released_at(k, t))
+
+
+def _without_clamp(line: Line, node: int) -> Line:
+    """The line without the element between an end and its clamp; without a clamp, the line itself."""
+    if not line.element[node]:
+        return line
+    element, kb, k0 = line.element.copy(), line.kb.copy(), line.k0.copy()
+    element[node], kb[node], k0[node] = 0, 0.0, 0.0
+    return line._replace(element=element, kb=kb, k0=k0)
+
+
+def released_as(model: Model, released: np.ndarray, t: float) -> Model:
+    """The model with the ends free that are marked, (2,) 0 or 1."""
+    for k in np.flatnonzero(released).tolist():
+        model = without_hold(model, k, t)
+    return model
+
+
+def check_releases(scene: Scene, model: Model) -> None:
+    """SceneError: an end is to be let go through which a torque passes into a catenary zone."""
+    for name, end in scene.ends.named().items():
+        if end.release is not None and len(model.line.torsion):
+            expected = "an end through which no torque passes into catenary zones"
+            fix = f"ends.{name}.swivel: true, or model: rod"
+            raise SceneError([Complaint(f"ends.{name}.release_at", "the end of a twisted catenary", expected, fix)])

@@ -1,0 +1,67 @@
+"""Held ends that are let go in mid-motion: when, the energy that goes with a clamp, and the event."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid.kernels import books as b
+from hybrid.kernels.energies import observe
+from hybrid.kernels.state import State
+from hybrid.model.build import Model
+from hybrid.model.release import NAMES, without_hold
+from hybrid.solve.run import CompiledRun
+
+if TYPE_CHECKING:
+    from hybrid.simulation.transient import Transient
+
+SAME_TIME = 1e-6  # of a step: a time so near is now
+
+
+def watch_forces(run: CompiledRun, model: Model) -> None:
+    """Let the compiled run notice the forces at which held ends are let go."""
+    held, forces = model.ends.values.held, model.ends.release_forces
+    for k, name in enumerate((b.RELEASE_START, b.RELEASE_END)):
+        run.clock[name] = forces[k] if held[k] else np.inf
+
+
+def overloaded(run: CompiledRun) -> dict[int, str]:
+    """The ends that are held by more than the force at which they are let go, after a step, and the reason in words."""
+    row, found = run.books.log[run.count[b.ROWS] - 1], {}
+    for k, name in enumerate((b.RELEASE_START, b.RELEASE_END)):
+        force, limit = float(row[b.LOG.index("end_force_start") + k]), float(run.clock[name])
+        if force > limit:
+            text = f"after the first step in which its force, {force:.6g} N, is above release_at.tension, {limit:g} N,"
+            found[k] = text
+    return found
+
+
+def due(model: Model, t: float, step: float) -> list[int]:
+    """The held ends whose time to be let go has come at t (s)."""
+    ends = model.ends
+    return [k for k in (0, 1) if ends.values.held[k] and ends.release_times[k] <= t + SAME_TIME * step]
+
+
+def elastic(model: Model, t: float, state: State) -> float:
+    """Energy of bending and torsion, J, at t (s)."""
+    cells, energy = model.cells, np.zeros(4)
+    vectors = np.zeros((2, cells + 1, 3))
+    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, *vectors, energy)
+    return float(energy[1] + energy[2])
+
+
+def let_go(run: Transient, k: int, why: str) -> Model:
+    """The model of a run with end k (0 or 1) free from now on; energy is booked, and an event says why."""
+    old, t, state = run.model, run.t, run.state
+    model = without_hold(old, k, t)
+    energy = 0.0
+    if model.line is not old.line:
+        energy = elastic(model, t, state) - elastic(old, t, state)
+        run.run.books.work[0, k] += energy  # what bends between the end and its clamp goes with the clamp
+    if run.switching is not None:
+        run.switching.release(k, model)
+    s = float(model.line.s[-k])
+    text = f"ends.{NAMES[k]} is let go {why} and is free from here on"
+    run.events.event(t, s, s, "end released", text, energy=energy)
+    return model

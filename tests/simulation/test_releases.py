@@ -1,0 +1,176 @@
+"""Held ends that are let go in mid-motion: what is conserved from there on, events, resumed runs, steps taken back."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+
+SECTION = {"length": 10.0, "mass": 1.0, "axial_stiffness": 1e5, "bending_stiffness": 5.0}
+CLAMP = {"kind": "clamped", "position": [8, 0, 0], "tangent": [1, 0, 0]}
+HEAVE = {"travel": {"by": [1.99, 0, 0], "over": 1.0}}
+
+
+def scene(end: dict[str, Any], start: dict[str, Any] | None = None, **changes: Any) -> hybrid.Scene:
+    data: dict[str, Any] = {
+        "cable": {"sections": [SECTION]},
+        "ends": {"start": start or {"kind": "pinned", "position": [0, 0, 0]}, "end": end},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20},
+        "time": {"duration": 1.5, "step": 0.01}, "output": {"every": 0.1, "points": 21},
+    }  # fmt: skip
+    return hybrid.validate_scene(data | changes)
+
+
+def pinned(**release: Any) -> dict[str, Any]:
+    return {"kind": "pinned", "position": [8, 0, 0], **release}
+
+
+def masses() -> np.ndarray:
+    out = np.full(21, 10.0 / 20)
+    out[[0, -1]] *= 0.5
+    return out
+
+
+def test_a_cable_whose_ends_are_both_let_go_falls_as_a_body() -> None:
+    """Its centre of mass is on the parabola of free fall to round-off; its angular momentum stays to second order."""
+    both = scene(
+        pinned(release_at={"time": 0.5}), {"kind": "pinned", "position": [0, 0, 0], "release_at": {"time": 0.5}}
+    )
+    with hybrid.run(both) as result:
+        after = result.t > 0.5 + 1e-9
+        t, r, v, m = result.t[after] - 0.5, result.position[after], result.velocity[after], masses()
+        centre = np.einsum("i,tik->tk", m, r) / m.sum()
+        begin = (m @ result.position[5]) / m.sum()
+        np.testing.assert_allclose(centre[:, 2] - begin[2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-6)
+        assert [(e.kind, e.t, e.s_a) for e in result.events if e.kind == "end released"] == [
+            ("end released", 0.5, 0.0), ("end released", 0.5, 10.0)]  # fmt: skip
+        spin = np.einsum(
+            "i,tik->tk", m, np.cross(r - centre[:, None], v - np.einsum("i,tik->tk", m, v)[:, None] / m.sum())
+        )
+        size = np.einsum("i,ti,ti->t", m, *2 * (np.linalg.norm(r - centre[:, None], axis=2),)).max()
+        assert np.abs(spin - spin[0]).max() < 1e-4 * size
+
+
+def test_energy_is_lost_to_second_order_after_a_release() -> None:
+    """The scheme damps the waves that set out from the end; what it takes falls with the step."""
+    lost = []
+    for step in (0.01, 0.0025):
+        with hybrid.run(scene(pinned(release_at={"time": 0.5}), time={"duration": 1.5, "step": step})) as result:
+            lost.append(float(np.abs(result.work["scheme"]).max()))
+            assert np.abs(result.work["end"][-1]) < 1e-12
+    assert lost[1] < 0.5 * lost[0] < 0.005 * 160, lost
+
+
+@pytest.mark.parametrize("model", ["rod", "{kind: adaptive, tolerance: 1.0e-3}"])
+def test_a_clamp_goes_with_the_energy_of_its_bend(model: str) -> None:
+    """Bending at the end is zero from then on, the clamp's energy is in the event and in the work of the end."""
+    made = scene(CLAMP | {"release_at": {"time": 0.5}}, model=hybrid.parse_scene(TEXT.replace("MODEL", model)).model)
+    with hybrid.run(made) as result:
+        event = next(e for e in result.events if e.kind == "end released")
+        assert event.energy < 0.0
+        assert result.work["end"][-1] == pytest.approx(event.energy, abs=1e-12)
+        assert np.abs(result.moment[result.t > 0.5 + 1e-9, -1]).max() < 1e-9 < np.abs(result.moment[5, -1]).max()
+
+
+TEXT = """\
+cable: {sections: [{length: 10, mass: 1, axial_stiffness: 1e5, bending_stiffness: 5}]}
+ends: {start: {kind: pinned, position: [0, 0, 0]}, end: {kind: pinned, position: [8, 0, 0]}}
+initial: equilibrium
+model: MODEL
+"""
+
+
+@pytest.mark.parametrize("controlled", [False, True])
+def test_an_end_is_let_go_by_its_force(controlled: bool) -> None:
+    """After the first step above the limit, and free from then on."""
+    time = {"duration": 1.5, "tolerance": 1e-5} if controlled else {"duration": 1.5, "step": 0.01}
+    with hybrid.run(scene(pinned(motion=HEAVE, release_at={"tension": 150.0, "time": 1.4}), time=time)) as result:
+        (event,) = (e for e in result.events if e.kind == "end released")
+        t, force = result.steps["t"], result.steps["end_force_end"]
+        first = int(np.argmax(force > 150.0))
+        assert event.t == t[first] < 1.0 and "release_at.tension, 150 N" in event.text
+        assert (force[:first] <= 150.0).all() and (force[first + 1 :] == 0.0).all()
+
+
+CASES = {
+    "time": (pinned(motion=HEAVE, release_at={"time": 0.55}), {}),
+    "tension": (pinned(motion=HEAVE, release_at={"tension": 150.0}), {}),
+    "clamp, adaptive": (CLAMP | {"release_at": {"time": 0.55}}, {"model": "adaptive"}),
+    "clamp, controlled": (CLAMP | {"release_at": {"time": 0.55}}, {"time": {"duration": 1.5, "tolerance": 1e-4}}),
+    "errors": (pinned(release_at={"time": 0.5}), {"output": {"every": 0.1, "errors": True}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, monkeypatch) -> None:
+    """Stopped before, near and after the release."""
+    end, changes = CASES[name]
+    made, stopping = scene(end, **changes), Stopping(monkeypatch)
+    with hybrid.run(made, tmp_path / "whole.h5", progress=stopping) as result:
+        t = next(e.t for e in result.events if e.kind == "end released")
+        at = int(np.searchsorted(result.steps["t"], t))
+    for k, stop in enumerate((at // 2, at, at + 1, at + 2, at + 30)):
+        assert went_on(made, tmp_path / f"{k}.h5", stopping, [stop]) == 1
+        assert differences(tmp_path / "whole.h5", tmp_path / f"{k}.h5") == []
+
+
+def test_a_load_that_changes_after_a_release_leaves_it_free(tmp_path: Path) -> None:
+    made = scene(pinned(release_at={"time": 0.5}))
+    hybrid.run(made, tmp_path / "a.h5").close()
+    with hybrid.resume(tmp_path / "a.h5", until=2.0, settings=["environment.fluid=null"]) as result:
+        assert result.steps["end_force_end"][-1] == 0.0
+
+
+@pytest.mark.parametrize("model", ["rod", "{kind: adaptive, tolerance: 1.0e-3}"])
+def test_a_simulation_releases_and_takes_it_back(model: str) -> None:
+    """Released, stepped and restored: as if nothing had been; then released for good it is the run with release_at."""
+    free = hybrid.parse_scene(TEXT.replace("MODEL", model)).model
+    with hybrid.run(scene(CLAMP | {"release_at": {"time": 0.5}}, model=free)) as expected:
+        places = expected.position[()]
+    with hybrid.Simulation(scene(CLAMP, model=free)) as simulation:
+        simulation.advance(0.3)
+        saved = simulation.save()
+        simulation.release("end")
+        simulation.set_force("end", [1.0, 0.0, 0.0])
+        simulation.advance(0.4)
+        simulation.restore(saved)
+        assert simulation.forces().end.any()
+        simulation.advance(0.5)
+        simulation.release("end")
+        assert not simulation.forces().end.any()
+        with pytest.raises(ValueError, match=r"ends\.end is not held"):
+            simulation.release("end")
+        with pytest.raises(ValueError, match=r"ends\.end is not held: set_force acts on it"):
+            simulation.set_end("end", [0, 0, 0])
+        simulation.advance(1.5)
+        result = simulation.result()
+    assert [e.kind for e in result.events].count("end released") == 1
+    np.testing.assert_allclose(result.position[()], places, rtol=0, atol=1e-9)
+
+
+REFUSED = {
+    "nothing": ({}, {}, "time or tension"),
+    "late": ({"time": 1.5}, {}, r"a time before time\.duration, 1\.5 s"),
+    "arbiter": ({"time": 0.5}, {"solver": "shooting"}, r"ends\.end is let go"),
+}
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_cannot_be_is_refused(name: str) -> None:
+    release, changes, text = REFUSED[name]
+    with pytest.raises(hybrid.SceneError, match=text):
+        scene(pinned(release_at=release), **changes)
+
+
+def test_a_twisted_catenary_is_not_released() -> None:
+    section = SECTION | {"torsional_stiffness": 3.0}
+    start = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    zones = {"kind": "zones", "zones": [{"rod": 2.0}, {"catenary": 6.0}, {"rod": 2.0}]}
+    made = scene(CLAMP | {"release_at": {"time": 0.5}}, start, cable={"sections": [section]}, model=zones)
+    with pytest.raises(hybrid.SceneError, match="twisted catenary"):
+        hybrid.run(made)
