@@ -137,8 +137,8 @@ LIMIT_EVENTS = {
 }
 # Changes of zones: part of a normal run.
 ZONE_EVENTS = ("split", "grow", "merge", "shrink", "retry")
-# All kinds that are part of a normal run: changes of zones, changes of loads that `resume` was asked for, ends let go.
-EXPECTED = (*ZONE_EVENTS, "loads change", "end released")
+# All kinds that are part of a normal run: changes of zones, what `resume`, `release_at` or `ramp` was asked for.
+EXPECTED = (*ZONE_EVENTS, "loads change", "end released", "motion blended in")
 # Kind of the event of a run that another program had begun.
 OTHER_PROGRAM = "other program"
 # Kind of the event that gives the number (value) of events of another kind (criterion) that were not written.

@@ -101,6 +101,15 @@ def cubic(x, c):
 
 
 @inner
+def blended(t, k, moves, value, rate):
+    """A value (3,) of the file of end k and its rate as far as its ramp has grown at t."""
+    if moves.ramp[k] == 0.0:
+        return value, rate
+    r, dr = rise(t, moves.ramp[k])
+    return scale(r, value), add(scale(r, rate), scale(dr, value))
+
+
+@inner
 def cubics_at(t, row, first, moves):
     """Values (3,) and rates of columns first to first + 2 of the cubics in a row."""
     x = t - moves.knots[row]
@@ -115,8 +124,9 @@ def position_at(t, k, moves, sea):
     """Position (m) and velocity (m/s) of an end whose position a motion prescribes."""
     base = (moves.position[k, 0], moves.position[k, 1], moves.position[k, 2])
     if moves.file[k, 1] > moves.file[k, 0]:
-        t = min(t, moves.knots[moves.file[k, 1]])
-        shift, v = cubics_at(t, knot_before(t, k, moves), 0, moves)
+        when = min(t, moves.knots[moves.file[k, 1]])
+        shift, v = cubics_at(when, knot_before(when, k, moves), 0, moves)
+        shift, v = blended(t, k, moves, shift, v)
         return add(base, shift), v
     shift, v = harmonics_at(t, k, 0.0, moves)
     x = add(base, shift)
@@ -213,8 +223,9 @@ def frame_at(t, k, moves):
     when = t if t < math.inf else 0.0
     if moves.prescribed[k, 1]:
         if moves.file[k, 1] > moves.file[k, 0]:
-            when = min(when, moves.knots[moves.file[k, 1]])
-            v, rate = cubics_at(when, knot_before(when, k, moves), 3, moves)
+            last = min(when, moves.knots[moves.file[k, 1]])
+            v, rate = cubics_at(last, knot_before(last, k, moves), 3, moves)
+            v, rate = blended(when, k, moves, v, rate)
             turn, spin = turn_by_vector(v, rate)
         else:
             angle, rate = harmonics_at(when, k, 3.0, moves)
@@ -321,14 +332,17 @@ def distance(a, b):
 @inner
 def turn_of_file(a, b, k, moves):
     """Upper bound (rad) of the turn of end k by its file between a and b: no faster than its rotation vector moves."""
-    last = moves.file[k, 1]
+    last, grown = moves.file[k, 1], rise(b, moves.ramp[k])[0]
+    more = grown - rise(a, moves.ramp[k])[0]  # of a ramp, which turns it as well, by no more than the largest vector
     a, b = min(a, moves.knots[last]), min(b, moves.knots[last])
     row, until, way = knot_before(a, k, moves), knot_before(b, k, moves), 0.0
     while row < until:
         way += way_of_cubics(a, moves.knots[row + 1], row, moves)
         row += 1
         a = moves.knots[row]
-    return way + way_of_cubics(a, b, row, moves)
+    way += way_of_cubics(a, b, row, moves)
+    v, _ = cubics_at(b, row, 3, moves)
+    return grown * way + more * (distance(v, (0.0, 0.0, 0.0)) + way)
 
 
 @inner

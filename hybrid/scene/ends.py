@@ -80,7 +80,7 @@ class Travel(Table):
 
 
 class Motion(Table):
-    """Prescribed motion of an end, relative to where it is held; it must start from rest.
+    """Prescribed motion of an end, relative to where it is held; it must start from rest, or have a `ramp`.
 
     What is given adds up; only a file stands alone.
     """
@@ -100,12 +100,13 @@ class Motion(Table):
         default=None, description="waves: rises and falls with the surface where the end is; needs waves with a ramp"
     )
     ramp: Positive | None = Field(
-        default=None, description="time over which harmonic motion and velocity grow from zero, smoothly [s]"
+        default=None, description="time over which harmonic motion, velocity and a file grow from zero, smoothly [s]"
     )
     file: Text | None = Field(
         default=None,
         min_length=1,
-        description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (s, m, degrees); relative to the scene file",
+        description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (s, m, degrees) in any order; relative to the "
+        "scene file; it starts at rest where the end is, or `ramp` blends it in",
     )
 
     def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
@@ -140,9 +141,6 @@ class Motion(Table):
         if self.file is not None:
             fix = "put the whole motion into the file, or leave file out"
             refuse(Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
-            if self.ramp is not None:
-                fix = "leave ramp out and let the motion in the file start from rest"
-                refuse([Finding(("ramp",), "nothing, because a file is followed as it is", fix)])
         elif not given:
             expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, or file"
             refuse([Finding((), expected, "say how the end moves, or leave motion out")])

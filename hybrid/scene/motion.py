@@ -3,9 +3,9 @@
 Motion has to start from rest and stay smooth: `motion_checks` refuses what does not.
 
 Symbols: A amplitude, w = 2 pi / period, p phase; ramp r(t) = 10 x^3 - 15 x^4 + 6 x^5 with
-x = t / ramp (C2 at both ends); harmonic r(t) A sin(w t + p); steady travel V times the integral
-of r; rotation R = Rz Ry Rx applied to the base frame; eta(x, y, t) height of the surface above
-still water, followed where the end is.  Everything adds up, in inertial axes, angles in radians
+x = t / ramp (C2 at both ends), which multiplies a file as well; harmonic r(t) A sin(w t + p);
+steady travel V times the integral of r; rotation R = Rz Ry Rx applied to the base frame;
+eta(x, y, t) height of the surface above still water, followed where the end is.  Everything adds up, in inertial axes, angles in radians
 inside, degrees in the scene.
 """
 
@@ -89,9 +89,10 @@ class EndMotion:
                 found = refused.finding
                 raise SceneError([Complaint("motion.file", found.given or "", found.expected, found.fix)]) from None
             if record.shift is not None:
-                self._shift_spline = spline(record.times, record.shift)
+                self._shift_spline = spline(record.times, record.shift, self.base if self._ramp else None)
             if record.rotation is not None:
-                self._turn_spline = spline(record.times, np.radians(record.rotation))
+                still = np.zeros(3) if self._ramp else None
+                self._turn_spline = spline(record.times, np.radians(record.rotation), still)
             self._last = float(record.times[-1])
         by_table = bool(self._shifts) or self._carried is not None or self._follows
         self._translates = by_table or self._shift_spline is not None
@@ -133,8 +134,8 @@ class EndMotion:
 
     def _translation(self, t: float) -> tuple[Array, Array]:
         if self._shift_spline is not None:
-            t = min(t, self._last)
-            return self.base + self._shift_spline(t), self._shift_spline(t, 1)
+            shift, velocity = self._followed(self._shift_spline, t)
+            return self.base + shift, velocity
         r, dr = self._grow(t)
         position, velocity = self.base.tolist(), [0.0, 0.0, 0.0]
         for axis, amplitude, w, phase in self._shifts:
@@ -155,8 +156,7 @@ class EndMotion:
 
     def _rotation(self, t: float) -> tuple[Array | None, Array]:
         if self._turn_spline is not None:
-            t = min(t, self._last)
-            turn, spin = _turn_by_vector(self._turn_spline(t), self._turn_spline(t, 1))
+            turn, spin = _turn_by_vector(*self._followed(self._turn_spline, t))
         else:
             r, dr = self._grow(t)
             angle, rate = [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]
@@ -166,6 +166,13 @@ class EndMotion:
                 rate[axis] += amplitude * (dr * sine + r * w * cosine)
             turn, spin = _turn_by_angles(angle, rate)
         return None if self._frame is None else turn @ self._frame, spin
+
+    def _followed(self, curve: Any, t: float) -> tuple[Array, Array]:
+        """Value (3,) and rate of a spline, as far as it has grown."""
+        r, dr = self._grow(t)
+        t = min(t, self._last)
+        value, rate = curve(t), curve(t, 1)
+        return r * value, r * rate + dr * value
 
     def _grow(self, t: float) -> tuple[float, float]:
         """The ramp and its derivative [1/s]."""

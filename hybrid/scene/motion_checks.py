@@ -51,7 +51,7 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
     for here, end, motion in _motions(ends):
         record, wrong = None, list(_harmonic_jump(motion))
         if motion.file is not None:
-            record, wrong = _judged(end, motion.file, time.duration if isinstance(time, Time) else None)
+            record, wrong = _judged(end, motion, time.duration if isinstance(time, Time) else None)
         if not wrong and isinstance(cable, Cable):
             wrong = list(_too_fast(cable, motion, record))
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
@@ -93,13 +93,13 @@ def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
     yield Finding((), expected, fix, f"{name} without ramp: {jump} at t = 0")
 
 
-def _judged(end: End, file: str, duration: float | None) -> tuple[Record | None, list[Finding]]:
+def _judged(end: End, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
     """A motion file, if it can be read, and what is wrong with it."""
     from hybrid.scene.motion_file import RecordRefused, read_record
     from hybrid.scene.motion_jumps import judge_record
 
     try:
-        record = read_record(file)
+        record = read_record(motion.file or "")
     except RecordRefused as refused:
         return None, [refused.finding]
     if end.held_tangent is None and record.rotation is not None:
@@ -111,7 +111,7 @@ def _judged(end: End, file: str, duration: float | None) -> tuple[Record | None,
             "columns t,rx,ry,rz, because the position of a guided end is free",
         )
         return record, [Finding(("file",), expected, "kind: clamped can be moved", given)]
-    return record, judge_record(record, end.held_position, duration)
+    return record, judge_record(record, end.held_position, duration, motion.ramp is not None)
 
 
 def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[Finding]:

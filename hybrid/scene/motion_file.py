@@ -78,10 +78,15 @@ class Record:
                 yield spline(self.times, values)
 
 
-def spline(times: Array, values: Array) -> Any:
-    """C2 spline through `values`, counted from their value at t = 0 so that no rounding shows as a jump."""
+def spline(times: Array, values: Array, base: Array | None = None) -> Any:
+    """C2 spline through `values`, counted from their value at t = 0 so that no rounding shows as a jump.
+
+    base: what they are counted from instead, of a record that is blended in and need not start from rest.
+    """
     from scipy.interpolate import CubicSpline  # slow to import
 
+    if base is not None:
+        return CubicSpline(times, values - base)
     # A record that begins with the computation begins from rest (judge_record sees to it).
     start = (1, np.zeros(3)) if times[0] == 0.0 else "not-a-knot"
     zero = CubicSpline(times, values, bc_type=(start, "not-a-knot"))(0.0)

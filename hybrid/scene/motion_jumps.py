@@ -39,8 +39,13 @@ NEIGHBOURS = 4
 SAME_START = 1e-3
 
 
-def judge_record(record: Record, position: Triple | None, duration: float | None) -> list[Finding]:
-    """What is wrong with a record as motion of an end that starts from rest at `position` ((3,) m, or None)."""
+def judge_record(
+    record: Record, position: Triple | None, duration: float | None, blended: bool = False
+) -> list[Finding]:
+    """What is wrong with a record as motion of an end that starts from rest at `position` ((3,) m, or None).
+
+    blended: a ramp brings it in, so that it may start anywhere with any velocity.
+    """
     found: list[Finding] = []
     times = record.times
     if times[0] > 0:
@@ -52,18 +57,18 @@ def judge_record(record: Record, position: Triple | None, duration: float | None
         found.append(Finding(("file",), expected, "a longer record or a shorter duration", given))
     if found:
         return found
-    if record.shift is not None and position is not None:
-        fix = "make the first row and the position of the end equal"
+    if record.shift is not None and position is not None and not blended:
+        fix = "make the first row and the position of the end equal, or give `ramp: ...` (s), which blends it in"
         found += _starts_at(record, record.shift, np.array(position), "position", "m", fix)
-    if record.rotation is not None:
-        fix = "rotation counts from the tangent of the end: subtract the first row"
+    if record.rotation is not None and not blended:
+        fix = "rotation counts from the tangent of the end: subtract the first row, or give `ramp: ...` (s)"
         found += _starts_at(record, record.rotation, np.zeros(3), "rotation", "deg", fix)
     for values, unit, name, measure in (
         (record.shift, record.shift_unit, "velocity", "m/s"),
         (record.rotation, record.rotation_unit, "angular velocity", "deg/s"),
     ):
         if values is not None and unit is not None:
-            jump = first_jump(times, values, unit, math.inf if duration is None else duration)
+            jump = first_jump(times, values, unit, math.inf if duration is None else duration, not blended)
             if jump is not None:
                 found.append(_jump_finding(record.name, jump, name, measure))
     return found
@@ -88,16 +93,19 @@ def _jump_finding(name: str, jump: tuple[float, float], what: str, unit: str) ->
     t, size = jump
     if t == 0.0:
         given = f"{name}, which starts with {size:.4g} {unit}"
-        fix = "let the record begin at rest, or grow from rest over about two periods"
+        fix = "give `ramp: ...` (s), about two periods, which blends it in, or let the record begin at rest"
         return Finding(("file",), f"no {what} at t = 0, because the cable starts at rest", fix, given)
     given = f"{name}, whose {what} jumps by {size:.4g} {unit} at t = {t:.6g} s"
     return Finding(("file",), f"a smooth {what}", "smooth the record there, or sample it more finely", given)
 
 
-def first_jump(times: Array, values: Array, unit: Array, until: float = math.inf) -> tuple[float, float] | None:
+def first_jump(
+    times: Array, values: Array, unit: Array, until: float = math.inf, from_rest: bool = True
+) -> tuple[float, float] | None:
     """Time and size of the first jump of velocity in [0, until], None if there is none.
 
-    times: (n,) s; values, unit: (n, 3) samples and what their last digits are worth.
+    times: (n,) s; values, unit: (n, 3) samples and what their last digits are worth; from_rest: whether a velocity at
+    t = 0 is a jump.
     """
     slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
     top = float(np.linalg.norm(slopes, axis=1).max())
@@ -105,9 +113,10 @@ def first_jump(times: Array, values: Array, unit: Array, until: float = math.inf
         return None
     start = [_start_speed(times, values[:, j], unit[:, j]) for j in range(values.shape[1])]
     speed, doubt = float(np.linalg.norm([v for v, _ in start])), float(np.linalg.norm([d for _, d in start]))
-    if speed > NEGLIGIBLE * top + doubt:
+    if from_rest and speed > NEGLIGIBLE * top + doubt:
         return 0.0, speed
-    jumps = [j for k in range(values.shape[1]) for j in _kinks(times, values[:, k], unit[:, k], NEGLIGIBLE * top)]
+    least = NEGLIGIBLE * top
+    jumps = [j for k in range(values.shape[1]) for j in _kinks(times, values[:, k], unit[:, k], least, from_rest)]
     if not jumps:
         jumps = [j for column in values.T for j in _leap_at_the_end(times, column, NEGLIGIBLE * top)]
     jumps = [(max(t, 0.0), size) for t, size in jumps if 0.0 <= t <= until]
@@ -141,9 +150,9 @@ def _slope_weights(t: Array) -> Array:
     return weights
 
 
-def _kinks(times: Array, x: Array, unit: Array, negligible: float) -> list[tuple[float, float]]:
+def _kinks(times: Array, x: Array, unit: Array, negligible: float, from_rest: bool) -> list[tuple[float, float]]:
     """(time, velocity jump) of every kink of one column."""
-    if times[0] == 0.0:
+    if times[0] == 0.0 and from_rest:
         # The cable is at rest before the record begins, which gives the first samples neighbours.
         n = NEIGHBOURS + 1
         rest = -np.arange(n, 0, -1) * (times[1] - times[0])

@@ -214,8 +214,10 @@ def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
             return  # the check of its source reports it
         for rows, kind in ((record.shift, "along"), (record.rotation, "normal")):
             if rows is not None:
-                for row in (rows - rows[0]).tolist():
-                    if any(row):
+                if motion.ramp is not None:  # it may start anywhere
+                    kind = "place" if kind == "along" else kind
+                for row in (rows - rows[0] if motion.ramp is None else rows).tolist():
+                    if any(row) or kind == "place":
                         yield Witness((*here, "file"), kind, (row[0], row[1], row[2]))  # type: ignore[arg-type]
 
 

@@ -26,6 +26,7 @@ from hybrid.model.resolution import Resolution
 from hybrid.model.scales import wave_step
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
+from hybrid.simulation.blended import note_blended
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
@@ -146,6 +147,8 @@ class Transient:
     def begin(self, equilibrium: Equilibrium | None) -> None:
         """From an equilibrium, or from the shape that the scene gives.  StepFailed: no accelerations are consistent."""
         model = self.model
+        if self.envelope is not None:
+            note_blended(self.scene, self.events)
         if equilibrium is None:
             state = model.start.copy()
             self._rotate_ends_in(state)

@@ -120,7 +120,15 @@ def test_files_compiled_are_python(tmp_path: Path, shift: bool, turn: bool, begi
     other = Motion(file=csv(tmp_path, "b.csv", False, True))
     times = (*TIMES, *np.linspace(-6.0, 31.0, 150), 29.75, 30.0)
     around = waters()
-    for pair in ((record, other), (other, record), (None, record), (record, KINDS["lists"])):
+    blended = Motion(file=record.file, ramp=7.0)
+    for pair in (
+        (record, other),
+        (blended, other),
+        (None, blended),
+        (other, record),
+        (None, record),
+        (record, KINDS["lists"]),
+    ):
         check(conditions(*pair, around), around, times)
 
 
@@ -178,18 +186,19 @@ def way(ends: EndConditions, a: float, b: float) -> float:
     return float((np.append(weights, 1.0) @ speeds).max() * (b - a) / 6000.0)
 
 
-@pytest.mark.parametrize("name", ["harmonics", "lists", "no ramp", "everything", "file"])
+@pytest.mark.parametrize("name", ["harmonics", "lists", "no ramp", "everything", "file", "blended file"])
 def test_turn_is_an_upper_bound_within_a_factor(tmp_path: Path, name: str) -> None:
     """No less than the integral of the angular speed (its error: 1e-5); axes that add up, and a ramp that counts with
     its largest value, make it up to 7 times more over the first third of a ramp, and up to 3 times later."""
     around = waters()
-    motion = KINDS.get(name) or Motion(file=csv(tmp_path, "a.csv", False, True))
+    blend = 6.0 if name == "blended file" else None
+    motion = KINDS.get(name) or Motion(file=csv(tmp_path, "a.csv", False, True), ramp=blend)
     ends = conditions(motion, None, around)
     moves = ends.moves()
     for a, b in ((0.0, 3.0), (1.0, 1.5), (2.0, 11.0), (5.0, 29.0), (8.0, 100.0)):
         exact = way(ends, a, b)
         bound = turn_of(a, b, moves)
-        assert exact * (1.0 - 1e-5) <= bound <= (3.0 if a >= 2.0 else 7.0) * exact
+        assert exact * (1.0 - 1e-5) <= bound <= (3.0 if a >= 2.0 and blend is None else 7.0) * exact
     if name == "no ramp":  # one axis: 4 amplitudes in a period
         assert turn_of(0.7, 5.7, moves) == pytest.approx(4.0 * math.radians(30.0), rel=1e-12)
     assert turn_of(3.0, 3.0, moves) == 0.0
