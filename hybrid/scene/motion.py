@@ -5,8 +5,8 @@ Motion has to start from rest and stay smooth: `motion_checks` refuses what does
 Symbols: A amplitude, w = 2 pi / period, p phase; ramp r(t) = 10 x^3 - 15 x^4 + 6 x^5 with
 x = t / ramp (C2 at both ends), which multiplies a file as well; harmonic r(t) A sin(w t + p);
 steady travel V times the integral of r; rotation R = Rz Ry Rx applied to the base frame;
-eta(x, y, t) height of the surface above still water, followed where the end is.  Everything adds up, in inertial axes, angles in radians
-inside, degrees in the scene.
+eta(x, y, t) height of the surface above still water, followed where the end is.  Everything adds
+up, in inertial axes, angles in radians inside, degrees in the scene.
 """
 
 from __future__ import annotations
@@ -134,8 +134,8 @@ class EndMotion:
 
     def _translation(self, t: float) -> tuple[Array, Array]:
         if self._shift_spline is not None:
-            shift, velocity = self._followed(self._shift_spline, t)
-            return self.base + shift, velocity
+            shift, speed = self._followed(self._shift_spline, t)
+            return self.base + shift, speed
         r, dr = self._grow(t)
         position, velocity = self.base.tolist(), [0.0, 0.0, 0.0]
         for axis, amplitude, w, phase in self._shifts:
