@@ -18,6 +18,8 @@ SEABED = 512
 FRICTION = 1024
 # No force: all of the cable and of what acts on it lies in a plane (hybrid.kernels.plane).
 PLANAR = 2048
+# Contact of the line with itself (hybrid.kernels.self_contact).
+SELF_CONTACT = 4096
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
@@ -31,4 +33,5 @@ FORCES = {
     "drag, added mass or wetting of bodies": (BODIES, "velocity, acceleration; cable.attachments, ends of kind body"),
     "seabed contact": (SEABED, "height and its rate; environment.seabed"),
     "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
+    "contact of the line with itself": (SELF_CONTACT, "distance of its parts; contact.self"),
 }

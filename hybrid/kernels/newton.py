@@ -19,10 +19,16 @@ from hybrid.kernels.compile import inner
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.generalized_alpha import Scheme, scheme
-from hybrid.kernels.references import caller_of_six
-from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
+from hybrid.kernels.references import caller, caller_of_six
+from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
+
+# Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
+# (kernels.self_contact).
+ADDRESS, ASKED, NEAR = range(3)
+PREPARE, LIMIT, TOUCH, FINISH = range(4)
+call_contact = caller(0.0)
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
@@ -91,7 +97,31 @@ def round_off_tension(line, ca, scale):
 
 
 @inner
-def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains):
+def ask_contact(contact, table, what):
+    """What kernels.self_contact answers."""
+    contact[ASKED] = what
+    return call_contact(contact[ADDRESS], table)
+
+
+@inner
+def start_step(plane, space, task, line, sea, old, new, work, contact, contact_table):
+    """Predict the end of a step; the task with its spectral radius, its scheme, and the largest turn and its cell.
+
+    Where the line touches itself the radius is 0: what contact excites within a step must not stay.
+    """
+    rho, safe = task.rho, 1.0
+    if contact[ADDRESS] != 0:
+        safe = ask_contact(contact, contact_table, PREPARE)
+        if contact[NEAR] != 0:
+            rho = 0.0
+    task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits)
+    s = scheme(rho, task.before, task.dt)
+    turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)
+    return task, s, turn, where
+
+
+@inner
+def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table):
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
     STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
@@ -100,6 +130,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
     ASSEMBLY        one march, for its report and its block rows
     CORRECTION      one march and the solution of its equations, into work.x
 
+    contact: of a step of a line in space that may meet itself (kernels.self_contact); its address is 0 for others.
+
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
     prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
     may end on a branch that has nothing to do with it.
@@ -107,8 +139,7 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
     reach, scale, most = task.limits
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
-        s = scheme(task.rho, task.before, task.dt)
-        turn, where = begin_step(plane, space, line, sea, old, new, work.u, s)
+        task, s, turn, where = start_step(plane, space, task, line, sea, old, new, work, contact, contact_table)
         if not turn < LARGEST_STEP_TURN:
             return TURNED_TOO_FAR, 0, turn, where
     cv, ca = s.cv, s.ca
@@ -142,6 +173,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
         if task.what == CORRECTION:
             outcome = OK
             break
+        if contact[ADDRESS] != 0 and not ask_contact(contact, contact_table, TOUCH) > 0.0:
+            break
         shift, turn, where, pull, big = measure(new.e, new.T, work.x)
         part = 1.0
         if shift > reach and not task.turning:
@@ -150,6 +183,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
             part = LARGEST_TURN / turn
         if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
             part *= 0.5
+        if contact[ADDRESS] != 0:
+            part = min(part, ask_contact(contact, contact_table, LIMIT))
         update(plane, space, line, new, cv, ca, part, task.turning, work)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
@@ -166,6 +201,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
     if task.what == STEP:
         if outcome == OK:
+            if contact[ADDRESS] != 0:
+                work.report[SELF_CONTACT_ENERGY] = ask_contact(contact, contact_table, FINISH)
             turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
             if not turn < LARGEST_STEP_TURN:
                 outcome, where = TURNED_TOO_FAR, cell

@@ -21,6 +21,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     PUSH_ENERGY               kinetic energy of the push out of the plane                      J
     WRONG_PIVOTS              how many pivots of the push's equations have the wrong sign      -
     LOCAL_ERROR, ..._NODE     local error of position that the step makes, and its node        m, -
+    SELF_CONTACT_ENERGY       energy of the contact of the line with itself                    J
 """
 
 from __future__ import annotations
@@ -36,4 +37,5 @@ SLACKEST, SLACKEST_CELL = 26, 27
 SEABED_ENERGY = 28
 PUSH_ENERGY, WRONG_PIVOTS = 29, 30
 LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
-REPORT_SIZE = 33
+SELF_CONTACT_ENERGY = 33
+REPORT_SIZE = 34

@@ -112,6 +112,10 @@ class Job(NamedTuple):
     following: NDArray[np.int64]  # of a run: table of what follows the model error (kernels.bending_error)
     zone_table: NDArray[np.int64]  # of a kernels.zone_step.ZoneJob, of a run whose zones move
     itself_table: NDArray[np.int64]  # of a kernels.self_distance.ItselfJob, of a line that could come near itself
+    contact: NDArray[
+        np.int64
+    ]  # (3,) of kernels.self_contact: address, 0: no contact; what is asked; whether it is near
+    contact_table: NDArray[np.int64]  # of a kernels.self_contact.ContactJob
     zones: int = 0  # address of kernels.zone_step.follow_zones; 0: zones stay, or Python follows them
     itself: int = 0  # address of kernels.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
@@ -138,7 +142,7 @@ def blank_job() -> Job:
     task = Task(0, limits=limits)
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
-        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64),
+        np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64),
     )  # fmt: skip
 
 
@@ -235,7 +239,10 @@ def solve_job(plane, space, job):
             old, new, was, now = job.new, job.old, job.now, job.was
         dt = clock[TRY_END] - clock[NOW]
         task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
-    return solve(plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains)
+    return solve(
+        plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
+        job.contact_table,
+    )  # fmt: skip
 
 
 @kernel

@@ -39,9 +39,10 @@ UNBENT = 1  # in place of the address of `watch_itself`, while the line is not b
     DISTANCE,  # m, between the centrelines there
     S, OTHER_S,  # m, where
     TOLD,  # 1 where it has been told that surfaces meet, until they have come apart
+    MEETING,  # diameters of clearance below which surfaces meet
     LEAST, LEAST_DISTANCE, LEAST_S, LEAST_OTHER, LEAST_TIME,  # the same of the least clearance so far, and when, s
-) = range(10)  # fmt: skip
-FOUND = 10
+) = range(11)  # fmt: skip
+FOUND = 11
 
 
 class Itself(NamedTuple):
@@ -129,7 +130,13 @@ def fill_tree(tree, before, r, e):
     leaves = tree.shape[0] // 2
     for q in range(leaves):
         fill_leaf(tree, leaves + q, q, before, r, e)
-    for k in range(leaves - 1, 0, -1):
+    fill_parents(tree)
+
+
+@inner
+def fill_parents(tree):
+    """Boxes of boxes."""
+    for k in range(tree.shape[0] // 2 - 1, 0, -1):
         for j in range(3):
             tree[k, j] = min(tree[2 * k, j], tree[2 * k + 1, j])
             tree[k, 3 + j] = max(tree[2 * k, 3 + j], tree[2 * k + 1, 3 + j])
@@ -269,9 +276,14 @@ def note_found(found, t):
     if found[DISTANCE] < math.inf and found[CLEARANCE] < found[LEAST]:
         found[LEAST], found[LEAST_DISTANCE], found[LEAST_TIME] = found[CLEARANCE], found[DISTANCE], t
         found[LEAST_S], found[LEAST_OTHER] = found[S], found[OTHER_S]
-    if not found[CLEARANCE] < APART * (found[DISTANCE] - found[CLEARANCE]):
+    meets = False
+    if found[DISTANCE] < math.inf:
+        width = found[DISTANCE] - found[CLEARANCE]
+        if not found[CLEARANCE] < APART * width:
+            found[TOLD] = 0.0
+        meets = found[CLEARANCE] < found[MEETING] * width and found[TOLD] == 0.0
+    else:
         found[TOLD] = 0.0
-    meets = found[CLEARANCE] < 0.0 and found[TOLD] == 0.0
     if meets:
         found[TOLD] = 1.0
     return meets

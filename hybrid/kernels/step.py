@@ -161,12 +161,27 @@ def seabed_work(line, sea, old, new, u, report):
 
 
 @inner
-def begin_step(plane, space, line, sea, old, new, u, s):
+def shorten(new, u, s, part):
+    """Go only a part of the way that is predicted; rates follow as with a correction."""
+    for i in range(u.shape[0]):
+        for k in range(3):
+            du = (part - 1.0) * u[i, k]
+            u[i, k] += du
+            new.v[i, k] += s.cv * du
+            new.vd[i, k] += s.ca * du
+
+
+@inner
+def begin_step(plane, space, line, sea, old, new, u, s, safe):
     """Predict the end of a step from `old` into `new`, with the algorithmic acceleration kept.
+
+    safe: part of the way in which the line does not pass through itself.
 
     Returns the largest turn of a chord (rad) and its cell; beyond LARGEST_STEP_TURN the step is not begun.
     """
     predict_nodes(old, new, u, s)
+    if safe < 1.0:
+        shorten(new, u, s, safe)
     turn, cell = largest_turn(old.e, u)
     if turn < LARGEST_STEP_TURN:
         predict_cells(plane, space, line, old, new, u, s)

@@ -16,7 +16,7 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.kernels.energies import observe
-from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.output_grid import Grid
@@ -358,7 +358,10 @@ class Observation:
 
     @cached_property
     def energies(self) -> dict[str, Floats]:
-        """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), and stored by the seabed."""
+        """(nb,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy), stored by the seabed, by
+
+        contact of the line with itself.
+        """
         kinetic, bending, torsion, stretch = self._observed[2]
         if self.batch.turn.size:
             torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN])
@@ -367,4 +370,5 @@ class Observation:
         return {
             "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
             "contact": self.batch.report[:, SEABED_ENERGY],
+            "self_contact": self.batch.report[:, SELF_CONTACT_ENERGY],
         }  # fmt: skip

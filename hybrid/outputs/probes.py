@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from hybrid.kernels.forces import PLANAR, SEABED
+from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
@@ -70,6 +70,9 @@ PROBES: dict[str, Probe] = {
     "energy/bending": Probe("J", "energy of bending", (), lambda v: v.energies["bending"], "rod"),
     "energy/contact": Probe(
         "J", "energy stored by the seabed under the cable", (), lambda v: v.energies["contact"], "seabed"
+    ),
+    "energy/self_contact": Probe(
+        "J", "energy of contact of the line with itself", (), lambda v: v.energies["self_contact"], "self_contact"
     ),
     "energy/torsion": Probe("J", "energy of torsion", (), lambda v: v.energies["torsion"], "rod torsion"),
 }
@@ -152,6 +155,7 @@ class Observer:
         self._place(line, sea, zones, s)
         has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
         has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
+        has |= {"self_contact"} if line.bits & SELF_CONTACT else set()
         self._probes = {
             name: p
             for name, p in PROBES.items()

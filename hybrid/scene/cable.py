@@ -138,6 +138,16 @@ def _other_units(density: float, mass: float, diameter: float) -> str:
     return "check mass (kg/m) and diameter (m); without a diameter there is no volume to compare with"
 
 
+class Contact(Table):
+    """What the cable touches beside the seabed: itself."""
+
+    self: bool = Field(
+        default=False,
+        description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs "
+        "model: rod and the diameter of every section; absent: they pass through each other, and an event says where",
+    )
+
+
 class Section(Table):
     """A stretch of cable with constant properties, per metre of unstretched length."""
 

@@ -29,7 +29,7 @@ from hybrid.scene.analysis import (
     ZonesModel,
 )
 from hybrid.scene.base import Finding, Place
-from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.cable import Cable, Contact, Environment
 from hybrid.scene.ends import Ends
 from hybrid.scene.plane import TYPED, plane_of
 from hybrid.scene.start_checks import SAME_LENGTH
@@ -200,6 +200,26 @@ def _in_a_plane(
     yield from plane_of(environment, cable, ends, initial, TYPED)[1]
 
 
+def _touches_itself(
+    cable: Cable, contact: Contact, model: Model, solver: str, dimension: int | None
+) -> Iterator[Finding]:
+    """Contact of the cable with itself is known between rods, in space."""
+    if not contact.self:
+        return
+    here: Place = ("contact", "self")
+    for i, section in enumerate(cable.sections):
+        if section.diameter is None:
+            expected = "a number > 0, in m, which parts of the cable keep apart (contact.self)"
+            yield Finding(("cable", "sections", i, "diameter"), expected, "add `diameter: ...` (m)")
+    if not isinstance(model, RodModel):
+        yield Finding(here, "false, because contact is known between rods alone", "add `model: rod`, or leave it out")
+    if solver == "shooting":
+        yield Finding(here, "false, because shooting knows no contact", "leave it out, or leave solver out")
+    if dimension == 2:
+        expected = "3 or nothing, because contact of the cable with itself leads out of a plane"
+        yield Finding(("dimension",), expected, "or leave contact.self out")
+
+
 def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[Finding]:
     if accuracy is not None and output.errors is False:
         expected = "true or nothing, because accuracy is judged by the error figure"
@@ -325,6 +345,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _moment_is_there,
     _sections_that_come_and_go,
     _in_a_plane,
+    _touches_itself,
     _turns_are_held,
     _mesh_spans,
     _layers_are_meshed,

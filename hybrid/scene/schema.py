@@ -36,7 +36,7 @@ from hybrid.scene.analysis import (
 )
 from hybrid.scene.attachments import Attachment, Clump, Float, Modules
 from hybrid.scene.base import Table, Text, Vector, refuse
-from hybrid.scene.cable import AddedMass, Cable, Damping, Drag, Environment, Fluid, Section
+from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
 from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Motion, Pinned, Travel
@@ -56,8 +56,8 @@ from hybrid.scene.sea import (
 __all__ = [
     "Accuracy",
     "AdaptiveModel", "AddedMass", "Attachment", "Body", "Cable", "CatenaryModel", "CatenaryZone", "Clamped", "Clump",
-    "CorrectedModel", "CorrectedZone", "Current", "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End", "Ends",
-    "Environment", "Equilibrium", "Float", "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial",
+    "Contact", "CorrectedModel", "CorrectedZone", "Current", "CurrentPoint", "CurrentProfile", "Damping", "Drag", "End",
+    "Ends", "Environment", "Equilibrium", "Float", "Fluid", "Free", "Friction", "Guided", "Harmonic", "Initial",
     "JonswapWaves", "Load", "Mesh", "Model", "Modules", "Motion", "Output", "Pinned", "Points", "PowerLawCurrent",
     "RegularWaves", "Resolution", "RodModel", "RodZone", "Scene", "Seabed", "Section", "Straight", "Table", "Time",
     "Travel", "UniformCurrent", "Vector", "Waves", "ZonesModel", "missing_time",
@@ -70,6 +70,7 @@ class Scene(Table):
     title: Text = Field(default="", description="a line for people; it heads plots and reports")
     environment: Environment = Field(default=Environment(), description="what acts on the cable from outside")
     cable: Cable = Field(description="what the cable is made of")
+    contact: Contact = Field(default=Contact(), description="what the cable touches beside the seabed")
     ends: Ends = Field(description="how the ends are held, moved and loaded")
     initial: Initial = Field(description="where the cable is at t = 0")
     model: Model = Field(

@@ -8,6 +8,8 @@ from collections.abc import Callable
 import numpy as np
 
 from hybrid.kernels.binding import Table
+from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.self_contact_law import OUTER
 from hybrid.kernels.self_distance import (
     CLEARANCE,
     DISTANCE,
@@ -16,6 +18,7 @@ from hybrid.kernels.self_distance import (
     LEAST_OTHER,
     LEAST_S,
     LEAST_TIME,
+    MEETING,
     OTHER_S,
     TURNED,
     UNBENT,
@@ -54,8 +57,16 @@ def meeting_text(s: float, other: float, distance: float, width: float, dt: floa
     passing = f" in a step of {dt:.3g} s" if dt > 0.0 else ""
     return (
         f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
-        f"diameter of {width:.3g} m: contact of a line with itself is not computed, nothing keeps it from passing "
-        f"through itself here"
+        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here; contact: {{self: true}} "
+        f"does in a run of rods"
+    )
+
+
+def touching_text(s: float, other: float, distance: float, width: float) -> str:
+    """Text of the event of a line that touches itself, with contact; as `meeting_text`."""
+    return (
+        f"s = {s:.6g} m and s = {other:.6g} m touch: their centrelines are {distance:.3g} m apart, the diameter is "
+        f"{width:.3g} m"
     )
 
 
@@ -67,6 +78,7 @@ class SelfWatch:
         self.itself = blank_itself(np.ones(1))
         self._job = Table(blank_itself_job())
         self._address = UNBENT
+        self._touches = False  # whether contact is computed
 
     def attach(self, model: Model, run: CompiledRun) -> None:
         """Go on with a (new) line of a run."""
@@ -78,6 +90,8 @@ class SelfWatch:
             line=model.line, ends=model.ends.values, old=old, new=new, clock=run.clock, counts=run.count,
             itself=self.itself,
         )  # fmt: skip
+        self._touches = bool(model.line.bits & SELF_CONTACT)
+        self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
         run.watch_itself(self._job.numbers, self._address)
 
     def look(self, run: CompiledRun) -> bool:
@@ -100,8 +114,12 @@ class SelfWatch:
         found = self.itself.found
         distance, width = float(found[DISTANCE]), float(found[DISTANCE] - found[CLEARANCE])
         s, other = sorted((float(found[S]), float(found[OTHER_S])))
-        text = meeting_text(s, other, distance, width, dt)
-        event(t, s, other, "line meets itself", text, value=distance, threshold=width)
+        if self._touches:
+            text = touching_text(s, other, distance, width)
+            event(t, s, other, "line touches itself", text, value=distance, threshold=width)
+        else:
+            text = meeting_text(s, other, distance, width, dt)
+            event(t, s, other, "line meets itself", text, value=distance, threshold=width)
 
     def fields(self) -> list[Field]:
         """Fields of the file; NaN where the line never came near itself."""

@@ -13,8 +13,9 @@ from dataclasses import replace
 import numpy as np
 
 from hybrid.adapt.manager import Change
-from hybrid.errors import Outcome
+from hybrid.errors import Complaint, Outcome, SceneError
 from hybrid.kernels import books as b
+from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.state import State, blank_state
 from hybrid.kernels.step_law import FIRST
@@ -32,8 +33,10 @@ from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
+from hybrid.simulation.self_watch import diameters
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.run import CompiledRun, Tried
+from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
 
@@ -160,6 +163,8 @@ class Transient:
         if self.envelope is not None:
             self.envelope.count_from(begun, state.r)
         self.set_model(begun, state)
+        if self.run.contact is not None:
+            self._refuse_to_start_in_itself(self.run.contact)
         self._find_accelerations()
         if self.switching is not None:
             self.switching.begin(begun.ends.values, state)
@@ -170,6 +175,15 @@ class Transient:
         self.run.place(state.r[first].copy())
         if self.envelope is not None:
             self.envelope.itself.look_at_start(self.run, self.events.event)
+
+    def _refuse_to_start_in_itself(self, contact: SelfContact) -> None:
+        """SceneError: parts of the line are in each other at the start, and contact could not tell to which side."""
+        self.stepper.work.u[:] = 0.0
+        if not np.isfinite(contact.energy()):
+            s, other = (float(self.model.line.s[k]) for k in contact.deepest)
+            given = f"{self.scene.initial.kind}, where the line is within itself at s = {s:.6g} m and s = {other:.6g} m"
+            fix = "another start, a smaller diameter, or contact: {self: false}"
+            raise SceneError([Complaint("initial", given, "a start in which the line does not cross itself", fix)])
 
     def _rotate_ends_in(self, state: State) -> None:
         """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
@@ -191,8 +205,9 @@ class Transient:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
         ends, run = self.model.ends, self.run
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
+        force = run.contact.force(self.state) if run.contact is not None else None
         taken = self.stepper.consistent_accelerations(
-            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state
+            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state, force
         )
         if taken.outcome != Outcome.OK:
             raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
@@ -440,7 +455,9 @@ class Transient:
             self.switching.model = model
         if self.correction is not None and self.correction.model is not model:
             self.correction.switch(model)
-        self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=self.correction is not None)
+        touches = bool(model.line.bits & SELF_CONTACT)
+        keep = touches or self.correction is not None
+        self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
         first = np.arange(model.line.s.size) if model.layout is None else model.layout.first
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
@@ -448,6 +465,9 @@ class Transient:
             self.stepper.limits, state, 1.0 + borne_strain(model), first,
             marks_of(self.scene, model), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
+        if touches:
+            contact = SelfContact(model.line, diameters(model), model.tension_scale)
+            self.run.touch_itself(contact, model.line, model.ends.values, self.stepper.work)
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)
             self.envelope.itself.attach(model, self.run)

@@ -36,6 +36,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run),
+        "self_contact": run.run.contact and run.run.contact.contact.numbers.copy(),
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
     }  # fmt: skip
 
@@ -54,7 +55,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     free = dict.fromkeys(("mesh", "plane", "envelope"))
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
-    older |= {"envelope": None, "_slackened": False}
+    older |= {"envelope": None, "_slackened": False, "self_contact": None}
     if run.correction is not None and isinstance(saved.get("correction"), dict):
         older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
@@ -89,6 +90,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         _restore_control(run, saved["control"])
     if saved["push"] is not None:
         monitor.restore(saved["push"], compiled)
+    if compiled.contact is not None:
+        compiled.contact.contact.numbers[:] = saved["self_contact"]
     if run.switching is not None:
         run.switching.restore(saved["zoning"])
     if run.correction is not None:

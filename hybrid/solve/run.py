@@ -23,6 +23,7 @@ from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
 from hybrid.kernels.state import NOT_VARYING, Batch, Ends, Floats, Line, Moves, Sea, State, Work
 from hybrid.kernels.zone_step import follow_zones
 from hybrid.solve.bending_corrector import Corrector
+from hybrid.solve.self_contact import SelfContact
 
 # Steps and samples that a call may take before Python writes them down.
 ROWS = 256
@@ -60,6 +61,7 @@ class CompiledRun:
         self.states: tuple[State, State]
         self._zones_address = 0  # of what follows zones; 0: not known yet
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
+        self.contact: SelfContact | None = None  # of a line that touches itself
         self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
 
     # --- what is computed ---------------------------------------------------------------------------
@@ -135,6 +137,12 @@ class CompiledRun:
         """From now on steps look how near the line comes to itself (kernels.self_distance)."""
         self.table.bind(itself=address, itself_table=table)
 
+    def touch_itself(self, contact: SelfContact, line: Line, ends: Ends, work: Work) -> None:
+        """The line touches itself from now on (kernels.self_contact)."""
+        table = contact.attach(line, ends, self.states, work, self.clock, self.count)
+        self.table.bind(contact=contact.call, contact_table=table)
+        self.contact = contact
+
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""
         self.table.bind(moves=moves)
@@ -172,6 +180,8 @@ class CompiledRun:
         skipped.add("model_error")  # where it is followed, simulation.stepping packs a checkpoint instead
         yield from (x for state in self.states for x in state)
         yield from self.pushes
+        if self.contact is not None:
+            yield self.contact.contact.numbers
         yield from (x for name, x in self.books._asdict().items() if name not in skipped)
 
     # --- what it knows ------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels import entry
+from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL, SEABED_ENERGY, SLACKEST, SLACKEST_CELL
@@ -110,13 +111,15 @@ class Stepper:
         friction_axes(sea, state.e, state.slip)
         state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
 
-    def consistent_accelerations(self, sea: Sea, ends: Ends, acceleration: Floats, state: State) -> Taken:
+    def consistent_accelerations(
+        self, sea: Sea, ends: Ends, acceleration: Floats, state: State, force: Floats | None = None
+    ) -> Taken:
         """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
 
         One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
         the correction is the acceleration; an inextensible cell asks for the change of
         length that keeps it so, d.(a_{c+1} - a_c) = -|n part of v_{c+1} - v_c|^2 / l.
-        acceleration: (2, 3) m/s2 of the held ends.
+        acceleration: (2, 3) m/s2 of the held ends; force: (N+1, 3) N, of contact of the line with itself.
         """
         state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
         l = np.linalg.norm(state.e, axis=1)
@@ -135,6 +138,12 @@ class Stepper:
         bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
         if bad >= 0:
             return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
+        if force is not None and force.any():
+            b, x = np.zeros_like(work.x), np.zeros_like(work.x)
+            b[:, 1:4] = -force
+            b[np.flatnonzero(ends.held) * (len(b) - 1)] = 0.0
+            solve_again(work.X, work.W, b, x)
+            work.x[:] += x
         state.vd[:] = HEAVY * work.x[:, 1:4]
         state.a[:] = state.vd
         state.T[:] += work.x[1:, 0]

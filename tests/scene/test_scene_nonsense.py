@@ -36,6 +36,13 @@ initial: {kind: equilibrium}
 model: {kind: zones, zones: [{corrected: 4.0}, {rod: 6.0}]}
 resolution: {cells_per_layer: 4.0}
 """
+TOUCHING = """\
+cable: {sections: [{length: 10.0, mass: 1.0, diameter: 0.03, bending_stiffness: 2.0}]}
+contact: {self: true}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: rod}
+"""
 TWISTED = """\
 cable: {sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]}
 ends:
@@ -61,6 +68,7 @@ TEXTS = {
     "ocean": OCEAN,
     "at rest": AT_REST,
     "corrected": CORRECTED,
+    "touching": TOUCHING,
     "twisted": TWISTED,
 } | SEAS
 
@@ -132,6 +140,7 @@ def _harmless(path: tuple[str | int, ...], nonsense: Any) -> bool:
         "criteria": (True,),
         "correct": (True,),
         "errors": (True,),
+        "self": (True,),
         "damping": ({},),
     }
     return any(nonsense == h and type(nonsense) is type(h) for h in harmless.get(str(path[-1]), ()))
@@ -176,7 +185,18 @@ def _loaded(name: str) -> Any:
 
 
 SIGNED = {"amplitude", "phase", "position", "current", "tangent", "normal", "force", "value", "direction", "origin"}
-SIGNED |= {"velocity", "moment", "intrinsic_curvature", *WORDS, "swivel", "joint", "criteria", "correct", "errors"}
+SIGNED |= {
+    "velocity",
+    "moment",
+    "intrinsic_curvature",
+    *WORDS,
+    "swivel",
+    "joint",
+    "criteria",
+    "correct",
+    "errors",
+    "self",
+}
 SIGNED |= {
     "z",
     "slope",

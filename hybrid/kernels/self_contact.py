@@ -1,0 +1,254 @@
+"""Contact of a line with itself in a step: pairs of pieces that are near, limits of corrections, and their solution.
+
+A run calls `contact_task` by its address, so that lines without self-contact compile none of it: before a try of a step
+(PREPARE), to shorten what Newton's method predicts and corrects so that no two strands pass through each other (LIMIT),
+to put the forces of contact into a correction (TOUCH), and for the energy at the end (FINISH).
+
+Contact couples nodes that are no neighbours, which the block rows along s do not know.  It is added to their solution
+x0 with the kept factors of the matrix A: (A - H) x = b + g is x = A^-1 b + A^-1 (g + H x), of which only the nodes in
+contact are unknown; GMRES finds them, each product with A^-1 being one more substitution.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.block_elimination import solve_again
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, TRY_END
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.newton import ASKED, LIMIT, NEAR, PREPARE, TOUCH
+from hybrid.kernels.references import reader
+from hybrid.kernels.self_contact_law import add_gradient, add_product
+from hybrid.kernels.self_contact_pairs import (
+    ENERGY,
+    MOST_PRODUCTS,
+    NODES,
+    OVERFLOW,
+    PART,
+    POINTS,
+    SPEED,
+    Contact,
+    blank_contact,
+    fill_tree,
+    find_points,
+    limit,
+)
+from hybrid.kernels.state import Ends, Floats, Line, State, Work, blank_line, blank_state, no_ends, no_work
+
+SOLVED = 1e-7  # residual of GMRES, as a part of the first
+
+
+class ContactJob(NamedTuple):
+    """Arguments of the entry: two states in turn as kernels.run has them, its clock and counts."""
+
+    line: Line
+    ends: Ends
+    old: State
+    new: State
+    work: Work
+    clock: Floats
+    counts: NDArray[np.int64]
+    call: NDArray[np.int64]
+    contact: Contact
+
+
+def blank_contact_job() -> ContactJob:
+    """A job with the types that every one has."""
+    state = blank_state(1)
+    clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+    call = np.zeros(3, np.int64)
+    return ContactJob(
+        blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1)
+    )  # fmt: skip
+
+
+read = reader(blank_contact_job())
+
+
+# --- the correction -------------------------------------------------------------------------------
+
+
+@inner
+def respond(ends, contact, work, with_gradient):
+    """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
+    x, y, b, count = contact.x, contact.y, contact.b, contact.counts[NODES]
+    for k in range(count):
+        i = contact.nodes[k]
+        y[i, 0], y[i, 1], y[i, 2] = 0.0, 0.0, 0.0
+    for k in range(contact.counts[POINTS]):
+        add_product(contact.points[k], x, y)
+        if with_gradient:
+            add_gradient(contact.points[k], y)
+    last = y.shape[0] - 1
+    for k in range(count):
+        i = contact.nodes[k]
+        held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
+        for j in range(3):
+            b[i, 1 + j] = 0.0 if held else y[i, j]
+    good = solve_again(work.X, work.W, b, contact.z)
+    for k in range(count):
+        i = contact.nodes[k]
+        b[i, 1], b[i, 2], b[i, 3] = 0.0, 0.0, 0.0
+    return good
+
+
+@inner
+def next_vector(contact, k):
+    """Orthogonalise basis vector k + 1 against those before; its length goes into the column k."""
+    V, H, size = contact.basis, contact.hessenberg, 3 * contact.counts[NODES]
+    for j in range(k + 1):
+        s = 0.0
+        for i in range(size):
+            s += V[j, i] * V[k + 1, i]
+        H[j, k] = s
+        for i in range(size):
+            V[k + 1, i] -= s * V[j, i]
+    s = 0.0
+    for i in range(size):
+        s += V[k + 1, i] * V[k + 1, i]
+    s = math.sqrt(s)
+    H[k + 1, k] = s
+    if s > 0.0:
+        for i in range(size):
+            V[k + 1, i] /= s
+
+
+@inner
+def rotate_column(H, k):
+    """Givens rotations of column k of the least-squares problem; the residual that is left."""
+    cos, sin, rhs = MOST_PRODUCTS, MOST_PRODUCTS + 1, MOST_PRODUCTS + 2
+    for j in range(k):
+        a, b = H[j, k], H[j + 1, k]
+        H[j, k], H[j + 1, k] = H[j, cos] * a + H[j, sin] * b, H[j, cos] * b - H[j, sin] * a
+    a, b = H[k, k], H[k + 1, k]
+    size = math.sqrt(a * a + b * b)
+    H[k, cos], H[k, sin] = a / size, b / size
+    H[k, k], H[k + 1, k] = size, 0.0
+    H[k + 1, rhs] = -H[k, sin] * H[k, rhs]
+    H[k, rhs] = H[k, cos] * H[k, rhs]
+    return abs(H[k + 1, rhs])
+
+
+@inner
+def solve_contact(ends, contact, work):
+    """Put contact into the correction work.x of a line without it; False if it is not finite."""
+    x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
+    count, rhs, solution = contact.counts[NODES], MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    for k in range(count):
+        i = contact.nodes[k]
+        x[i, 0], x[i, 1], x[i, 2] = work.x[i, 1], work.x[i, 2], work.x[i, 3]
+    if not respond(ends, contact, work, True):
+        return False
+    s = 0.0
+    for k in range(count):
+        i = contact.nodes[k]
+        for j in range(3):
+            V[0, 3 * k + j] = z[i, 1 + j]
+            s += z[i, 1 + j] * z[i, 1 + j]
+    s = math.sqrt(s)
+    for i in range(MOST_PRODUCTS + 1):
+        H[i, rhs] = 0.0
+    H[0, rhs] = s
+    done = 0
+    if s > 0.0:
+        for i in range(3 * count):
+            V[0, i] /= s
+        left = s
+        while done < min(MOST_PRODUCTS, 3 * count) and left > SOLVED * s:
+            for k in range(count):
+                i = contact.nodes[k]
+                x[i, 0], x[i, 1], x[i, 2] = V[done, 3 * k], V[done, 3 * k + 1], V[done, 3 * k + 2]
+            if not respond(ends, contact, work, False):
+                return False
+            for k in range(count):
+                i = contact.nodes[k]
+                for j in range(3):
+                    V[done + 1, 3 * k + j] = V[done, 3 * k + j] - z[i, 1 + j]
+            next_vector(contact, done)
+            left = rotate_column(H, done)
+            done += 1
+    for j in range(done - 1, -1, -1):
+        s = H[j, rhs]
+        for k in range(j + 1, done):
+            s -= H[j, k] * H[k, solution]
+        H[j, solution] = s / H[j, j]
+    for k in range(count):
+        i = contact.nodes[k]
+        for m in range(3):
+            s = work.x[i, 1 + m]
+            for j in range(done):
+                s += H[j, solution] * V[j, 3 * k + m]
+            x[i, m] = s
+    if not respond(ends, contact, work, True):
+        return False
+    for i in range(work.x.shape[0]):
+        for j in range(5):
+            work.x[i, j] += z[i, j]
+    return True
+
+
+# --- entry ----------------------------------------------------------------------------------------
+
+
+@inner
+def place(contact, old, u):
+    """The nodes of a configuration, and their tree."""
+    for i in range(u.shape[0]):
+        for k in range(3):
+            contact.at[i, k] = old.r[i, k] + u[i, k]
+    fill_tree(contact.tree, contact.at)
+
+
+@inner
+def prepare(line, ends, contact, old, u, dt):
+    """Before a try of a step of dt: how much of the prediction is safe, and whether the step comes to contact.
+
+    The size of the law follows the speed of what meets, and stays while anything touches.
+    """
+    numbers, speed = contact.numbers, contact.numbers[SPEED]
+    for i in range(u.shape[0]):
+        for k in range(3):
+            u[i, k] = 0.0
+            contact.move[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * old.a[i, k]
+    place(contact, old, u)
+    find_points(line, ends, contact)
+    numbers[SPEED] = 0.0
+    limit(line, ends, contact)
+    near = numbers[SPEED] > 0.0 or contact.counts[POINTS] > 0
+    numbers[SPEED] = speed if contact.counts[POINTS] > 0 else numbers[SPEED] / dt
+    return near
+
+
+@kernel
+def contact_task(table):
+    """What is asked by `call[ASKED]` of the configuration old.r + work.u.
+
+    PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails;
+    FINISH: the energy of contact, J.
+    """
+    job = read(table)
+    line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
+    old = job.new if job.counts[PARITY] else job.old
+    if phase == PREPARE:
+        near = prepare(line, ends, contact, old, work.u, job.clock[TRY_END] - job.clock[NOW])
+        job.call[NEAR] = 1 if near else 0
+        return contact.numbers[PART]
+    if phase == LIMIT:
+        speed = contact.numbers[SPEED]
+        for i in range(work.x.shape[0]):
+            for k in range(3):
+                contact.move[i, k] = work.x[i, 1 + k]
+        limit(line, ends, contact)
+        contact.numbers[SPEED] = speed
+        return contact.numbers[PART]
+    place(contact, old, work.u)
+    find_points(line, ends, contact)
+    if phase != TOUCH:
+        return contact.numbers[ENERGY]
+    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work)):
+        return 0.0
+    return 1.0

@@ -1,0 +1,252 @@
+"""Contact of a line with itself: the pairs of its pieces that are near, limits of corrections, points of contact."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.compile import inner
+from hybrid.kernels.newton import LIMIT, TOUCH
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.rotations import dot, sub
+from hybrid.kernels.self_contact_law import INNER, OUTER, POINT, P, Q, foot, note_point, spline_point, spline_weights
+from hybrid.kernels.self_distance import DEPTH, LEAF, NEIGHBOURS, box_distance, fill_parents, runs_on
+from hybrid.kernels.state import Floats
+
+WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
+SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
+IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
+MOST_PRODUCTS = 60  # of GMRES
+(
+    PART,  # of a correction that is safe
+    ENERGY,  # J, of contact
+    SPEED,  # m/s, with which pieces may meet in the step that is prepared
+    WIDEST,  # m, diameter
+    REACH,  # m, distance within which pairs are looked at
+) = range(5)
+NUMBERS = 5
+POINTS, NODES, OVERFLOW = range(3)  # of `counts`
+COUNTS = 3
+
+
+class Contact(NamedTuple):
+    """What contact works with; N cells, pieces 1 to N-1."""
+
+    width: Floats  # (N+1,) m, diameters of pieces
+    samples: NDArray[np.int64]  # (N+1,) sample points of pieces
+    stiff: Floats  # (N+1,) N, least size of the law
+    mass: Floats  # (N+1,) kg/m
+    numbers: Floats  # (NUMBERS,)
+    counts: NDArray[np.int64]  # (COUNTS,)
+    tree: Floats  # as kernels.self_distance has it, of pieces
+    stack: NDArray[np.int64]
+    at: Floats  # (N+1, 3) m, nodes
+    move: Floats  # (N+1, 3) m, the correction that is to be limited
+    points: Floats  # (C, POINT)
+    nodes: NDArray[np.int64]  # (N+1,) those in contact
+    marks: NDArray[np.int64]  # (N+1,) 1 for those
+    x: Floats  # (N+1, 3) m, displacements in products
+    y: Floats  # (N+1, 3) N
+    b: Floats  # (N+1, 5) right-hand side
+    z: Floats  # (N+1, 5) its solution
+    basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1))
+    hessenberg: Floats  # (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4): columns, rotations (2), right-hand side, solution
+
+
+def blank_contact(cells: int, points: int = 1) -> Contact:
+    """For a line of so many cells, with room for so many points of contact."""
+    z, nodes = np.zeros, cells + 1
+    leaves = 1
+    while leaves * LEAF < nodes:
+        leaves *= 2
+    return Contact(
+        width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
+        counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64), at=z((nodes, 3)),
+        move=z((nodes, 3)), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
+        x=z((nodes, 3)), y=z((nodes, 3)), b=z((nodes, 5)), z=z((nodes, 5)),
+        basis=z((MOST_PRODUCTS + 1, 3 * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
+    )  # fmt: skip
+
+
+@inner
+def fill_tree(tree, r):
+    """Boxes of the pieces of nodes at r, a leaf for LEAF nodes."""
+    leaves, n = tree.shape[0] // 2, r.shape[0] - 1
+    for q in range(leaves):
+        leaf = leaves + q
+        for k in range(3):
+            tree[leaf, k], tree[leaf, 6 + k] = math.inf, math.inf
+            tree[leaf, 3 + k], tree[leaf, 9 + k] = -math.inf, -math.inf
+        for i in range(max(q * LEAF, 1), min((q + 1) * LEAF, n)):
+            for j in range(2):
+                e = sub(get3(r, i + j), get3(r, i + j - 1))
+                f = 1.0 / math.sqrt(dot(e, e))
+                for k in range(3):
+                    t = f * e[k]
+                    tree[leaf, 6 + k], tree[leaf, 9 + k] = min(tree[leaf, 6 + k], t), max(tree[leaf, 9 + k], t)
+            for k in range(3):
+                a, b, c = 0.5 * (r[i - 1, k] + r[i, k]), r[i, k], 0.5 * (r[i, k] + r[i + 1, k])
+                tree[leaf, k] = min(tree[leaf, k], min(a, min(b, c)))
+                tree[leaf, 3 + k] = max(tree[leaf, 3 + k], max(a, max(b, c)))
+    fill_parents(tree)
+
+
+@inner
+def hull_distance(r, p, q):
+    """Distance, m, of the boxes of two pieces."""
+    square = 0.0
+    for k in range(3):
+        a, b, c = 0.5 * (r[p - 1, k] + r[p, k]), r[p, k], 0.5 * (r[p, k] + r[p + 1, k])
+        d, e, f = 0.5 * (r[q - 1, k] + r[q, k]), r[q, k], 0.5 * (r[q, k] + r[q + 1, k])
+        x = max(min(a, min(b, c)) - max(d, max(e, f)), min(d, min(e, f)) - max(a, max(b, c)))
+        if x > 0.0:
+            square += x * x
+    return math.sqrt(square)
+
+
+@inner
+def may_touch(line, ends, width, p, q):
+    """Whether two pieces, p before q, are no neighbours, neither along the line nor from one held end to the other."""
+    n = line.h.shape[0]
+    between, window = line.s[q] - line.s[p], WINDOW * 0.5 * (width[p] + width[q])
+    if not (q - p > NEIGHBOURS and between > window):
+        return False
+    if ends.held[0] != 0 and ends.held[1] != 0:
+        return p + n - q > NEIGHBOURS and line.s[p] + line.s[n] - line.s[q] > window
+    return True
+
+
+@inner
+def largest_difference(move, p, q):
+    """Largest difference of the displacements of the nodes of two pieces."""
+    square = 0.0
+    for i in range(p - 1, p + 2):
+        for j in range(q - 1, q + 2):
+            d = sub(get3(move, i), get3(move, j))
+            square = max(square, dot(d, d))
+    return math.sqrt(square)
+
+
+@inner
+def limit_part(line, ends, contact, p, q, width, moved):
+    """Shorten the part so that no sample point of piece p comes too near piece q by a difference of `moved`, m."""
+    r, numbers = contact.at, contact.numbers
+    n, count = line.h.shape[0], contact.samples[p]
+    for g in range(count):
+        x = spline_point(r, p, spline_weights((g + 0.5) / count))
+        v, side = foot(r, q, x)
+        if side != 0 and 0 < q + side < n:
+            beside = q + side
+            if not may_touch(line, ends, contact.width, min(p, beside), max(p, beside)):
+                continue
+        away = sub(x, spline_point(r, q, spline_weights(v)))
+        room = max(SAFE * (math.sqrt(dot(away, away)) - INNER * width), 0.0)
+        if room < numbers[PART] * moved:
+            numbers[PART] = room / moved
+
+
+@inner
+def gather(line, contact, p, q, width):
+    """Keep the points of contact of piece p with their feet on piece q."""
+    r, counts, numbers = contact.at, contact.counts, contact.numbers
+    n, count, nearest = line.h.shape[0], contact.samples[p], OUTER * width
+    length = 0.25 * (line.h[p - 1] + line.h[p]) / count  # half: each strand has sample points
+    fast = IMPACT * numbers[SPEED] * numbers[SPEED]
+    size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
+    for g in range(count):
+        w = spline_weights((g + 0.5) / count)
+        x = spline_point(r, p, w)
+        v, side = foot(r, q, x)
+        if side != 0 and 0 < q + side < n:
+            continue
+        away = sub(x, spline_point(r, q, spline_weights(v)))
+        if not dot(away, away) < nearest * nearest:
+            continue
+        if counts[POINTS] == contact.points.shape[0]:
+            counts[OVERFLOW] = 1
+            return
+        row = contact.points[counts[POINTS]]
+        numbers[ENERGY] += note_point(r, p, w, q, v, side != 0, width, size, length, row)
+        counts[POINTS] += 1
+
+
+@inner
+def look_at_pair(line, ends, contact, phase, p, q):
+    """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
+    if not may_touch(line, ends, contact.width, p, q):
+        return
+    apart, width = hull_distance(contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
+    if phase == LIMIT:
+        moved = largest_difference(contact.move, p, q)
+        if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
+            limit_part(line, ends, contact, p, q, width, moved)
+            limit_part(line, ends, contact, q, p, width, moved)
+        if apart - moved < OUTER * width:
+            contact.numbers[SPEED] = max(contact.numbers[SPEED], moved)
+    elif apart < OUTER * width:
+        gather(line, contact, p, q, width)
+        gather(line, contact, q, p, width)
+
+
+@inner
+def look_at_pairs(line, ends, contact, phase):
+    """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else."""
+    tree, stack, n = contact.tree, contact.stack, line.h.shape[0]
+    leaves, reach = tree.shape[0] // 2, contact.numbers[REACH]
+    stack[0, 0], stack[0, 1], top = 1, 1, 1
+    while top > 0:
+        top -= 1
+        a, b = stack[top, 0], stack[top, 1]
+        if (b - a <= 1 and runs_on(tree, a, b)) or not box_distance(tree, a, b) < reach:
+            continue
+        if a >= leaves:
+            first, second = (a - leaves) * LEAF, (b - leaves) * LEAF
+            for p in range(max(first, 1), min(first + LEAF, n)):
+                for q in range(max(second, p + NEIGHBOURS + 1), min(second + LEAF, n)):
+                    look_at_pair(line, ends, contact, phase, p, q)
+            continue
+        c, d = 2 * a, 2 * b
+        stack[top, 0], stack[top, 1] = c, d
+        stack[top + 1, 0], stack[top + 1, 1] = c + 1, d + 1
+        stack[top + 2, 0], stack[top + 2, 1] = c, d + 1
+        top += 3
+        if a != b:
+            stack[top, 0], stack[top, 1] = c + 1, d
+            top += 1
+
+
+@inner
+def limit(line, ends, contact):
+    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m."""
+    numbers, move, n = contact.numbers, contact.move, line.h.shape[0]
+    m0, m1, m2 = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        m0, m1, m2 = m0 + move[i, 0], m1 + move[i, 1], m2 + move[i, 2]
+    mean, square = (m0 / (n + 1), m1 / (n + 1), m2 / (n + 1)), 0.0
+    for i in range(n + 1):
+        d = sub(get3(move, i), mean)
+        square = max(square, dot(d, d))
+    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * math.sqrt(square) / SAFE
+    numbers[PART] = 1.0
+    look_at_pairs(line, ends, contact, LIMIT)
+
+
+@inner
+def find_points(line, ends, contact):
+    """The points of contact, their energy, and the nodes in contact."""
+    counts, numbers = contact.counts, contact.numbers
+    for k in range(counts[NODES]):
+        contact.marks[contact.nodes[k]] = 0
+    counts[POINTS], counts[NODES], counts[OVERFLOW], numbers[ENERGY] = 0, 0, 0, 0.0
+    numbers[REACH] = OUTER * numbers[WIDEST]
+    look_at_pairs(line, ends, contact, TOUCH)
+    for k in range(counts[POINTS]):
+        for of in (P, Q):
+            p = int(contact.points[k, of])
+            for i in range(p - 1, p + 2):
+                if contact.marks[i] == 0:
+                    contact.marks[i], contact.nodes[counts[NODES]] = 1, i
+                    counts[NODES] += 1

@@ -1,0 +1,81 @@
+"""Contact of a line with itself: its arrays for a line, and the table of its kernel."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.binding import Table
+from hybrid.kernels.newton import ADDRESS, ASKED, FINISH
+from hybrid.kernels.self_contact import blank_contact_job, contact_task
+from hybrid.kernels.self_contact_law import FORCE, NORMAL, WX, WY, P, Q
+from hybrid.kernels.self_contact_pairs import POINTS, WIDEST, blank_contact
+from hybrid.kernels.state import Ends, Floats, Line, State, Work
+
+# Sample points of a piece lie at most this part of a diameter apart.
+SPACING = 0.25
+# Room for points of contact: LEAST_POINTS, or two for each sample point; at most MOST_POINTS.
+LEAST_POINTS, MOST_POINTS = 1000, 100_000
+# Least size of the law of contact, N: of EI/D^2; without EI of the tension scale.
+STIFFNESS, TENSION = 0.16, 0.02
+
+
+class SelfContact:
+    """Contact of one line with itself; `table` and `call` are for the job of a run."""
+
+    def __init__(self, line: Line, width: Floats, tension_scale: float) -> None:
+        """width: (N,) m, diameters of cells; tension_scale: N."""
+        n = line.h.size
+        both = np.pad(width, 1, mode="edge")
+        widths = 0.5 * (both[1:] + both[:-1])
+        length = np.pad(line.h, 1, mode="edge")
+        pieces = 0.5 * (length[1:] + length[:-1])
+        samples = np.maximum(np.ceil(pieces / (SPACING * widths)), 1)
+        contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)))
+        contact.width[:], contact.samples[:] = widths, samples
+        bending = line.kb[:, :2].min(axis=1) * line.hn
+        contact.stiff[:] = np.maximum(
+            STIFFNESS * bending / contact.width**2, TENSION * tension_scale * (bending == 0.0)
+        )
+        contact.mass[:] = line.mass / pieces
+        contact.numbers[WIDEST] = contact.width.max()
+        self.contact = contact
+        self.call = np.zeros(3, np.int64)
+        self._job = Table(blank_contact_job())
+
+    def energy(self) -> float:
+        """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
+        self.call[ASKED] = FINISH
+        energy: float = contact_task(self._table)
+        return energy
+
+    @property
+    def deepest(self) -> tuple[int, int]:
+        """The nodes beside the point of contact, of those looked at last, with the largest force."""
+        points = self.contact.points[: self.contact.counts[POINTS]]
+        row = points[np.argmin(points[:, FORCE])]
+        return int(row[P]), int(row[Q])
+
+    def force(self, state: State) -> Floats:
+        """Forces (N+1, 3) N of contact on the nodes of the state of a run."""
+        self._work.u[:] = 0.0
+        self.energy()
+        out = np.zeros_like(state.r)
+        for row in self.contact.points[: self.contact.counts[POINTS]]:
+            f = -row[FORCE] * row[NORMAL : NORMAL + 3]
+            p, q = int(row[P]), int(row[Q])
+            out[p - 1 : p + 2] += row[WX : WX + 3, None] * f
+            out[q - 1 : q + 2] -= row[WY : WY + 3, None] * f
+        return out
+
+    def attach(
+        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, clock: Floats, count: np.ndarray
+    ) -> np.ndarray:
+        """The table of the kernel for a run; `call` has its address then."""
+        old, new = states
+        self._job.bind(
+            line=line, ends=ends, old=old, new=new, work=work, clock=clock, counts=count, call=self.call,
+            contact=self.contact,
+        )  # fmt: skip
+        self._table, self._work = self._job.numbers, work
+        self.call[ADDRESS] = contact_task.address(self._table)
+        return self._table

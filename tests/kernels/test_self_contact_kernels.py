@@ -1,0 +1,159 @@
+"""Contact of a line with itself: derivatives against differences, what its forces keep, limits of corrections."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hybrid.kernels import self_contact as k
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.compile import kernel
+from hybrid.kernels.entry import workspace
+from hybrid.kernels.newton import ASKED, FINISH, LIMIT
+from hybrid.kernels.self_contact_law import INNER, OUTER, add_gradient, add_product
+from hybrid.kernels.self_contact_pairs import POINTS
+from hybrid.kernels.state import blank_line, blank_state, no_ends
+from hybrid.solve.self_contact import SelfContact
+
+WIDTH = 0.1
+
+
+@kernel
+def gradient(points, count, out):
+    for i in range(count):
+        add_gradient(points[i], out)
+
+
+@kernel
+def product(points, count, x, out):
+    for i in range(count):
+        add_product(points[i], x, out)
+
+
+class Tangle:
+    """A line at rest with nodes at r (N+1, 3) m, and its contact."""
+
+    def __init__(self, r: np.ndarray, width: float = WIDTH) -> None:
+        n = len(r) - 1
+        self.r, h = r, np.linalg.norm(np.diff(r, axis=0), axis=1)
+        line = blank_line(n)._replace(
+            h=h,
+            s=np.append(0.0, np.cumsum(h)),
+            kb=np.ones((n + 1, 3)),
+            hn=np.full(n + 1, h.mean()),
+            mass=np.ones(n + 1),
+        )
+        states = (blank_state(n), blank_state(n))
+        for state in states:
+            state.r[:] = r
+        self.work = workspace(n, keep=True)
+        self.contact = SelfContact(line, np.full(n, width), 1.0)
+        ends = no_ends()
+        ends.held[:] = 0
+        clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        self.table = self.contact.attach(line, ends, states, self.work, clock, counts)
+
+    def energy(self, u: np.ndarray) -> float:
+        """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""
+        self.work.u[:] = u
+        self.contact.call[ASKED] = FINISH
+        return k.contact_task(self.table)
+
+    @property
+    def count(self) -> int:
+        return int(self.contact.contact.counts[POINTS])
+
+    def gradient(self, u: np.ndarray) -> np.ndarray:
+        self.energy(u)
+        out = np.zeros_like(self.r)
+        gradient(self.contact.contact.points, self.count, out)
+        return out
+
+    def limit(self, x: np.ndarray) -> float:
+        """The safe part of a correction x (m)."""
+        self.energy(np.zeros_like(self.r))
+        self.work.x[:, 1:4] = x
+        self.contact.call[ASKED] = LIMIT
+        return k.contact_task(self.table)
+
+
+def crossing(gap: float, angle: float = 70.0, seed: int = 0) -> np.ndarray:
+    """A bent line whose two legs cross at an angle (deg), `gap` diameters apart; nodes shaken a little."""
+    random = np.random.default_rng(seed)
+    x, a = np.linspace(-1.0, 1.0, 21), np.radians(angle)
+    first = np.column_stack([x, 0.05 * x**2, np.zeros(21)])
+    second = np.column_stack([-x * np.cos(a), -x * np.sin(a) + 0.013, np.full(21, gap * WIDTH)])
+    bow = np.linspace(0.0, 1.0, 14)[1:-1, None]
+    way = first[-1] * (1.0 - bow) + second[0] * bow + np.array([1.0, 0.5, 0.3]) * 4.0 * bow * (1.0 - bow)
+    r = np.vstack([first, way, second])
+    return r + 1e-3 * random.normal(size=r.shape)
+
+
+def plectoneme(turns: int = 3, cells: int = 60) -> np.ndarray:
+    """Two strands wound about each other, joined at one end."""
+    t = np.linspace(0.0, 1.0, cells // 2)
+    up = np.column_stack(
+        [0.48 * WIDTH * np.cos(2 * np.pi * turns * t), 0.48 * WIDTH * np.sin(2 * np.pi * turns * t), 1.2 * t]
+    )
+    down = (up * [-1.0, -1.0, 1.0])[::-1]
+    bow = np.linspace(0.0, np.pi, 12)[1:-1]
+    top = np.column_stack([0.1 * np.cos(bow), np.zeros(10), 1.2 + 0.15 * np.sin(bow)])
+    return np.vstack([up, top, down])
+
+
+SHAPES = {
+    "crossing": crossing(0.95), "flat": crossing(0.96, angle=25.0), "plectoneme": plectoneme(),
+    "oblique": crossing(0.97, angle=35.0, seed=3),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_force_and_stiffness_are_derivatives_of_the_energy(name: str) -> None:
+    tangle, random = Tangle(SHAPES[name]), np.random.default_rng(1)
+    still = np.zeros_like(tangle.r)
+    assert tangle.energy(still) > 0.0 and tangle.count > 1
+    g = tangle.gradient(still)
+    for _ in range(4):
+        x = random.normal(size=still.shape)
+        e = 1e-7 * WIDTH
+        slope = (tangle.energy(e * x) - tangle.energy(-e * x)) / (2.0 * e)
+        assert slope == pytest.approx(np.vdot(g, x), rel=1e-6, abs=1e-6 * np.abs(g).max())
+        turn = (tangle.gradient(e * x) - tangle.gradient(-e * x)) / (2.0 * e)
+        tangle.energy(still)
+        out = np.zeros_like(still)
+        product(tangle.contact.contact.points, tangle.count, x, out)
+        assert np.abs(out - turn).max() < 1e-5 * np.abs(turn).max()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_contact_keeps_momentum_and_angular_momentum(name: str) -> None:
+    tangle = Tangle(SHAPES[name])
+    g = tangle.gradient(np.zeros_like(tangle.r))
+    size = np.abs(g).sum()
+    assert np.abs(g.sum(axis=0)).max() < 1e-14 * size
+    assert np.abs(np.cross(tangle.r, g).sum(axis=0)).max() < 1e-14 * size * np.abs(tangle.r).max()
+
+
+def test_no_contact_no_energy() -> None:
+    far = Tangle(crossing(OUTER + 0.1))
+    assert far.energy(np.zeros_like(far.r)) == 0.0 and far.count == 0
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("far", [0.5, 3.0, 40.0])
+def test_no_correction_leads_through_the_line(seed: int, far: float) -> None:
+    """Strands end up farther apart than where the force is infinite, however large a correction is asked."""
+    random = np.random.default_rng(seed)
+    tangle = Tangle(crossing(1.0 + 2.0 * random.random(), angle=10.0 + 70.0 * random.random(), seed=seed))
+    x = np.zeros_like(tangle.r)
+    x[33:, 2] = -far * WIDTH  # the second leg through the first
+    x += 0.1 * far * WIDTH * random.normal(size=x.shape)
+    part = tangle.limit(x)
+    assert 0.0 < part <= 1.0
+    for share in np.linspace(0.0, part, 40):
+        assert np.isfinite(tangle.energy(share * x))
+        assert tangle.r[33:, 2].min() - tangle.r[:21, 2].max() > 0.0  # it began on this side
+    if far > 4.0:
+        assert part < 1.0
+    gaps = (tangle.r + part * x)[43, 2] - (tangle.r + part * x)[10, 2]
+    assert gaps > 0.5 * INNER * WIDTH

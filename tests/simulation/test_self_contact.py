@@ -1,0 +1,137 @@
+"""Lines that touch themselves: nothing passes through, no energy comes from nothing, momentum is kept, runs resume."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.kernels.energies import observe
+from hybrid.kernels.self_contact_pairs import ENERGY
+from hybrid.kernels.self_distance import LEAST_DISTANCE
+from hybrid.simulation.transient import Transient
+
+WIDTH, STIFF = 0.02, 0.1
+
+
+def hairpin(angle: float, gap: float, chord: float = 0.025) -> np.ndarray:
+    """Nodes (N+1, 3) m of a line whose two straight legs cross at an angle (deg), a gap (m) apart, and a bow."""
+    a, x = np.radians(angle), np.linspace(-0.5, 0.5, 25)
+    first = np.column_stack([x, 0.0 * x, 0.0 * x])
+    second = np.column_stack([-x * np.cos(a), -x * np.sin(a), 0.0 * x + gap])
+    leave, arrive = (p / np.linalg.norm(p) for p in (first[1] - first[0], second[1] - second[0]))
+    u = np.linspace(0.0, 1.0, 60)[1:-1, None]
+    way = 3.0 * np.linalg.norm(second[0] - first[-1]) + 1.2
+    bow = (2 * u**3 - 3 * u**2 + 1) * first[-1] + (3 * u**2 - 2 * u**3) * second[0]
+    bow += way * ((u**3 - 2 * u**2 + u) * leave + (u**3 - u**2) * arrive)
+    r = np.vstack([first, bow, second])
+    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+    at = np.linspace(0.0, s[-1], round(s[-1] / chord) + 1)
+    return np.column_stack([np.interp(at, s, r[:, k]) for k in range(3)])
+
+
+def flying(r: np.ndarray, step: float, duration: float, contact: bool = True) -> hybrid.Simulation:
+    """A line with nodes at r, m, that nothing holds."""
+    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+    section = {
+        "length": float(s[-1]), "mass": 0.4, "diameter": WIDTH, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
+    }  # fmt: skip
+    return hybrid.Simulation(hybrid.validate_scene({
+        "environment": {"gravity": 1e-15}, "cable": {"sections": [section]}, "contact": {"self": contact},
+        "ends": {"start": {"kind": "free"}, "end": {"kind": "free"}}, "model": "rod", "mesh": {"nodes": s.tolist()},
+        "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
+        "time": {"duration": duration, "step": step, "rho_inf": 0.9}, "output": {"every": step, "points": 5},
+    }))  # fmt: skip
+
+
+def energy(run: Transient) -> float:
+    """Kinetic, elastic and contact energy, J."""
+    x, parts = run.state, np.zeros(4)
+    room = np.zeros((x.T.size + 1, 3))
+    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, room, room.copy(), parts)
+    contact = run.run.contact
+    return float(parts.sum()) + (float(contact.contact.numbers[ENERGY]) if contact else 0.0)
+
+
+@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("steps", [1.0, 10.0], ids=["pass-through step", "ten times that"])
+def test_a_throw(seed: int, steps: float) -> None:
+    """One leg is thrown at the other at 4 to 20 m/s, with steps in which it could pass a diameter, or ten.
+
+    The least distance is that of polygons along straight ways within steps: the spline between them is up to 0.2
+    diameters away, so 0.5 is no passage, which would have 0.
+    """
+    random = np.random.default_rng(seed)
+    speed, gap = float(np.exp(random.uniform(np.log(4.0), np.log(20.0)))), 3.0 * WIDTH
+    step, r = steps * WIDTH / speed, hairpin(random.uniform(20.0, 90.0), gap)
+    duration = 60.0 * WIDTH / speed * max(1.0, 0.5 * steps)
+    simulation = flying(r, step, duration)
+    run = simulation._loop.run
+    s = np.linspace(-1.0, 1.0, len(r))
+    run.state.v[:, 2] = -0.5 * speed * (1.0 + np.tanh(s / 0.15))
+    run.state.v[:] += 0.05 * speed * random.normal(size=3)
+    run._find_accelerations()
+    mass = run.model.line.mass[:, None]
+    momentum, first, most, touched = (mass * run.state.v).sum(axis=0), energy(run), 0.0, False
+    while simulation.t < duration * (1.0 - 1e-9):
+        simulation.advance(min(simulation.t + step, duration))
+        most = max(most, energy(run))
+        touched |= run.run.contact.contact.counts[0] > 0
+    assert touched
+    assert most < 1.001 * first
+    assert run.envelope.itself.itself.found[LEAST_DISTANCE] > 0.5 * WIDTH
+    moved = (mass * run.state.v).sum(axis=0) - momentum
+    assert np.abs(moved).max() < 1e-13 * mass.sum() * speed
+
+
+def looped(**more: Any) -> dict[str, Any]:
+    """A rod with three turns whose ends approach: it throws a loop, whose strands meet."""
+    section = {
+        "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.5,
+        "damping": {"mass": 0.5}, "torsional_stiffness": 0.4,
+    }  # fmt: skip
+    clamp = {"kind": "clamped", "tangent": [1, 0, 0], "normal": [0, 0, 1]}
+    away = {"travel": {"by": [-1.9, 0, 0], "over": 8.0}}
+    return {
+        "environment": {"gravity": 0.5}, "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 100},
+        "initial": {"kind": "equilibrium"}, "contact": {"self": True},
+        "ends": {
+            "start": clamp | {"position": [0, 0, 0]},
+            "end": clamp | {"position": [3.9, 0, 0], "turns": 3, "motion": away},
+        },
+        "time": {"duration": 9.0, "step": 0.01}, "output": {"every": 0.1, "points": 41},
+    } | more  # fmt: skip
+
+
+def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
+    free = hybrid.run(hybrid.validate_scene(looped(contact={"self": False})))
+    assert "line meets itself" in {event.kind for event in free.events}
+    result = hybrid.run(hybrid.validate_scene(looped()))
+    kinds = {event.kind for event in result.events}
+    assert "line meets itself" not in kinds and "line touches itself" in kinds
+    assert float(result["self_distance/distance"]) > 0.85 * WIDTH
+    assert (result["energy/self_contact"] > 0.0).any()
+    apart = np.linalg.norm(result["position"] - free["position"], axis=2).max()
+    assert apart > WIDTH
+    put_in = sum(
+        np.abs(result[name]).max() for name in result.names if name.startswith("work/") and name != "work/scheme"
+    )
+    assert result["work/scheme"].max() < 1e-3 * put_in
+
+
+def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, stopping = hybrid.validate_scene(looped()), Stopping(monkeypatch)
+    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
+        assert np.interp([6.5, 8.0], whole.times, whole["energy/self_contact"]).all()
+    assert went_on(scene, tmp_path / "run.h5", stopping, [650, 150]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_start_within_itself_is_refused() -> None:
+    r = hairpin(60.0, 0.3 * WIDTH)
+    with pytest.raises(hybrid.SceneError, match=r"within itself at s = .* m"):
+        flying(r, 0.01, 0.1)
