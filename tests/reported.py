@@ -25,6 +25,7 @@ def reported(
     steps: bool = True,
     allowed: float | None = None,
     torque: float = 0.0,
+    through: bool = False,
     status: str = "complete",
     message: str = "",
     scene: str = "title: Made-up mooring\n",
@@ -36,7 +37,8 @@ def reported(
     """A line that swings on 0 <= s <= 100 m, 0 <= t <= 10 s.
 
     Tension 10 kN (1 + s/100 + 0.1 sin(2 pi t / 10)): largest at the end, t = 2.5 s; dip: N taken away in the middle at
-    t = 5 s; span: where output points are, m; curvature 0.02 1/m at s = 50 m, t = 2.5 s; rod from 40 to 60 m after half the time, with EI 2000 N m^2.
+    t = 5 s; span: where output points are, m; curvature 0.02 1/m at s = 50 m, t = 2.5 s; rod from 40 to 60 m after half the time, with EI 2000 N m^2
+    and a diameter of 0.05 m; through: whether catenaries carry the torque as well.
     """
     s = np.linspace(*span, points)
     scalar: dict[str, str] = {"tension": "N", "curvature": "1/m"}
@@ -64,6 +66,7 @@ def reported(
         fixed.append((Field("min_bend_radius", "m", "d", (points,), ("s",), nan_ok=True), limit))
     if rod:
         fixed.append((Field("bending_stiffness", "N m^2", "d", (points,), ("s",)), np.full(points, 2000.0)))
+        fixed.append((Field("diameter", "m", "d", (points,), ("s",), nan_ok=True), np.full(points, 0.05)))
     attributes: dict[str, Any] = {"title": title, "cells": 40}
     if errors:
         causes = {"mesh": 0.03, "time": 0.01, "model": 0.002, "total": 0.042}
@@ -97,6 +100,8 @@ def reported(
         }  # fmt: skip
         late = rod and (t > 0.5 * DURATION or outputs == 1)
         zones = [("catenary", 0.0, 40.0), ("rod", 40.0, 60.0), ("catenary", 60.0, 100.0)]
+        if rod and not through:
+            values["torque"] = torque * late * ((s >= 40.0) & (s <= 60.0))
         recorder.save(float(t), {f.name: values[f.name] for f in fields}, zones if late else [("catenary", 0.0, 100.0)])
         if steps and outputs > 1 and t > 0.0:
             pull = float(values["tension"][-1])

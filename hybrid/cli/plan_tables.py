@@ -6,12 +6,13 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
 from hybrid.kernels.forces import FORCES
+from hybrid.store.hockling import kink_torque
 
 if TYPE_CHECKING:
     from hybrid.model.plan import Plan
     from hybrid.scene.schema import Scene
 
-LINES, COLUMNS = 12, 80  # of the short form
+LINES, COLUMNS = 13, 80  # of the short form
 # Forces whose names are too long for it.
 SHORT = {
     "mass-proportional damping": "mass damping",
@@ -41,6 +42,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "dimension": "2: all of the scene lies in a plane" if plane else "3",
         "mesh": _mesh(plan),
         "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
+        "hockling": _hockling(plan),
         "time": _time(scene, plan),
         "accuracy": asked,
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
@@ -76,6 +78,17 @@ def _mesh(plan: Plan) -> str:
     if plan.base_cells is not None:
         return f"{plan.base_cells} cells as catenary, {cells} ({plan.unknowns} unknowns) if all is rod"
     return f"{_count(cells, 'cell')}, {plan.unknowns} unknowns"
+
+
+def _hockling(plan: Plan) -> str:
+    """The torque with which the line could throw a loop as it hangs, and from which on that would kink."""
+    found = plan.critical_torque
+    if found is None:
+        return ""
+    text = f"a loop can form from {found.torque:.3g} N m on (s = {found.s:.4g} m)"
+    if found.diameter > 0.0 and found.min_bend_radius > 0.0:
+        text += f", kinks from {kink_torque(found.stiffness, found.diameter, found.min_bend_radius):.3g}"
+    return text
 
 
 def _time(scene: Scene, plan: Plan) -> str:

@@ -105,6 +105,9 @@ class Model:
         return 3 * (self.cells + 1) + self.cells + int(self.line.spin.sum())
 
 
+HUNG = "an elastic catenary under all loads"  # a first shape that has the tensions of an equilibrium, but for bending
+
+
 def zone_plans(scene: Scene) -> tuple[ZonePlan, ...]:
     """The zones a scene's model stands for, in order."""
     model = scene.model
@@ -164,7 +167,7 @@ def build(
     shape = hung(scene, line, sea.values)
     if shape is not None:
         start.r[:], start.T[:] = shape
-        shape_name = "an elastic catenary under all loads"
+        shape_name = HUNG
     start.e[:] = np.diff(start.r, axis=0)
     if isinstance(scene.initial, Points):
         _exact_lengths(start, h, compliance == 0.0, scene)

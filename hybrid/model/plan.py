@@ -5,17 +5,32 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from math import ceil
+from typing import NamedTuple
+
+import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.model.build import build
+from hybrid.model.build import HUNG, Model, build
 from hybrid.model.contents import Entry
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.run_time import processor_time
+from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene
 from hybrid.scene.schema import Scene
+
+
+class CriticalTorque(NamedTuple):
+    """The smallest torque with which the line, as it hangs, could throw a loop (hockling): 2 sqrt(EI T), and where."""
+
+    torque: float  # N m
+    s: float  # m
+    tension: float  # N, there
+    stiffness: float  # N m2
+    diameter: float  # m; NaN: not given
+    min_bend_radius: float  # m; NaN: not given
 
 
 @dataclass(frozen=True)
@@ -32,6 +47,8 @@ class Plan:
     seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
     # The same of every model that a pre-run chooses from; none: the scene names its model.  The rest is as for rods.
     choice: tuple[tuple[str, float], ...] = ()
+    # None: an end turns freely, nothing resists bending, or the shape under all loads is not known without a search
+    critical_torque: CriticalTorque | None = None
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
@@ -117,5 +134,23 @@ def _plan(scene: Scene) -> Plan:
     seconds = processor_time(scene, model, cells, steps, outputs)
     return Plan(
         model.contents, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
-        seconds,
+        seconds, critical_torque=_critical_torque(scene, model),
     )  # fmt: skip
+
+
+def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:
+    """Of the elastic catenary that a search of equilibrium starts from."""
+    cable, line, T = model.cable, model.line, model.start.T
+    if not (all(cable.held_twist) and model.start_shape == HUNG and T.min() > 0.0):
+        return None
+    middle = 0.5 * (line.s[:-1] + line.s[1:])
+    EI = cable.weakest_bending[cable.piece(middle)]
+    if not EI.min() > 0.0:
+        return None
+    torque = 2.0 * np.sqrt(EI * T)
+    k = int(np.argmin(torque))
+    at = middle[k : k + 1]
+    radius = limits_along(scene, at).get("min_bend_radius", np.full(1, np.nan))
+    return CriticalTorque(
+        float(torque[k]), float(at[0]), float(T[k]), float(EI[k]), float(outer_diameter(scene, at)[0]), float(radius[0])
+    )

@@ -62,6 +62,11 @@ def weakest_bending(scene: Scene, s: np.ndarray) -> np.ndarray:
     return _along(scene, s, [min(bending_stiffness(x)) for x in scene.cable.sections], np.fmin)
 
 
+def outer_diameter(scene: Scene, s: np.ndarray) -> np.ndarray:
+    """Outer diameter (ns,) m at arc lengths s (m); at a seam the larger one, NaN where none is given."""
+    return _along(scene, s, [np.nan if x.diameter is None else x.diameter for x in scene.cable.sections], np.fmax)
+
+
 def borne_tension(scene: Scene, s: np.ndarray) -> np.ndarray:
     """Tension (ns,) N at which a section reaches its max_strain, at arc lengths s (m); the smaller one at a seam."""
     borne = [x.axial_stiffness * x.max_strain if x.axial_stiffness else np.inf for x in scene.cable.sections]

@@ -12,7 +12,7 @@ from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
-from hybrid.model.sections import SECTION_LIMITS, limits_along, weakest_bending
+from hybrid.model.sections import SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
 from hybrid.simulation.envelope import Envelope
@@ -131,6 +131,8 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
         if any(field.name == "torque" for field in observer.fields):
             name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
             out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))
+            name, text = f"{prefix}diameter", "outer diameter; NaN: none given"
+            out.append((Field(name, "m", text, s.shape, (dim,), nan_ok=True), outer_diameter(scene, s)))
     return out
 
 

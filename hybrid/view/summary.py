@@ -14,9 +14,11 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
 from hybrid.store.envelope import NOTHING, has_envelope
+from hybrid.store.hockling import formation_tension
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
 from hybrid.view.along import along
+from hybrid.view.loops import trapped_loop
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix
 from hybrid.view.worst import Worst, limits_of, worst
@@ -25,7 +27,7 @@ from hybrid.view.worst import Worst, limits_of, worst
 PART_OF_TENSION = 1e-4
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
-    "Proc. Inst. Mech. Eng. 34, 1883; for cables F. Rosenthal, J. Appl. Mech. 43, 1976)"
+    "Proc. Inst. Mech. Eng. 34, 1883); friction, plasticity and the structure of the strands are not in it"
 )
 CAUSES = {"mesh": "mesh", "time": "time step", "model": "model", "total": "together"}
 
@@ -92,17 +94,6 @@ def moment(result: Result, t: float) -> str:
 def _at(values: np.ndarray, k: int) -> tuple[int, int]:
     """Output and point of the k-th value of an array (nt, ns)."""
     return divmod(k, values.shape[1])
-
-
-def rods(result: Result, s: np.ndarray) -> np.ndarray:
-    """Where the cable is a rod (nt, len(s)); points on a joint belong to both sides."""
-    out = np.zeros((len(result.times), len(s)), bool)
-    near = 1e-9 * float(s[-1] - s[0])
-    for row, zones in zip(out, result.zones, strict=True):
-        for zone in zones:
-            if zone.kind == "rod":
-                row |= (s >= zone.s_a - near) & (s <= zone.s_b + near)
-    return out
 
 
 # ---- one function per fact ------------------------------------------------------------------------
@@ -298,18 +289,15 @@ def _hockling(result: Result) -> Fact:
         return Fact("hockling", title, text, "absent")
 
     if "torque" not in result:
-        return none("No torque is computed: no part of the cable is a rod.")
+        return none("No torque is computed: no part of the cable is a rod, or holds the twist at both ends.")
     found = along(result, "torque")
-    where = rods(result, found.s)
-    if not where.any():
-        return none("No torque is computed: no part of the cable was a rod.")
-    torque = np.where(where, found.values, 0.0)
+    torque = np.asarray(found.values, float)
     if not np.abs(torque).max() > ZERO:
-        return none("The rods of the cable carry no torque.")
+        return none("The cable carries no torque.")
     stiffness, tension = found.of(result, "bending_stiffness"), along(result, "tension").values
     if stiffness is None:
         return none("Not judged: the file has no bending stiffness to hold the torque against.")
-    needed = np.divide(torque**2, 4.0 * stiffness, out=np.zeros_like(torque), where=stiffness > 0.0)
+    needed = formation_tension(torque, np.broadcast_to(stiffness, torque.shape))
     scale = NOTHING * float(np.abs(tension).max())
     if float(needed.max()) <= PART_OF_TENSION * float(np.abs(tension).max()):
         i, k = _at(torque, int(np.abs(torque).argmax()))
@@ -321,7 +309,7 @@ def _hockling(result: Result) -> Fact:
     t, s = float(result.times[i]), float(found.s[k])
     values = {
         "torque": float(torque[i, k]), "needed": float(needed[i, k]), "tension": float(tension[i, k]),
-        "ratio": float(ratio[i, k]),
+        "ratio": float(ratio[i, k]), "margin": 1.0 / float(ratio[i, k]),
     }  # fmt: skip
     there = f"{place(result, s)}{moment(result, t)}"
     text = (
@@ -332,7 +320,18 @@ def _hockling(result: Result) -> Fact:
     if not verdict:
         verdict = f", {short(1.0 / values['ratio'], 3)} times as much"
     weight = "alarm" if values["ratio"] >= 1.0 else "plain"
-    return Fact("hockling", title, f"{text}{verdict}. {HOCKLING}.", weight, values, t, s)
+    text = f"{text}{verdict}."
+    if (loop := trapped_loop(result, found, torque)) is not None:
+        values |= loop
+        text += (
+            f" A loop of the largest torque would lie on itself until {amount(loop['pop_out_tension'], 'N', 3)} pull "
+            f"it open, bent to {amount(loop['pop_out_radius'], 'm', 3)}"
+        )
+        if "kink_margin" in loop:
+            kinks = loop["kink_margin"] < 1.0
+            text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
+        text += "."
+    return Fact("hockling", title, f"{text} {HOCKLING}.", weight, values, t, s)
 
 
 def _seabed(result: Result) -> Fact:

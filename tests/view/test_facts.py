@@ -66,7 +66,7 @@ def test_torque_is_held_against_greenhills_criterion() -> None:
     assert "Greenhill" in found.text and f"{least / 500.0:.3g} times as much" in found.text
     broken = fact(reported(torque=12e3), "hockling")
     assert broken.weight == "alarm" and broken.values["ratio"] > 1.0
-    assert "carry no torque" in fact(reported(), "hockling").text
+    assert "carries no torque" in fact(reported(), "hockling").text
     assert "far too small" in fact(reported(torque=0.1), "hockling").text
     none = fact(reported(rod=False), "hockling")
     assert none.weight == "absent" and "No torque is computed" in none.text
@@ -81,6 +81,22 @@ def test_torque_in_slack_rods_breaks_the_criterion() -> None:
     slack._cache["tension"] = tension
     found = fact(slack, "hockling")
     assert found.weight == "alarm" and (found.t, found.s) == (10.0, 50.0)
+
+
+def test_the_loop_of_the_largest_torque_is_held_against_the_bend_radius() -> None:
+    """q = M D/EI = 0.05: T = 1.105 (M/D)(1 + 0.053 q); the radius at the crown is D/(2 delta), delta = 0.236."""
+    found = fact(reported(torque=2000.0, allowed=0.1), "hockling")
+    assert found.values["pop_out_tension"] == pytest.approx(1.105 * 2000.0 / 0.05 * 1.00265, rel=5e-3)
+    assert found.values["pop_out_radius"] == pytest.approx(0.05 / (2 * 0.236), rel=1e-2)
+    assert found.values["kink_margin"] == pytest.approx(found.values["pop_out_radius"] / 0.1)
+    assert "kinks first" not in found.text and "of the radius allowed" in found.text
+    assert "kinks first" in fact(reported(torque=2000.0, allowed=0.2), "hockling").text
+
+
+def test_torque_of_catenaries_counts() -> None:
+    """The smallest tension is in a catenary, where the same torque asks for the same."""
+    found = fact(reported(torque=2000.0, through=True), "hockling")
+    assert found.values["tension"] == pytest.approx(9e3) and found.values["margin"] == pytest.approx(18.0)
 
 
 def test_touchdown_is_told_with_its_range() -> None:

@@ -1,0 +1,84 @@
+"""The localised loop of a twisted rod: its formulas against the equations of the rod, and published constants."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from hybrid.store.hockling import formation_tension, kink_torque, pop_out, strand_distance
+
+
+def loop(m: float, s: np.ndarray) -> np.ndarray:
+    """Places (n, 3) of the loop in sqrt(EI/T)."""
+    k = np.sqrt(1.0 - m * m)
+    w = 2.0 * k / np.cosh(k * s) * np.exp(1j * m * s)
+    return np.column_stack([w.real, w.imag, s - 2.0 * k * np.tanh(k * s)])
+
+
+@pytest.mark.parametrize("m", [0.1, 0.3, 0.5])
+def test_the_loop_is_an_equilibrium_of_a_rod(m: float) -> None:
+    """t x t'' + 2 m t' + t x n = constant, with the tension n = e_z: moments of a rod with EI = T = 1 (differences)."""
+    s = np.linspace(-6.0, 6.0, 24001)
+    r, h = loop(m, s), s[1] - s[0]
+    t = np.gradient(r, h, axis=0)
+    np.testing.assert_allclose(np.linalg.norm(t, axis=1)[2:-2], 1.0, atol=1e-6)
+    bend = np.cross(t, np.gradient(t, h, axis=0))
+    moment = bend + 2.0 * m * t + np.cross(r, [0.0, 0.0, 1.0])  # about the origin: it is the same everywhere
+    np.testing.assert_allclose(moment[4:-4] - moment[12000], 0.0, atol=2e-5)
+
+
+@pytest.mark.parametrize("m", [0.05, 0.3, 0.55])
+def test_distance_of_the_strands(m: float) -> None:
+    """Against all pairs of places on the two strands."""
+    s = np.linspace(0.5, 4.0, 701)
+    a, b = loop(m, s), loop(m, -s)
+    apart = np.linalg.norm(a[:, None] - b[None], axis=2)
+    inner = apart[1:-1, 1:-1]
+    least = min(
+        inner[i, j]
+        for i, j in np.argwhere(
+            (inner <= apart[:-2, 1:-1])
+            & (inner <= apart[2:, 1:-1])
+            & (inner <= apart[1:-1, :-2])
+            & (inner <= apart[1:-1, 2:])
+        )
+    )
+    assert strand_distance(m) == pytest.approx(least, rel=5e-4)  # of the grid of pairs
+
+
+def test_constants_of_the_distance() -> None:
+    expected = [0.221, 0.446, 0.677, 0.917, 1.169]
+    np.testing.assert_allclose([strand_distance(m) for m in (0.1, 0.2, 0.3, 0.4, 0.5)], expected, atol=1e-3)
+    assert np.isnan(strand_distance(0.6))
+
+
+@pytest.mark.parametrize("q", [1e-6, 0.01, 0.2, 1.0, 1.5])
+def test_pop_out(q: float) -> None:
+    """T = 1.105 (M/D)(1 + 0.053 q), and the radius at the crown is half the inverse of its curvature 2 k."""
+    EI, D = 3.0, 0.02
+    M = q * EI / D
+    found = pop_out(M, EI, D)
+    assert found is not None and found.tension == pytest.approx(1.105 * M / D * (1.0 + 0.053 * q), rel=1e-2)  # a fit
+    m = M / (2.0 * np.sqrt(EI * found.tension))
+    assert strand_distance(m) * np.sqrt(EI / found.tension) == pytest.approx(
+        D, rel=2e-3
+    )  # between entries of the table
+    assert found.radius == pytest.approx(np.sqrt(EI / found.tension) / (2.0 * np.sqrt(1.0 - m * m)), rel=1e-9)
+
+
+def test_torque_from_which_on_a_loop_kinks() -> None:
+    """0.227 EI D/R^2 for radii that are many diameters; it is the torque at which the loop that pops out has R."""
+    EI, D = 3.0, 0.02
+    for R in (0.03, 0.1, 0.5, 50.0):
+        torque = kink_torque(EI, D, R)
+        found = pop_out(torque, EI, D)
+        assert found is not None and found.radius == pytest.approx(R, rel=2e-3)
+    assert kink_torque(EI, D, 0.5) == pytest.approx(0.227 * EI * D / 0.25, rel=5e-3)
+    assert kink_torque(EI, D, 0.1 * D) == np.inf
+
+
+def test_nothing_to_say() -> None:
+    assert pop_out(0.0, 1.0, 0.1) is None and pop_out(100.0, 1.0, 0.1) is None and pop_out(1.0, 0.0, 0.1) is None
+    np.testing.assert_allclose(
+        formation_tension(np.array([2.0, -2.0, 1.0]), np.array([1.0, 1.0, 0.0])), [1.0, 1.0, 0.0]
+    )
