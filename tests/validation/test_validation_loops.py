@@ -58,7 +58,9 @@ def test_the_localised_loop():
     torque, tension = found["torque"][0].mean(), found["reaction_end"][0, 0]
     assert torque == pytest.approx(39.180, rel=5e-4)
     m = torque / (2.0 * math.sqrt(tension))
-    assert 4.0 * math.sqrt(1.0 - m * m) / math.sqrt(tension) == pytest.approx(0.0614, rel=3e-2)  # sensitive: m is near 1
+    assert 4.0 * math.sqrt(1.0 - m * m) / math.sqrt(tension) == pytest.approx(
+        0.0614, rel=3e-2
+    )  # sensitive: m is near 1
     assert torque / 0.8 + 4.0 * math.acos(m) == pytest.approx(16.0 * math.pi, rel=1e-3)
     needed = formation_tension(np.array([torque]), np.ones(1))[0]
     assert needed == pytest.approx(tension, rel=0.12) and needed < tension  # near the margin of forming
