@@ -122,9 +122,13 @@ def requested_accuracy(scene: Scene) -> RequestedAccuracy | None:
 
 
 def is_irregular(scene: Scene) -> bool:
-    """Whether a scene moves irregularly: its extremes and standard deviations matter, not what is at an instant."""
-    fluid = scene.environment.fluid
-    return scene.time is not None and fluid is not None and isinstance(fluid.waves, JonswapWaves)
+    """Whether a scene moves irregularly: its extremes and standard deviations matter, not what is at an instant.
+
+    It is not, where `accuracy: {instant: ...}` asks for that.
+    """
+    fluid, asked = scene.environment.fluid, requested_accuracy(scene)
+    moves = scene.time is not None and fluid is not None and isinstance(fluid.waves, JonswapWaves)
+    return moves and not (asked is not None and asked.instant)
 
 
 def wants_errors(scene: Scene) -> bool:

@@ -241,7 +241,7 @@ def _emptied(target: Path | io.BytesIO) -> None:
 def _controller(case: Case, compute: Callable[[Resolution], RunSample], choice: ModelChoice = NAMED) -> ErrorController:
     """What chooses how finely a case is computed."""
     asked = requested_accuracy(case.scene)
-    irregular = is_irregular(case.scene) and not (asked is not None and asked.instant)
+    irregular = is_irregular(case.scene)
     return ErrorController(asked, _free(case.scene), True, case.sample, compute, case.beside, irregular, choice)
 
 

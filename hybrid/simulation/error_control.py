@@ -42,6 +42,8 @@ MOST_REFINEMENTS = 3
 REFINEMENTS_AT_REST, CPU_AT_REST = 6, 5.0
 # The same of an irregular motion, and how much finer it may be: chance is soon more than cells and steps are.
 IRREGULAR_REFINEMENTS, IRREGULAR_FINER = 1, 2.0
+# A run that is hardly finer is not made of it: what it changes is chance.
+WORTH_REPEATING = 1.2
 # Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
 DIVERGES = 0.85
 
@@ -292,7 +294,10 @@ class ErrorController:
         if met or hopeless or sum(self.runs) > MOST_CPU:
             return None
         if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
-            return refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
+            found = refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
+            now = run.resolution
+            worth = found and max(found.fineness / now.fineness, now.step / max(found.step, 1e-300)) >= WORTH_REPEATING
+            return found if worth else None
         found = refined(run.resolution, verdict, self.free)
         if found is None or self.moves or found.fineness == run.resolution.fineness:
             return found
