@@ -185,11 +185,12 @@ class ErrorController:
 
     def without_refinement(self, why: str) -> tuple[RunSample, Errors]:
         """The result as it is and its errors, where a finer one did not come to its end."""
-        assert self.estimate is not None and self.asked is not None
+        assert self.estimate is not None
         run, errors = self.estimate.run, self.estimate.errors
-        verdict = self._verdict(self.asked)
-        if verdict.ratio > 1.0:
-            self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
+        if self.asked is not None:  # else its model error was to be followed
+            verdict = self._verdict(self.asked)
+            if verdict.ratio > 1.0:
+                self._notes.append(("accuracy missed", f"{verdict.text}; {why}"))
         return run, errors
 
     def _compute_comparisons(

@@ -33,6 +33,9 @@ from hybrid.store.writer import Recorder
 LOGGED = 100
 
 
+# Steps times cells from one checkpoint to the next, about 5 s of computing.
+WORK = 10_000_000
+
 # Of a step: stops that are so near to each other are one, or a step between them would be round-off.
 SAME_STOP = 1e-6
 
@@ -194,6 +197,8 @@ class TimeLoop:
         if run.between_steps:
             self._checkpoint()
         if self._interrupted():
+            if run.between_steps:
+                self._checkpoint(last=True)
             self._log()
             self.write_envelope()
             run.events.write_to(self.recorder)
@@ -287,21 +292,26 @@ class TimeLoop:
     # --- checkpoints ----------------------------------------------------------------------------
 
     def _checkpoint(self, last: bool = False) -> None:
-        """Bring the file up to date, with a checkpoint at the output just written, if it is time to.
+        """Keep a checkpoint at the output just written where one is due, and bring the file up to date.
 
-        last: the run is complete: the checkpoint waits until the file is closed.
+        They are due by the work done, so that the same run has the same ones; how often readers see more goes by the
+        clock.  last: the run ends here; all of it is written when the file is closed.
         """
         recorder = self.recorder
         self.run.events.write_to(recorder)
-        if isinstance(recorder, Recorder) and (last or recorder.due):
+        if not isinstance(recorder, Recorder):
+            return
+        (steps, changes), here = self._kept, (self.run.steps, self.run.changes)
+        much = steps < 0 or (here[0] - steps) * self.run.model.cells >= WORK
+        new = isinstance(self.target, Path) and here != self._kept and (last or much or here[1] != changes)
+        if new or last or recorder.due:
             self._log()
-            here = self.run.steps, self.run.changes
-            if isinstance(self.target, Path) and here != self._kept:
-                recorder.checkpoint(self._content)
-                self._kept = here
-            if not last:
-                self.write_envelope()
-                recorder.flush()
+        if new:
+            recorder.checkpoint(self._content)
+            self._kept = here
+        if not last and (new or recorder.due):
+            self.write_envelope()
+            recorder.flush()
 
     def _content(self) -> dict[str, Any]:
         switching = self.run.switching

@@ -12,11 +12,13 @@ import pytest
 from bits import Stopping, differences
 
 import hybrid
+import hybrid.simulation.time_loop
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.simulation import case, restore
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
-from hybrid.store.named_arrays import pack
+from hybrid.store.hdf5_file import opened
+from hybrid.store.named_arrays import pack, unpack
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 
@@ -110,6 +112,7 @@ def test_changes_are_made_at_their_time_however_often_it_is_stopped(name, tmp_pa
     """A current from 3 s on: computed anew, from a checkpoint at 3 s, and stopped on the way; one motion."""
     short = ["time.duration=6", "dimension=null"]
     more = {"settings": ["environment.fluid.current=[0.4, 0.2, 0]"], "start": 3.0}
+    monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", 0)
     monkeypatch.setattr(record, "_PAUSE", 0.0)
     monkeypatch.setattr(record, "_PART", 0.0)
     hybrid.run(hybrid.load_scene(EXAMPLES / f"{name}.yaml", short), tmp_path / "long.h5").close()
@@ -275,7 +278,9 @@ def test_a_full_disk_loses_nothing(part, tmp_path):
         import resource
         from hybrid.cli.commands import main
         from hybrid.store import writer as record
+        import hybrid.simulation.time_loop
         import hybrid.solve.run
+        hybrid.simulation.time_loop.WORK = 0
         record._PAUSE = record._PART = 0.0
         hybrid.solve.run.CELL_STEPS = 1
         resource.setrlimit(resource.RLIMIT_FSIZE, ({most}, {most}))
@@ -344,7 +349,8 @@ def test_a_file_of_a_newer_format_is_refused(whole):
 )
 def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, monkeypatch):
     """The climb of the run before it is not that of the run that goes on."""
-    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5", "dimension=null"])
+    settings = ["output.errors=true", "time.duration=5", "model=catenary"]  # no run to compare with after the result
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", settings)
     stopping = Stopping(monkeypatch)
     hybrid.run(scene, progress=stopping).close()
     begun = stopped(tmp_path / "begun.h5", monkeypatch, scene, stopping.heard - 10)
@@ -358,6 +364,18 @@ def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, m
         hybrid.resume(tmp_path / "run.h5", progress=stopping, **more)
     hybrid.resume(tmp_path / "run.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path, monkeypatch):
+    """After the result, where no accuracy is asked for: the result stands, and goes on to its error figure."""
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5"])
+    stopping = Stopping(monkeypatch)
+    hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
+    path = stopped(tmp_path / "run.h5", monkeypatch, scene, stopping.heard - 3)
+    with hybrid.open(path) as result:
+        assert result.status == "complete" and result.times[-1] == 5.0
+    hybrid.resume(path).close()
+    assert differences(tmp_path / "whole.h5", path) == []
 
 
 def test_a_finer_result_of_another_scene_is_not_taken(tmp_path):
@@ -432,3 +450,26 @@ def test_home_and_links_lead_to_the_file_they_name(tmp_path, monkeypatch):
     hybrid.run(scene, tmp_path / "link.h5").close()
     assert (tmp_path / "link.h5").is_symlink()
     assert {x.name for x in tmp_path.iterdir()} == {"run.h5", "link.h5"}
+
+
+def test_checkpoints_are_at_the_same_places_whatever_the_clock(tmp_path, monkeypatch):
+    """By the work done: a run whose file is flushed at every pause has the same ones as one that never is."""
+    monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", 20 * 40)  # 40 steps of 20 cells
+    monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 20 * 7)  # a pause every 7 steps
+    places, kept, keep = [], [], record.Recorder.checkpoint
+
+    def noted(self, content):
+        keep(self, content)
+        places[-1].append(self.last)
+
+    monkeypatch.setattr(record.Recorder, "checkpoint", noted)
+    for k, pause in enumerate((0.0, 1e9)):
+        monkeypatch.setattr(record, "_PAUSE", pause)
+        monkeypatch.setattr(record, "_PART", 0.0)
+        places.append([])
+        hybrid.run(swinging(), tmp_path / f"{k}.h5").close()
+        with opened(tmp_path / f"{k}.h5") as file:
+            points = [checkpoint._checkpoint(unpack(bytes(file[name][()]))) for name in checkpoint.SLOTS]
+        kept.append([(x.number, x.t, x.rows, x.state["steps"]) for x in points])
+    assert places[0] == places[1] and len(places[0]) == 6  # of 200 steps: the first, after 42, 84, 126, 168, the last
+    assert kept[0] == kept[1]
