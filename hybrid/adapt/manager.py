@@ -83,7 +83,10 @@ def _flag(k: int, text: str) -> Any:
 
 
 # Arrays of `Zones` that are the same for every layout.
-OF_BASE = ("clock", "counts", "clamped", "tangents", "moments", "ratios", "rod", "leaving", "grown", "haste")
+OF_BASE = (
+    "clock", "counts", "clamped", "tangents", "moments", "ratios", "rod", "leaving", "grown", "haste", "parts", "H",
+    "next_rod", "here", "plan", "calm",
+)  # fmt: skip
 
 
 all_zones = Packed(lambda n: blank_zones(n, 1), given=(*OF_BASE, "kinds"))
@@ -104,17 +107,25 @@ class DomainManager:
         pace: float | None = None,
         left: float = 1.0,
         on_base: LineOnBase | None = None,
+        curvature_error: float | None = None,
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
         left: part of the bending error of catenaries that remains in results (1: no correction);
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
+        curvature_error: part of the largest curvature that the length of cells may make it wrong by, in the cells of
+        rods, which follow it; None: they stay as they are.
         """
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
         self.pace, self.held, self.left = pace or dwell, False, left
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
-        self.zones = blank_zones(1, n)  # what the compiled run knows of them
+        places = layout.starts[-1] + 1
+        self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
+            here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
+        )
+        self.zones.parts[:], self.zones.H[:] = layout.parts, np.diff(layout.base)
+        self.zones.clock[z.SHARE] = curvature_error or 0.0
         self.tolerance = tolerance
         self.zones.clock[z.PACE] = self.pace
         self.zones.clamped[:] = cable.held_tangent
@@ -185,6 +196,9 @@ class DomainManager:
         kept = {name: getattr(self.zones, name) for name in OF_BASE}
         self.zones = all_zones(layout.base_of_cell.size, kinds=kinds, **kept)
         self.zones.rod[:], self.zones.since[:] = layout.rod, -np.inf
+        self.zones.place[:] = layout.places
+        self.zones.here[:] = False
+        self.zones.here[layout.places] = True
         clock, flags = self.zones.clock, self.zones.counts
         clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
         flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
@@ -278,6 +292,11 @@ class DomainManager:
     def review_due(self, t: float) -> bool:
         """Whether a review is due: a catenary asks, a rod has been blended out, or some time has passed."""
         return self.loudest > 1.0 or t >= self.next_review
+
+    def same_zones(self) -> Change:
+        """A change of cells alone."""
+        none = np.zeros_like(self.layout.rod)
+        return Change(self.layout.rod, (), none, none)
 
     def review(self, t: float, state: State) -> Change | None:
         """The change that follows from the ratios since the last review; None: no change."""

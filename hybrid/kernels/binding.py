@@ -23,11 +23,13 @@ class Table:
     def __init__(self, example: Any) -> None:
         """example: with the types that all values have."""
         self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
+        self._sizes: dict[str, list[int]] = {}  # of the parts of a tuple
         self._bound: dict[str, Any] = {}
         at = 0
         for name, value in example._asdict().items():
             pattern = _pattern(value)
             self._places[name] = at, at + _size(pattern), pattern
+            self._sizes[name] = [_size(x) for x in pattern] if isinstance(pattern, tuple) else []
             at += _size(pattern)
         self.numbers: NDArray[np.int64] = np.zeros(at, np.int64)
         self.bind(**example._asdict())
@@ -38,17 +40,26 @@ class Table:
             if self._bound.get(name, self) is value:
                 continue
             at, end, pattern = self._places[name]
-            self._bound.pop(name, None)  # nothing is bound there if this fails half-way
+            before = self._bound.pop(name, None)  # nothing is bound there if this fails half-way
             if not isinstance(pattern, tuple):
-                self._put(at, pattern, value, name)
+                self.numbers[at:end] = _numbers(value, pattern, name)
+            elif (known := _known(value)) is not None:
+                self.numbers[at:end] = known
             else:
-                self.numbers[at:end] = _numbers_of(value, pattern, name)
+                self._put_changes(at, pattern, value, before, name)
+                _keep(value, self.numbers[at:end].copy())
             self._bound[name] = value
 
-    def _put(self, at: int, pattern: Any, value: Any, name: str) -> None:
-        """A number or an array, at its place."""
-        found = _numbers(value, pattern, name)
-        self.numbers[at : at + len(found)] = found
+    def _put_changes(self, at: int, pattern: Any, value: Any, before: Any, name: str) -> None:
+        """A tuple at its place, where `before` is bound (None: nothing): what is the same is left as it is."""
+        if before is None or len(value) != len(pattern):
+            found = _numbers(value, pattern, name)
+            self.numbers[at : at + len(found)] = found
+            return
+        for each, of, same, size in zip(value, pattern, before, self._sizes[name], strict=True):
+            if each is not same:
+                self.numbers[at : at + size] = _numbers(each, of, name)
+            at += size
 
 
 # Numbers of the tuples that were bound last: a line is bound in several tables, and two states take turns.
@@ -57,18 +68,13 @@ class _OfThread(threading.local):
         self.known: dict[int, tuple[Any, NDArray[np.int64]]] = {}
 
 
-_here, MOST_KNOWN = _OfThread(), 8
+_here, MOST_KNOWN = _OfThread(), 24
 
 
-def _numbers_of(value: Any, pattern: Any, name: str) -> NDArray[np.int64]:
-    """Numbers of a tuple; those of the last ones are kept, and with them the tuples."""
-    known = _here.known
-    before = known.get(id(value))
-    if before is not None and before[0] is value:
-        return before[1]
-    found = np.array(_numbers(value, pattern, name), np.int64)
-    _keep(value, found)
-    return found
+def _known(value: Any) -> NDArray[np.int64] | None:
+    """Numbers of a tuple, if it is one of the last, which are kept."""
+    known = _here.known.get(id(value))
+    return known[1] if known is not None and known[0] is value else None
 
 
 def _keep(value: Any, numbers: NDArray[np.int64]) -> None:
@@ -81,9 +87,8 @@ def _keep(value: Any, numbers: NDArray[np.int64]) -> None:
 def _numbers(value: Any, pattern: Any, name: str) -> list[int]:
     """Addresses, shapes and numbers of a value; TypeError: it is not of the pattern."""
     if isinstance(pattern, tuple):
-        before = _here.known.get(id(value))
-        if before is not None and before[0] is value:
-            return before[1].tolist()
+        if (known := _known(value)) is not None:
+            return known.tolist()
         if len(value) != len(pattern):
             raise TypeError(f"{name}: {len(value)} values, expected {len(pattern)}")
         out: list[int] = []
@@ -110,37 +115,59 @@ class Packed:
         of the block, but given whenever one is made.
         """
         two, three = blank(2), blank(3)
-        self._make, self._fields = two._make, []
+        self._make, self._given = two._make, tuple(given)
+        self._fields: list[
+            tuple[str, Any, Any, int]
+        ] = []  # name, type, what is fixed and what grows of shapes, numbers
         for name, x, y in zip(two._fields, two, three, strict=True):
             if name in given:
-                self._fields.append((name, None, _pattern(x)))
+                self._fields.append((name, None, _pattern(x), _size(_pattern(x))))
                 continue
             slopes = tuple(b - a for a, b in zip(x.shape, y.shape, strict=True))
             fixed = tuple(a - 2 * k for a, k in zip(x.shape, slopes, strict=True))
-            self._fields.append((name, x.dtype, tuple(zip(fixed, slopes, strict=True))))
+            self._fields.append((name, x.dtype, tuple(zip(fixed, slopes, strict=True)), 1 + x.ndim))
+        self._plans: dict[int, Any] = {}
 
     def __call__(self, cells: int, **given: Any) -> Any:
         """One for a line of so many cells."""
-        places, at = [], 0
-        for name, dtype, dims in self._fields:
-            if dtype is None:
-                places.append((name, None, dims, 0))
-                continue
-            shape = tuple([a + b * cells for a, b in dims])
-            places.append((name, dtype, shape, at))
-            at += -(-math.prod(shape) * dtype.itemsize // 8) * 8
-        block = np.zeros(max(at, 8) // 8)
-        begin, numbers, values = block.__array_interface__["data"][0], [], []
+        plan = self._plans.get(cells)
+        if plan is None:
+            plan = self._plans[cells] = self._plan(cells)
+        size, places, numbers, addresses = plan
+        block, numbers = np.zeros(size), numbers.copy()
+        numbers[addresses] += block.__array_interface__["data"][0]
+        values = []
         for name, dtype, shape, offset in places:
-            if dtype is None:
-                values.append(given[name])
-                numbers += _numbers(given[name], shape, name)
-            else:
+            if dtype is not None:
                 values.append(np.ndarray(shape, dtype, block, offset))
-                numbers += [begin + offset, *shape]
+                continue
+            values.append(given[name])
+            found = _numbers(given[name], shape, name)
+            numbers[offset : offset + len(found)] = found
         value = self._make(values)
-        _keep(value, np.array(numbers, np.int64))
+        _keep(value, numbers)
         return value
+
+    def _plan(self, cells: int) -> Any:
+        """Size of the block; of each field its shape and offset there, or pattern and where its numbers begin; numbers
+
+        in a block at address 0, and which of them are addresses.
+        """
+        places: list[Any] = []
+        numbers: list[int] = []
+        addresses: list[int] = []
+        offset = 0
+        for name, dtype, dims, size in self._fields:
+            if dtype is None:
+                places.append((name, None, dims, len(numbers)))
+                numbers += [0] * size
+                continue
+            shape = tuple(a + b * cells for a, b in dims)
+            places.append((name, dtype, shape, offset))
+            addresses.append(len(numbers))
+            numbers += [offset, *shape]
+            offset += -(-math.prod(shape) * dtype.itemsize // 8) * 8
+        return max(offset, 8) // 8, places, np.array(numbers, np.int64), np.array(addresses)
 
 
 def _bits(value: float) -> int:

@@ -15,6 +15,14 @@ from numpy.typing import NDArray
 from hybrid.kernels import books as b
 from hybrid.kernels.books import COUNT_SIZE, WORKS
 from hybrid.kernels.cell import chord
+from hybrid.kernels.cell_lengths import (
+    FADE,
+    arc_less_chord,
+    follow_arcs,
+    largest_curvature,
+    plan_cells,
+    weigh_curvature,
+)
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import CLAMP, CRITERIA, TORSION
 from hybrid.kernels.energies import observe
@@ -52,8 +60,10 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     COMPLIANCE, FREE_TWIST,  # of all the line: rad per N m; rad
     LETTING_GO,  # over which lengths become true
     CALM_STEP, RAMP_STEP,  # longest steps: while nothing is ramped, and else
-) = range(14)  # fmt: skip
-CLOCK_SIZE = 14
+    SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
+    PEAK,  # 1/m, largest curvature of rods of late
+) = range(16)  # fmt: skip
+CLOCK_SIZE = 16
 # Flags of `counts`.
 (
     KNOWN,  # tensions of earlier are of these cells
@@ -63,8 +73,9 @@ CLOCK_SIZE = 14
     RELAXING, UNDER_WAY,  # lengths are on their way to true ones; those of the last step were
     GOING, COMING,  # stiffness is ramped down; up
     STRAINED,  # `strain` is of the state now
-) = range(9)  # fmt: skip
-FLAG_COUNT = 9
+    CELLS_DUE,  # rods should have other cells
+) = range(10)  # fmt: skip
+FLAG_COUNT = 10
 
 
 class Zones(NamedTuple):
@@ -83,6 +94,15 @@ class Zones(NamedTuple):
     leaving: NDArray[np.bool_]  # (n,) rods whose stiffness is ramped down
     grown: Floats  # (n,) part of its stiffness that each rod has
     haste: Floats  # (n,) by how much faster it is ramped up
+    # Of cells that follow the curvature (kernels.cell_lengths); K cells of the finest mesh:
+    parts: NDArray[np.int64]  # (n,) finest cells of base cells
+    H: Floats  # (n,) m, lengths of base cells
+    next_rod: NDArray[np.bool_]  # (n,) what is rod where nodes are planned
+    here: NDArray[np.bool_]  # (K+1,) places of nodes now
+    plan: NDArray[np.bool_]  # (K+1,) and where they should be
+    calm: NDArray[np.int64]  # (K+1,) steps for which a node could have gone
+    place: NDArray[np.int64]  # (N+1,) places of nodes
+    wanted: Floats  # (N+1,) m, longest cells that the curvature allows
     share: Floats  # (N+1,) the same of nodes, at the end of a step
     stiff: Floats  # (N+1, 3) N m, all of their stiffness
     true: Floats  # (N,) m, lengths
@@ -104,7 +124,9 @@ def blank_zones(cells: int, base: int) -> Zones:
         kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
         ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
-        haste=np.ones(base), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
+        haste=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
+        here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64), place=z(nodes, np.int64),
+        wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
         rate=z(cells), since=np.full(cells, -np.inf), keeps=z(cells, bool), strain=z((2, nodes, 3)),
         moment=z((nodes, 3)), energy=z(4),
     )  # fmt: skip
@@ -225,6 +247,10 @@ def evaluate(line, sea, ends, state, zones, dt):
     )
     if flags[LOADED]:
         weigh_moments(state, zones)
+    if z[SHARE] > 0.0:
+        z[PEAK] = max(z[PEAK], largest_curvature(line, zones.kinds.turn))
+        if z[PEAK] > 0.0:
+            weigh_curvature(line, sea, state, zones, z[SHARE] * z[PEAK])
     z[LOUDEST] = largest_ratio(line, zones.kinds, zones.ratios)
 
 
@@ -249,7 +275,7 @@ def book(line, ends, before, state, dt, zones):
         for c in range(line.h.shape[0]):
             booked -= 0.5 * (before.T[c] + state.T[c]) * (line.h[c] - zones.lengths[c])
             zones.lengths[c] = line.h[c]
-        flags[RELAXING] = flags[UNDER_WAY]
+        flags[RELAXING] = flags[UNDER_WAY] or z[SHARE] > 0.0
     if flags[GOING] or flags[COMING]:
         if flags[STRAINED]:
             for i in range(zones.moment.shape[0]):
@@ -272,6 +298,17 @@ def book(line, ends, before, state, dt, zones):
 
 
 @inner
+def other_cells(line, sea, state, zones, dt):
+    """Whether rods should have other cells, after a step of dt."""
+    z = zones.clock
+    z[PEAK] *= math.exp(-dt / (FADE * z[PACE]))
+    for j in range(zones.rod.shape[0]):
+        zones.next_rod[j] = zones.rod[j]
+    z[DT] = dt
+    return plan_cells(line, sea, state, zones, z[SHARE] * z[PEAK], dt)
+
+
+@inner
 def is_coming(zones):
     """Whether any stiffness is ramped up."""
     coming = False
@@ -291,6 +328,23 @@ def evaluate_criteria(table):
 
 
 @kernel
+def take_arcs(table):
+    """True lengths that make chords of the state `new` of a job as long as arcs."""
+    job = read(table)
+    for c in range(job.line.h.shape[0]):
+        less = arc_less_chord(job.line, job.new, job.zones, c)
+        job.zones.true[c] = job.line.s[c + 1] - job.line.s[c] - less
+
+
+@kernel
+def plan_nodes(table):
+    """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
+    job = read(table)
+    z = job.zones.clock
+    plan_cells(job.line, job.sea, job.new, job.zones, z[SHARE] * z[PEAK], z[DT])
+
+
+@kernel
 def follow_zones(table):
     """What zones do in the present phase of a run, before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)
@@ -307,6 +361,10 @@ def follow_zones(table):
     if count[b.PARITY]:
         state, before = before, state
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
+    if zones.clock[SHARE] > 0.0:
+        follow_arcs(line, state, zones)
+        zones.counts[CELLS_DUE] = other_cells(line, job.sea, state, zones, clock[b.LAST_DT])
     ramping = zones.counts[GOING] or zones.counts[COMING]
     clock[b.ALLOWED] = zones.clock[RAMP_STEP] if ramping else zones.clock[CALM_STEP]
-    return 1 if zones.clock[LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[NEXT_REVIEW] else 0
+    due = zones.clock[LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[NEXT_REVIEW] or zones.counts[CELLS_DUE] != 0
+    return 1 if due else 0

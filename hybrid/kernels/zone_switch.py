@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.cell import chord
+from hybrid.kernels.cell_lengths import arc_less_chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.energies import observe
 from hybrid.kernels.forces import PLANAR, SEABED
@@ -17,7 +18,7 @@ from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Sea, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import shares, soften
-from hybrid.kernels.zone_step import LETTING_GO, Zones, blank_zones
+from hybrid.kernels.zone_step import LETTING_GO, SHARE, Zones, blank_zones
 from hybrid.kernels.zone_torque import twist_energy
 from hybrid.kernels.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
 
@@ -160,7 +161,7 @@ def relax(job, t):
     zones, before, match = job.target_zones, job.zones, job.transfer.match
     for c in range(match.kept.shape[0]):
         a = match.kept[c]
-        zones.keeps[c] = not job.transfer.target.spin[c]
+        zones.keeps[c] = not job.transfer.target.spin[c] and not zones.clock[SHARE] > 0.0
         if a < 0:
             relax_cell(job, c, t)
         elif job.numbers[RELAXES] > 0.0:
@@ -179,7 +180,11 @@ def end_switch(table):
         for k in range(3):
             zones.stiff[i, k] = target.kb[i, k]
     for c in range(target.h.shape[0]):
+        a = transfer.match.kept[c]
         zones.true[c], zones.lengths[c] = target.h[c], transfer.match.lengths[c]
+        if zones.clock[SHARE] > 0.0:
+            less = arc_less_chord(target, transfer.out, zones, c)
+            zones.true[c] = job.zones.true[a] if a >= 0 else target.h[c] - less
     make_stiffness(target, zones)
     relax(job, job.numbers[TIME])
     for c in range(target.h.shape[0]):

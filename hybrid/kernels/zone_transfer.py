@@ -407,3 +407,30 @@ def transfer_state(job):
 def transfer(table):
     """Carry the state of a Transfer to its new cells."""
     transfer_state(read(table))
+
+
+@kernel
+def carry_push(push, s, at, out):
+    """A push (N+1, 4) on nodes s at other ones, on cubics with the slopes of parabolas: a rod would feel kinks."""
+    n, c = s.shape[0] - 1, 0
+    for i in range(at.shape[0]):
+        while c < n - 1 and s[c + 1] <= at[i]:
+            c += 1
+        H = s[c + 1] - s[c]
+        q = (at[i] - s[c]) / H
+        for k in range(4):
+            a, b = push_slope(push, s, c, k), push_slope(push, s, c + 1, k)
+            near = (1.0 - q) ** 2 * ((1.0 + 2.0 * q) * push[c, k] + q * H * a)
+            out[i, k] = near + q * q * ((3.0 - 2.0 * q) * push[c + 1, k] - (1.0 - q) * H * b)
+
+
+@inner
+def push_slope(push, s, i, k):
+    """Derivative at node i: of the parabola, at an end of the chord."""
+    n = s.shape[0] - 1
+    if i == 0 or i == n:
+        c = min(i, n - 1)
+        return (push[c + 1, k] - push[c, k]) / (s[c + 1] - s[c])
+    ha, hb = s[i] - s[i - 1], s[i + 1] - s[i]
+    before, after = (push[i, k] - push[i - 1, k]) / ha, (push[i + 1, k] - push[i, k]) / hb
+    return (hb * before + ha * after) / (ha + hb)

@@ -26,7 +26,7 @@ from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.plane import in_plane, planar
-from hybrid.model.resolution import Resolution, first_resolution, mesh_is_free
+from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.sections import merged_sections
@@ -233,6 +233,8 @@ GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier
 # to that: it is more likely that a stiffness is in another unit.
 TWIST, MOST_FOR_TWIST = 0.25, 5000
 FEWEST_CELLS = 4  # of a zone, however little is asked
+# Of rods whose cells follow the curvature: base cells, the shortest cell over (EI/w)^(1/3), most cells in a base cell.
+FOLLOWING_BASE, FOLLOWING_CELL, MOST_FOLLOWING = 24, 0.125, 512
 
 
 def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
@@ -292,13 +294,22 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
     """Base cells, all rod."""
     model = scene.model
     assert isinstance(model, AdaptiveModel)
-    base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
+    follows = follows_curvature(scene)
+    if follows:  # base cells stay, whatever the fineness: what is asked of rods decides
+        resolution = replace(resolution, grading=None, fineness=max(resolution.fineness, 1.0))
+        base, _ = place_nodes((ZonePlan("rod", scene.length),), cuts, None, None, FOLLOWING_BASE)
+    if not (follows and mesh_is_free(scene)):
+        base, _ = _placed(scene, cable, (ZonePlan("rod", scene.length),), cuts, resolution, BASE_CELLS)
     middle = 0.5 * (base[:-1] + base[1:])
     cell = rod_cells(scene, cable, middle, resolution.grading)
     cell = (
         np.minimum(cell, TWIST / np.maximum(twist_rate(scene, cable, middle), TWIST / scene.length))
         / resolution.fineness
     )
+    if follows:
+        halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
+        parts = np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING)
+        return Layout(base, parts, np.ones(base.size - 1, bool))
     parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(base.size - 1, bool))
 
@@ -313,6 +324,8 @@ def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None 
     if asked:
         return np.full(s.size, asked)
     bend = cable.bending_length(LEAST_WEIGHT * 9.81 * cable.mass)[cable.piece(s)]
+    if follows_curvature(scene):
+        return np.asarray(FOLLOWING_CELL * bend)
     if grading is None:
         return np.asarray(ROD_CELL * bend)
     cell = np.minimum(grading.cell(s), GRADED_ROD_CELL * bend)

@@ -149,6 +149,12 @@ def wants_survey(scene: Scene) -> bool:
     return mesh_is_free(scene) and (requested_accuracy(scene) is not None or scene.resolution is not None)
 
 
+def follows_curvature(scene: Scene) -> bool:
+    """Whether the cells of rods follow the curvature in a run."""
+    wanted = scene.model.curvature_error if isinstance(scene.model, AdaptiveModel) else None
+    return wanted is not None and scene.time is not None
+
+
 def zones_are_free(scene: Scene) -> bool:
     """Whether the program chooses the tolerance of zones."""
     return isinstance(scene.model, AdaptiveModel) and scene.model.tolerance is None

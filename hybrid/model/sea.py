@@ -40,8 +40,8 @@ class Surroundings:
 
     def on(self, cells: int) -> Surroundings:
         """The same sea around a line of another number of cells."""
-        blank = no_sea(cells)
-        values = self.values._replace(flow=blank.flow, axis=blank.axis, slip=blank.slip, slid=blank.slid, bed=blank.bed)
+        axis, slip, slid, bed = (np.zeros((cells + 1, 3)) for _ in range(4))
+        values = self.values._replace(flow=np.zeros((cells + 1, 7)), axis=axis, slip=slip, slid=slid, bed=bed)
         return Surroundings(values)
 
     def at(self, t: float) -> Sea:

@@ -17,6 +17,7 @@ from hybrid.outputs.output_grid import Grid
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
+from hybrid.store.records import THERE, there
 
 
 @dataclass(frozen=True)
@@ -141,6 +142,7 @@ class Observer:
         corrected: bool = False,
         jumps: Sequence[float] | Floats = (),
         changes: Sequence[float] = (),
+        finest: Floats | None = None,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -148,8 +150,9 @@ class Observer:
         errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
         for it.  `values_of` gets the criteria, and for both of the latter the shift.
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
-        section ends and the next begins.
+        section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature.
         """
+        self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
@@ -201,6 +204,9 @@ class Observer:
                 replace(f, name=sided[f.name], shape=self.jumps.shape, dims=("right/s",),
                         description=f"{f.description}, just after the point") for f in fields if f.name in sided
             ]  # fmt: skip
+        if finest is not None:
+            text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
+            fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
         self.fields = tuple(fields)
 
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
@@ -248,6 +254,8 @@ class Observer:
             if ratios is None:
                 raise ValueError("criteria are written, but `ratios` is not given")
             out |= {name: ratios[:, k] for k, name in enumerate(self._criteria)}
+        if self._finest is not None:
+            out[THERE] = np.tile(there(self._finest, self.line.s), (batch.t.size, 1))
         if self._with_work:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))
             if self.first_energy is None:

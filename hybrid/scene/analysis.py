@@ -239,6 +239,12 @@ class AdaptiveModel(Table):
     rod_cell: Positive | None = Field(
         default=None, description="length of the cells of a rod; absent: a quarter of (EI/w)^(1/3), w the weight [m]"
     )
+    curvature_error: Positive | None = Field(
+        default=None,
+        le=0.5,
+        description="part of the largest curvature that the length of rod cells may make it wrong by, anywhere: "
+        "cells become shorter and longer during the run where they are needed; absent: they have one length [-]",
+    )
     hold_time: Positive | None = Field(
         default=None,
         validation_alias=AliasChoices("hold_time", "dwell"),

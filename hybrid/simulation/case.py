@@ -21,7 +21,7 @@ from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
 from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
-from hybrid.model.resolution import Resolution, first_resolution, requested_accuracy, wants_errors
+from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
@@ -364,6 +364,7 @@ class Case:
         return Observer(
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
             model.corrected, self.points.jumps, section_changes(self.scene),
+            model.layout.finest.nodes if follows_curvature(self.scene) and model.layout and not only else None,
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

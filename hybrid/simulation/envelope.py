@@ -7,7 +7,7 @@ extremes of its two nodes are interpolated, with the time of the nearer one.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -43,19 +43,30 @@ QUANTITIES = {
 _S_TEXT = "arc lengths of nodes; point loads and changes of section come twice, with the value before and after them"
 
 
-def marks_of(scene: Scene, model: Model) -> np.ndarray:
-    """Bits (N+1,) of kernels.books for the nodes of a model: point loads, changes of section."""
-    s = model.line.s
+def marked_places(scene: Scene, model: Model) -> tuple[tuple[float, int], ...]:
+    """Arc lengths, m, of point loads and changes of section, with their bits of kernels.books."""
+    loads = tuple((float(x), b.LOADED) for x in model.attached)
+    return loads + tuple((float(x), b.SEAM) for x in section_changes(scene))
+
+
+def marks_on(s: Floats, places: Sequence[tuple[float, int]]) -> np.ndarray:
+    """Bits (N+1,) of kernels.books for nodes s (N+1,) m; those of the ends are left out."""
     marks = np.zeros(s.size, np.int8)
-    for places, bit in ((model.attached, b.LOADED), (section_changes(scene), b.SEAM)):
-        for x in places:
-            marks[np.argmin(np.abs(s - x))] |= bit
+    for x, bit in places:
+        marks[np.argmin(np.abs(s - x))] |= bit
     marks[[0, -1]] = 0
     return marks
 
 
+def marks_of(scene: Scene, model: Model) -> np.ndarray:
+    """The same for the nodes of a model."""
+    return marks_on(model.line.s, marked_places(scene, model))
+
+
 def _doubled(nodes: Floats, marked: Floats) -> Floats:
     """Nodes (N+1,) m with those that are marked (K,) m twice."""
+    if not marked.size:
+        return nodes
     return np.insert(nodes, np.searchsorted(nodes, marked), marked)
 
 

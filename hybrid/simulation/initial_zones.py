@@ -16,7 +16,7 @@ from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import picked
 from hybrid.model.layout import Layout
-from hybrid.model.resolution import Resolution
+from hybrid.model.resolution import Resolution, follows_curvature
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.equilibrium import equilibrium_of, solve_model
@@ -53,10 +53,14 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     step = resolution.step if resolution.local is None else 0.0
     pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
     hold = wanted.hold_time if wanted.hold_time is not None else pace
+    curvature_error = wanted.curvature_error if follows_curvature(scene) else None
+    if curvature_error is not None:  # finer meshes have smaller errors: of second order
+        curvature_error /= resolution.fineness**2
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, given_zones(scene, model.layout),
         model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
         LEFT if model.corrected else 1.0, model.on_base,
+        curvature_error,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager

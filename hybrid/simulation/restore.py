@@ -20,7 +20,7 @@ import numpy as np
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.cache import kernel_hash
-from hybrid.model.build import MOST_PARTS, Model, build
+from hybrid.model.build import MOST_FOLLOWING, MOST_PARTS, Model, build
 from hybrid.model.layout import Layout
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
@@ -137,7 +137,9 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         layout = Layout(**matched({"here": None} | dict(mesh), template, "mesh"))
         _check_nodes(layout.base, scene)
         fits = layout.parts.shape == layout.rod.shape == (layout.base.size - 1,)
-        if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= MOST_PARTS):
+        most = MOST_FOLLOWING if layout.here is not None else MOST_PARTS
+        fits &= layout.here is None or (layout.here.dtype == bool and layout.here.shape == (layout.parts.sum() + 1,))
+        if not (fits and 1 <= layout.parts.min() <= layout.parts.max() <= most):
             raise ValueError("base cells that no mesh has")
         first = build(scene, resolution, layout.finest)
         model = on_layout(first, layout)

@@ -29,7 +29,7 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended
 from hybrid.simulation.diagnostics import borne_strain
-from hybrid.simulation.envelope import Envelope, marks_of
+from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
@@ -75,6 +75,7 @@ class Transient:
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
+        self._marked = marked_places(scene, model)
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
@@ -463,7 +464,7 @@ class Transient:
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
             self.stepper.limits, state, 1.0 + borne_strain(model), first,
-            marks_of(self.scene, model), self.correction.corrector if self.correction is not None else None,
+            marks_on(model.line.s, self._marked), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
             contact = SelfContact(model.line, diameters(model), model.tension_scale)

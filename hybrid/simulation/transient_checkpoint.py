@@ -63,6 +63,9 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
     if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
         saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
+    if isinstance(saved.get("zoning"), dict):
+        older |= {"zoning": {"following": None} | saved["zoning"]}
+        saved = {name: x for name, x in saved.items() if name != "zoning"}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
     clock[b.NOW], clock[b.PREVIOUS] = saved["t"], saved["t"] - saved["last"]

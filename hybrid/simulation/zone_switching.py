@@ -19,7 +19,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.torque_transfer import carry_torque
-from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, follow_zones
+from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, follow_zones, plan_nodes, take_arcs
 from hybrid.kernels.zone_switch import (
     AFTER,
     BEFORE,
@@ -63,7 +63,8 @@ class ZoneSwitching:
         """loaded: whether joints carry the moment of the catenary's curvature."""
         self.model, self.manager = model, manager
         self.joints = Joints(model.line) if loaded else None
-        self.table, self._switch_table = Table(blank_zone_job()), Table(blank_switch_job())  # of the compiled run
+        self.table = Table(blank_zone_job())  # of the compiled run
+        self._switch_table, self._plan_table = Table(blank_switch_job()), Table(blank_zone_job())
         self._guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
         self._kinks = np.zeros(base.size, bool)
@@ -107,7 +108,11 @@ class ZoneSwitching:
         """What is under way: bending, lengths, moments at joints, and what the manager remembers."""
         line, zones = self.model.line, self.zones
         relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts[z.RELAXING] else None
+        following = None
+        if zones.clock[z.SHARE] > 0.0:
+            following = {"true": zones.true, "calm": zones.calm, "peak": float(zones.clock[z.PEAK])}
         return {
+            "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
             "strain": zones.strain[1] if zones.counts[z.STRAINED] else NO_STRAIN,
             "joints": self.joints and self.joints.checkpoint(), "relaxing": relaxing,
@@ -130,6 +135,12 @@ class ZoneSwitching:
             for name, x in matched(relaxing, template, "relaxing").items():
                 getattr(zones, name)[:] = x
             zones.counts[z.RELAXING] = 1
+        if (following := saved["following"]) is not None:
+            needs: dict[str, Any] = {"true": zones.true, "calm": zones.calm, "peak": 0.0}
+            found = matched(following, needs, "following")
+            if not (found["true"].min() > 0.0 and found["peak"] >= 0.0):
+                raise ValueError("lengths or a curvature that no line has")
+            zones.true[:], zones.calm[:], zones.clock[z.PEAK] = found["true"], found["calm"], found["peak"]
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
         if strain.size:
@@ -139,6 +150,12 @@ class ZoneSwitching:
         """Weigh the criteria of the first state."""
         self.manager.reset()
         self.evaluate_criteria(0.0, 0.0, ends, state)
+        zones = self.zones
+        if zones.clock[z.SHARE] > 0.0:  # chords become as long as arcs within a pace
+            self._plan_table.bind(line=self.model.line, ends=ends, new=state, zones=zones)
+            take_arcs(self._plan_table.numbers)
+            zones.lack[:], zones.since[:] = zones.true - self.model.line.h, 0.0
+            zones.counts[z.RELAXING] = 1
 
     def prepare_step(self, dt: float, state: State) -> None:
         """Before a step of dt: lengths, bending and moments at joints as they will be then; of zones not compiled."""
@@ -190,12 +207,15 @@ class ZoneSwitching:
             follow_zones(self.table.numbers)
         if self.joints is not None:
             booked = self.joints.unload(self.model.line, state.r - before.r)
-        return booked, manager.review(t, state) if manager.review_due(t) else None
+        change = manager.review(t, state) if manager.review_due(t) else None
+        if change is None and self.zones.counts[z.CELLS_DUE]:
+            change = manager.same_zones()
+        return booked, change
 
     def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
         """The model and the state with other zones, and the energy (J) that the switch puts in."""
         old, manager, model = self.manager.layout, self.manager, self.model
-        new = old._replace(rod=change.rod)
+        new = old._replace(rod=change.rod, here=self._plan(change.rod, sea, ends, state))
         line = model.line
         if self.joints is not None:
             self.joints.unload(line, np.zeros_like(state.r))
@@ -225,6 +245,16 @@ class ZoneSwitching:
         self.manager.release(k, model.cable)
         self.zones.stiff[-k] = model.line.kb[-k]
         self.model = model
+
+    def _plan(self, rod: np.ndarray, sea: Sea, ends: Ends, state: State) -> np.ndarray | None:
+        """Places of the finest mesh where nodes should be; None: cells do not follow the curvature."""
+        zones = self.zones
+        if not zones.clock[z.SHARE] > 0.0:
+            return None
+        zones.next_rod[:] = rod
+        self._plan_table.bind(line=self.model.line, sea=sea, ends=ends, new=state, zones=zones)
+        plan_nodes(self._plan_table.numbers)
+        return zones.plan.copy()
 
     def release_joints(self, state: State) -> None:
         """Take what joints carry off the line, for another line to be put in its place."""

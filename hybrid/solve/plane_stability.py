@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.state import Floats
+from hybrid.kernels.zone_transfer import carry_push
 
 # Sines over the length whose sum is the push: enough that no mode of a line that could grow is left out.
 SINES = 6
@@ -27,10 +28,7 @@ def scaled(push: Floats, size: float, s: Floats) -> Floats:
 
 
 def on_nodes(push: Floats, s: Floats, at: Floats) -> Floats:
-    """The push at other nodes, on cubics with the slopes of parabolas: a rod would feel the kinks of chords."""
-    slope = np.gradient(push, s, axis=0)
-    j = np.clip(np.searchsorted(s, at, side="right") - 1, 0, s.size - 2)
-    h = (s[j + 1] - s[j])[:, None]
-    q = (at - s[j])[:, None] / h
-    near = (1.0 - q) ** 2 * ((1.0 + 2.0 * q) * push[j] + q * h * slope[j])
-    return np.asarray(near + q * q * ((3.0 - 2.0 * q) * push[j + 1] - (1.0 - q) * h * slope[j + 1]))
+    """The push at other nodes."""
+    out = np.zeros((at.size, 4))
+    carry_push(push, s, at, out)
+    return out

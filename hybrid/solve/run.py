@@ -60,6 +60,7 @@ class CompiledRun:
         self.count[b.VARIES] = varies
         self.states: tuple[State, State]
         self._zones_address = 0  # of what follows zones; 0: not known yet
+        self._solver, self._address = in_space, 0
         self.pushes: tuple[Floats, Floats] = (NO_PUSH, NO_PUSH)
         self.contact: SelfContact | None = None  # of a line that touches itself
         self.sampled_errors: Floats = np.zeros((0, 0))  # of the model error, at the outputs that `samples` gave last
@@ -103,7 +104,8 @@ class CompiledRun:
         if self.count[b.PARITY]:
             self.pushes, self.count[b.PARITY] = self.pushes[::-1], 0
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
-        self._solver, self._address = in_plane if line.bits & PLANAR else in_space, 0
+        solver = in_plane if line.bits & PLANAR else in_space
+        self._solver, self._address = solver, self._address if solver is self._solver else 0
         self.quota = max(1, min(ROWS, CELL_STEPS // cells))
         self.count[b.QUOTA] = self.quota
         old, new = self.states

@@ -44,6 +44,7 @@ from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
+    THERE,
     Attributes,
     Columns,
     Event,
@@ -303,7 +304,8 @@ class Result:
     @property
     def mesh(self) -> MeshHistory:
         """`mesh[i]`: the cells at output i, their nodes s (N+1,) m and kinds (N,); fields are on the output grid."""
-        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones)
+        words = self[THERE] if THERE in self.names else None
+        return MeshHistory(self["mesh/s"], self["mesh/always"], self.zones, words)
 
     @property
     def scene_text(self) -> str:

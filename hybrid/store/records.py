@@ -37,6 +37,16 @@ class Mesh(NamedTuple):
         return f"<mesh of {h.size} cells of {h.min():.4g} to {h.max():.4g} m: {count}>"
 
 
+THERE = "mesh/there"  # the field of a line whose cells follow the curvature
+
+
+def there(s: np.ndarray, nodes: np.ndarray) -> np.ndarray:
+    """Bits in words of 64 for places s (K,) m, rising: those that are nodes (N+1,) m, which are among them."""
+    bits = np.zeros(-(-s.size // 64) * 64, np.uint8)
+    bits[np.searchsorted(s, nodes)] = 1
+    return np.packbits(bits, bitorder="little").view("<i8").astype(np.int64)
+
+
 class Event(NamedTuple):
     """Something that happened at time t (s) on s_a <= s <= s_b (m), and why.
 
@@ -155,9 +165,12 @@ class ZoneHistory(Sequence[list[Zone]]):
 class MeshHistory(Sequence[Mesh]):
     """`mesh[i]`: the cells at output i, in the order of s."""
 
-    def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory) -> None:
-        """s, always: (K,) nodes that there may be, m, and whether they are there outside of rods as well."""
-        self._s, self._always, self._zones = s, always.astype(bool), zones
+    def __init__(self, s: np.ndarray, always: np.ndarray, zones: ZoneHistory, words: np.ndarray | None = None) -> None:
+        """s, always: (K,) nodes that there may be, m, and whether they are there outside of rods as well; words: which
+
+        of them there are at every output, as `there` has it; None: all in rods.
+        """
+        self._s, self._always, self._zones, self._words = s, always.astype(bool), zones, words
 
     def __len__(self) -> int:
         return len(self._zones)
@@ -169,6 +182,8 @@ class MeshHistory(Sequence[Mesh]):
         bounds = np.array([zone.s_b for zone in zones[:-1]])
         names = np.array([zone.kind for zone in zones])
         rod = names[np.searchsorted(bounds, s)] == "rod"  # of a bound, the zone before it
+        if self._words is not None:
+            rod &= np.unpackbits(self._words[i].astype("<i8").view(np.uint8), bitorder="little")[: s.size] == 1
         nodes = s[self._always | rod]
         return Mesh(nodes, names[np.searchsorted(bounds, 0.5 * (nodes[1:] + nodes[:-1]))])
 

@@ -23,7 +23,7 @@ from hybrid.scene.schema import Scene
 ADAPTIVE = (
     OCEAN.replace(
         "model: {kind: catenary}",
-        "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
+        "model: {kind: adaptive, tolerance: 1.0e-3, rod_cell: 1.0, curvature_error: 0.05, hold_time: 2.0, force_rod: [[0.0, 10.0]], "
         "force_catenary: [[200.0, 250.0]], joint: curvature, correct: true}",
     )
     + "output: {criteria: true, errors: true}\naccuracy: {position: 3 cm, tension: 1%, curvature: 5%, instant: 2%, "

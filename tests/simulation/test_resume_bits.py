@@ -19,6 +19,10 @@ CASES = {
     "catenary": ("07_forced_taut_cable", ["time.duration=2"]),
     "rod in a plane": ("06_whip", ["time.duration=0.2"]),
     "adaptive in a plane": ("touchdown", ["time.duration=20"]),
+    "cells that follow": (
+        "touchdown",
+        ["time.duration=8", "model={kind: adaptive, curvature_error: 0.05}", "mesh=null"],
+    ),
     "adaptive in space": ("s_tether", ["time.duration=8"]),
     "friction, laid": ("laying", ["time.duration=30"]),
     "friction, slack": ("slack_on_seabed", ["time.duration=20"]),

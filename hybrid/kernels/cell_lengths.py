@@ -1,0 +1,274 @@
+"""How long the cells of rods may be: from the curvature as it is, at every step of a run whose cells follow it.
+
+    symbol   meaning                                                        unit
+    kappa    curvature at a node                                            1/m
+    W        wanted length of cells at a node                               m
+    l0       min(sqrt(EI/T), (EI/w)^(1/3)), over which a rod bends          m
+    delta    what the chord of a cell is shorter by than its arc            m
+
+A cell of length h interpolates the curvature with the error h^2 |kappa''| / 8.  Cells are dyadic parts of base cells: a
+part is halved where it is longer than wanted, and two halves become one where that is shorter by far.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.compile import inner
+from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT
+from hybrid.kernels.forces import SEABED
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.rotations import dot, scale, sub
+from hybrid.kernels.zone_criteria import SMOOTH, depth, kink_at, raise_ratio
+
+TURN = 0.3  # rad that a cell turns through
+SHORTEST_CELL = 0.6  # of l0
+EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
+FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
+STEEPEST = 0.8  # by which W may grow with s: cells beside each other differ by little more than 2
+AHEAD = 0.75  # of W from which cells are halved where others must be: changes become fewer
+MERGE = 0.5  # of W that two cells made one may be long
+CALM_STEPS = 4  # for which two cells must have been so short
+FADE = 10.0  # ramp times over which the largest curvature of earlier is forgotten
+SAVED = 0.12  # of all cells: so many must go before any goes
+SMOOTHED = 0.1  # part by which delta comes nearer to what it is, in a step: at once it is unstable in slack lines
+
+
+@inner
+def bending_length(kinds, T, i):
+    """l0 at node i."""
+    n = T.shape[0]
+    low = min(T[max(i - 1, 0)], T[min(i, n - 1)])
+    EI, w = kinds.EI[i], kinds.w[i]
+    bend = math.sqrt(EI / max(low, kinds.floor[i], 1e-300))
+    return min(bend, (EI / w) ** (1.0 / 3.0)) if w > 0.0 else bend
+
+
+@inner
+def node_curvature(line, turn, i):
+    """kappa at node i; at a joint that of the rod beside it, because a joint has a kink."""
+    n = line.h.shape[0]
+    if 0 < i < n and line.spin[i] != line.spin[i - 1]:
+        i = i + 1 if line.spin[i] else i - 1
+    return turn[i] / line.hn[i] if 0 < i < n or line.element[i] else 0.0
+
+
+@inner
+def second_difference(line, turn, i):
+    """|kappa''| at an inner node i."""
+    a, b = line.s[i] - line.s[i - 1], line.s[i + 1] - line.s[i]
+    k = node_curvature(line, turn, i)
+    before, after = node_curvature(line, turn, i - 1), node_curvature(line, turn, i + 1)
+    return abs(2.0 * ((after - k) / b - (k - before) / a) / (a + b))
+
+
+@inner
+def wanted_length(line, kinds, T, i, error):
+    """W at node i; error: 1/m, that interpolation may make."""
+    n, turn = T.shape[0], kinds.turn
+    bends = 0.0
+    for k in range(max(i - 1, 1), min(i + 2, n)):
+        bends = max(bends, second_difference(line, turn, k))
+    W = math.sqrt(8.0 * error / bends) if bends > 0.0 else math.inf
+    k = node_curvature(line, turn, i)
+    if k > 0.0:
+        W = min(W, TURN / k)
+    return max(W, SHORTEST_CELL * bending_length(kinds, T, i))
+
+
+@inner
+def lower_between(W, s, a, b, to):
+    """W at nodes between arc lengths a and b, m, and at the next node on either side, is `to` at most."""
+    n = s.shape[0]
+    for i in range(n):
+        if s[min(i + 1, n - 1)] >= a and s[max(i - 1, 0)] <= b:
+            W[i] = min(W[i], to)
+
+
+@inner
+def lower_at_edge(line, sea, state, zones, i, dt):
+    """W about a contact edge in cell i, and over the way that it will go in a step of dt."""
+    p, q = depth(sea, state.r, i), depth(sea, state.r, i + 1)
+    s, h = line.s, line.s[i + 1] - line.s[i]
+    part = p / (p - q)
+    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
+    rises = (1.0 - part) * dot(normal, get3(state.v, i)) + part * dot(normal, get3(state.v, i + 1))
+    l0 = bending_length(zones.kinds, state.T, i)
+    at, way = s[i] + part * h, dt * rises * h / (q - p)
+    way = min(max(way, -FARTHEST * l0), FARTHEST * l0)
+    a, b = at + min(way, 0.0) - EDGE_WIDTH * l0, at + max(way, 0.0) + EDGE_WIDTH * l0
+    lower_between(zones.wanted, s, a, b, EDGE_CELL * l0)
+
+
+@inner
+def find_wanted(line, sea, state, zones, error, dt):
+    """Wanted lengths at nodes for the next step, of dt, into zones.wanted, graded."""
+    kinds, T, W, s = zones.kinds, state.T, zones.wanted, line.s
+    n = T.shape[0]
+    for i in range(n + 1):
+        W[i] = wanted_length(line, kinds, T, i, error)
+    if line.bits & SEABED:
+        for i in range(n):
+            if (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
+                lower_at_edge(line, sea, state, zones, i, dt)
+    for i in range(1, n + 1):
+        W[i] = min(W[i], W[i - 1] + STEEPEST * (s[i] - s[i - 1]))
+    for i in range(n - 1, -1, -1):
+        W[i] = min(W[i], W[i + 1] + STEEPEST * (s[i + 1] - s[i]))
+
+
+@inner
+def least_wanted(zones, p, b):
+    """Least W of the nodes from the p-th on up to place b on the finest mesh, and of the next one."""
+    least = zones.wanted[p]
+    while p + 1 < zones.wanted.shape[0] and zones.place[p] < b:
+        p += 1
+        least = min(least, zones.wanted[p])
+    return least
+
+
+@inner
+def halves(zones, p, a, size, unit):
+    """Whether the part of `size` finest cells of length `unit` from place a on is halved, and whether it must be now."""
+    W, middle, h = least_wanted(zones, p, a + size), a + size // 2, size * unit
+    if h > W * AHEAD:
+        zones.calm[middle] = 0
+        return True, h > W and not zones.here[middle]
+    if not zones.here[middle]:
+        return False, False
+    zones.calm[middle] = zones.calm[middle] + 1 if h <= MERGE * W else 0
+    return zones.calm[middle] < CALM_STEPS, False
+
+
+@inner
+def plan_base_cell(zones, p, begin, size, unit):
+    """Nodes of a base cell that is rod, of `size` finest cells, into zones.plan; whether some must be there at once.
+
+    p: its first node now.  Parts in their order along the line: the one that begins at an offset is as long as the largest power of two in it.
+    """
+    offset, part, at_once = 0, size, False
+    while offset < size:
+        while zones.place[p + 1] <= begin + offset:
+            p += 1
+        while part > 1:
+            halved, now = halves(zones, p, begin + offset, part, unit)
+            at_once |= now
+            if not halved:
+                break
+            part //= 2
+            zones.plan[begin + offset + part] = True
+        offset += part
+        part = offset & -offset
+    return at_once
+
+
+@inner
+def plan_cells(line, sea, state, zones, error, dt):
+    """Places of the finest mesh where nodes should be into zones.plan; whether rods need more of them at once, or many
+
+    may go; dt: s, of the step before, which the next one is taken to be as long as.
+    """
+    find_wanted(line, sea, state, zones, error, dt)
+    begin, p, at_once = 0, 0, False
+    for k in range(zones.plan.shape[0]):
+        zones.plan[k] = False
+    for j in range(zones.parts.shape[0]):
+        size = zones.parts[j]
+        while zones.place[p] < begin:
+            p += 1
+        zones.plan[begin] = True
+        if zones.next_rod[j]:
+            at_once |= plan_base_cell(zones, p, begin, size, zones.H[j] / size)
+        begin += size
+    zones.plan[begin] = True
+    gone = 0
+    for k in range(zones.plan.shape[0]):
+        gone += zones.here[k] and not zones.plan[k]
+    return at_once or gone > SAVED * line.h.shape[0]
+
+
+# --- kinds ----------------------------------------------------------------------------------------
+
+
+@inner
+def missing_curvature(line, zones, T, i, H):
+    """Curvature, 1/m, that node i would be wrong by in a catenary of one cell of length H, but for a contact edge."""
+    kinds, n = zones.kinds, T.shape[0]
+    turn, l0 = kinds.turn, bending_length(kinds, T, i)
+    if line.element[i] and (i == 0 or i == n or kinds.node[i] != SMOOTH):
+        return turn[i] / line.hn[i]
+    if i == 0 or i == n:
+        return turn[i] / l0
+    if kinds.node[i] != SMOOTH or line.spin[i] != line.spin[i - 1]:
+        return kink_at(line, turn, i) / (2.0 * l0)
+    if 1 < i < n - 1 and line.spin[i - 2] == line.spin[i + 1]:  # away from joints, whose kink is no curvature
+        return max(l0 * l0, 0.125 * H * H) * second_difference(line, turn, i)
+    return 0.0
+
+
+@inner
+def weigh_curvature(line, sea, state, zones, error):
+    """Raise ratios to those of the curvature that catenaries would leave out, over the one allowed, 1/m."""
+    kinds, T = zones.kinds, state.T
+    n, of = T.shape[0], kinds.base_of_cell
+    for i in range(n + 1):
+        ja, jb = of[max(i - 1, 0)], of[min(i, n - 1)]
+        row = CLAMP if i == 0 or i == n else (BEND if kinds.node[i] == SMOOTH else POINT)
+        H = max(zones.H[ja], zones.H[jb])
+        raise_ratio(zones.ratios, row, ja, jb, missing_curvature(line, zones, T, i, H) / error)
+        if line.bits & SEABED and i < n and (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
+            jump = kinds.w[i] / max(T[i], kinds.floor[i], 1e-300)  # of the curvature, which a rod rounds off
+            raise_ratio(zones.ratios, EDGE, jb, jb, 0.5 * jump / error)
+
+
+# --- lengths ----------------------------------------------------------------------------------------
+
+
+@inner
+def second_divided(r, s, i):
+    """r'' at a node, 1/m; at an end that of its neighbour."""
+    n = s.shape[0] - 1
+    i = min(max(i, 1), n - 1)
+    a, b = s[i] - s[i - 1], s[i + 1] - s[i]
+    one, two = sub(get3(r, i), get3(r, i - 1)), sub(get3(r, i + 1), get3(r, i))
+    return scale(2.0 / (a + b), sub(scale(1.0 / b, two), scale(1.0 / a, one)))
+
+
+@inner
+def smooth_bend(line, state, zones, c, k):
+    """r'' at a node (c or c + 1) of cell c; where there is a joint or a load, at the other one."""
+    n = line.h.shape[0]
+    other = c if k > c else c + 1
+    if 0 < k < n and (zones.kinds.node[k] != 0 or line.spin[k] != line.spin[k - 1]) and 0 < other < n:
+        k = other
+    return second_divided(state.r, line.s, k)
+
+
+@inner
+def arc_less_chord(line, state, zones, c):
+    """delta of cell c, to fourth order; none where the curvature changes its sign."""
+    if line.h.shape[0] < 3:
+        return 0.0
+    e, h = get3(state.e, c), line.s[c + 1] - line.s[c]
+    d = scale(1.0 / math.sqrt(dot(e, e)), e)
+    a, b = smooth_bend(line, state, zones, c, c), smooth_bend(line, state, zones, c, c + 1)
+    across = dot(a, b) - dot(a, d) * dot(b, d)
+    return h * h * h / 24.0 * max(across, 0.0)
+
+
+@inner
+def follow_arcs(line, state, zones):
+    """True lengths come nearer to those that make chords as long as the arcs they stand for."""
+    for c in range(line.h.shape[0]):
+        aim = line.s[c + 1] - line.s[c] - arc_less_chord(line, state, zones, c)
+        zones.true[c] += SMOOTHED * (aim - zones.true[c])
+
+
+@inner
+def largest_curvature(line, turn):
+    """Of all inner nodes without a joint, and of clamps."""
+    most, n = 0.0, line.h.shape[0]
+    for i in range(n + 1):
+        if line.element[i] or (0 < i < n and line.spin[i] == line.spin[i - 1]):
+            most = max(most, turn[i] / line.hn[i])
+    return most

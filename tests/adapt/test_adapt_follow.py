@@ -1,0 +1,125 @@
+"""Cells that follow the curvature: their lengths, chords as long as arcs, and runs whose mesh moves."""
+
+from __future__ import annotations
+
+from itertools import pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from adapt_cases import cable, hanging, helix, layout, on, state_on, still
+from problems import order
+
+import hybrid
+from hybrid.adapt.manager import DomainManager
+from hybrid.kernels import zone_step as z
+from hybrid.kernels.binding import Table
+from hybrid.kernels.state import no_sea
+from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+# A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
+TOUCHDOWN = (
+    "output.errors=false", "output.points=501", "output.every=1", "time.duration=20",
+    "model={kind: adaptive, force_rod: [[0, 250]], curvature_error: 0.03}", "mesh={cells: 24}",
+)  # fmt: skip
+
+
+def planned(curvature_error, shape, n=8, parts=64, length=10.0):
+    """The layout that a state on a shape asks for, from the finest mesh, and the manager that made it."""
+    what, zones = cable(length), layout(np.linspace(0, length, n + 1), parts, "R" * n)
+    line = on(what, zones)
+    state = state_on(line, shape, 1e4)  # taut: the layer is as short as the cells
+    manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=curvature_error)
+    manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
+    manager.zones.clock[z.PEAK] = (manager.zones.kinds.turn[1:-1] / line.hn[1:-1]).max()
+    manager.zones.next_rod[:] = True
+    table = Table(blank_zone_job())
+    table.bind(line=line, new=state, zones=manager.zones)
+    for _ in range(5):  # for so long two cells must be too short before they become one
+        plan_nodes(table.numbers)
+    return zones._replace(here=manager.zones.plan.copy())
+
+
+@pytest.mark.parametrize("share", [0.01, 0.04])
+def test_cells_are_as_long_as_the_curvature_allows(share: float) -> None:
+    """A catenary, kappa = a/(a^2 + s^2): h^2 |kappa''| / 8 is at most the share of the largest, and cells no shorter
+
+    than a quarter of what that allows; they are dyadic parts, and neighbours differ by little.
+    """
+    a, at = 0.5, 3.0
+    found = planned(share, hanging(a, at)[0])
+    s, h = found.nodes, np.diff(found.nodes)
+    x = np.linspace(0.0, 10.0, 20001)
+    k = a / (a * a + (x - at) ** 2)
+    bends = np.abs(np.gradient(np.gradient(k, x), x))
+    worst = np.array([bends[(x >= p) & (x <= q)].max() for p, q in pairwise(s)])
+    assert (h**2 * worst / 8.0 <= 1.1 * share * k.max()).all()
+    sharp = worst > 0.3 * worst.max()
+    assert (h[sharp] ** 2 * worst[sharp] / 8.0).max() > share * k.max() / 16.0
+    assert set(found.base) <= set(s.tolist()) and found.places.size < 150
+    ratio = h[1:] / h[:-1]
+    assert ratio.min() > 1 / 4.01 and ratio.max() < 4.01
+    size = np.diff(found.places)
+    assert ((size & (size - 1)) == 0).all() and (found.places[:-1] % size == 0).all()
+
+
+@pytest.mark.parametrize("shape", ["hanging", "helix"])
+def test_chords_become_as_long_as_arcs_to_fourth_order(shape: str) -> None:
+    """What is taken off a length is what the chord of a smooth curve lacks, h^3 kappa^2 / 24, to fourth order."""
+    curve = {"hanging": hanging(), "helix": helix()}[shape][0]
+    left = []
+    for n in (10, 20, 40):
+        what, zones = cable(), layout(np.linspace(0, 10, n + 1), 1, "R" * n)
+        line = on(what, zones)
+        state = state_on(line, curve)
+        manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=0.05)
+        table = Table(blank_zone_job())
+        table.bind(line=line, new=state, zones=manager.zones)
+        take_arcs(table.numbers)
+        chords = np.linalg.norm(state.e, axis=1)
+        inner = slice(2, -2)
+        left.append(np.abs(manager.zones.true - chords)[inner].max() / line.h[0])
+        assert np.abs(line.h - chords)[inner].max() / line.h[0] > 5.0 * left[-1]
+    assert order(left)[-1] > 3.5, left
+
+
+@pytest.fixture(scope="module")
+def following():
+    return hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", list(TOUCHDOWN)))
+
+
+def test_a_mesh_that_moves_with_the_touchdown(following: hybrid.Result) -> None:
+    """The curvature everywhere and always as 600 uniform cells have it, with a fifth of them, and they move."""
+    rod = hybrid.run(
+        hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN[:4], "model=rod", "mesh={cells: 1000}"])
+    )
+    most = rod.curvature.max()
+    cells = [mesh.kinds.size for mesh in following.mesh][2:]
+    assert max(cells) < 140
+    assert np.abs(following.curvature - rod.curvature)[2:].max() < 0.07 * most
+    assert np.abs(following.tension - rod.tension)[:, -1].max() < 5e-3 * rod.tension[:, -1].mean()
+    assert np.abs(following.position - rod.position).max() < 2e-4 * 250.0
+    edges = rod.touchdown[:, 1]
+    nearest = [np.diff(mesh.s)[np.searchsorted(mesh.s, x) - 1] for mesh, x in zip(following.mesh, edges, strict=True)]
+    assert np.ptp(edges) > 5.0 and max(nearest[2:]) < 0.8  # m, shorter than two layers wherever the touchdown is
+
+
+def test_what_changes_of_cells_put_in_is_booked(following: hybrid.Result) -> None:
+    """Energy less all work is what the time scheme dissipates: as much as with rods that stay, within a part of it."""
+    rod = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN[:4], "model=rod", "mesh={cells: 400}"]))
+    scheme, size = following["work/scheme"], np.abs(rod["work/drag"]).max()
+    assert np.abs(following["work/zones"]).max() > 0.0
+    assert np.abs(scheme - rod["work/scheme"]).max() < 0.02 * size
+
+
+def test_a_run_whose_cells_follow_is_continued_to_the_last_bit(tmp_path: Path) -> None:
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=6", "output.every=0.5"])
+    whole = hybrid.run(scene)
+    short = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=3", "output.every=0.5"])
+    hybrid.run(short, tmp_path / "r.h5").close()
+    more = hybrid.resume(tmp_path / "r.h5", until=6.0)
+    for name in ("position", "tension", "curvature", "work/zones"):
+        np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
+    for a, b in zip(more.mesh, whole.mesh, strict=True):
+        np.testing.assert_array_equal(a.s, b.s)
