@@ -9,6 +9,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Line
 from hybrid.model.build import Model
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.scene.schema import Scene
 
 NAMES = ("start", "end")
@@ -22,7 +23,10 @@ def without_hold(model: Model, k: int, t: float) -> Model:
         held_tangent=(tangent[0] and k != 0, tangent[1] and k != 1),
         held_twist=(twist[0] and k != 0, twist[1] and k != 1),
     )
-    return replace(model, line=_without_clamp(model.line, -k), cable=cable, ends=model.ends.released_at(k, t))
+    line, ends, on_base = _without_clamp(model.line, -k), model.ends.released_at(k, t), None
+    if model.layout is not None:
+        on_base = LineOnBase(cable, model.layout.base)
+    return replace(model, line=line, cable=cable, ends=ends, on_base=on_base)
 
 
 def _without_clamp(line: Line, node: int) -> Line:

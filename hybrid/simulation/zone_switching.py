@@ -244,7 +244,7 @@ class ZoneSwitching:
         """End k (0 or 1) has been let go."""
         self.manager.release(k, model.cable)
         self.zones.stiff[-k] = model.line.kb[-k]
-        self.model = model
+        self.model, self._guided[k] = model, 0.0
 
     def _plan(self, rod: np.ndarray, sea: Sea, ends: Ends, state: State) -> np.ndarray | None:
         """Places of the finest mesh where nodes should be; None: cells do not follow the curvature."""
