@@ -274,7 +274,8 @@ def _end_conditions(
         ]
         motion = end.prescribed_motion
         if motion is not None:
-            motions[k] = EndMotion(motion, end.held_position, base, around.elevation)
+            waves = around.values.waves, float(around.values.ramps[1]), end.held_tangent is not None
+            motions[k] = EndMotion(motion, end.held_position, base, around.elevation, waves)
     held = [end.held_position is not None for end in scene.ends.both]
     when = [end.release for end in scene.ends.both]
     times = [x.time if x is not None and x.time is not None else np.inf for x in when]

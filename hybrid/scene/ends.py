@@ -6,6 +6,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
@@ -79,6 +80,32 @@ class Travel(Table):
     begin: NonNegative = Field(default=0.0, description="time at which it begins [s]")
 
 
+class Vessel(Table):
+    """A vessel that carries the end: it moves with the waves of the scene, to first order; it grows with their ramp."""
+
+    rao: Text = Field(
+        min_length=1,
+        description="CSV file, relative to the scene file: a row for every frequency [rad/s] and heading [deg], the "
+        "direction of the waves against that of the vessel (0: from astern, 180: from ahead); columns surge, sway, "
+        "heave (m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin)",
+    )
+    origin: Vector = Field(description="point of the vessel that the RAO is for, at rest, inertial frame [m]")
+    heading: Number = Field(
+        default=0.0, description="direction of its bow, counter-clockwise from the inertial x axis [deg]"
+    )
+    fairlead: Vector | None = Field(
+        default=None,
+        description="the end in axes of the vessel from its origin (to the bow, to port, up); absent: it follows from "
+        "the position of the end, with which it must agree [m]",
+    )
+
+    def place(self, fairlead: Triple) -> Triple:
+        """Where a point given in axes of the vessel is, at rest, inertial frame [m]."""
+        c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
+        x, y, z = fairlead
+        return self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, self.origin[2] + z
+
+
 class Motion(Table):
     """Prescribed motion of an end, relative to where it is held; it must start from rest, or have a `ramp`.
 
@@ -99,6 +126,7 @@ class Motion(Table):
     follow: Literal["waves"] | None = Field(
         default=None, description="waves: rises and falls with the surface where the end is; needs waves with a ramp"
     )
+    vessel: Vessel | None = Field(default=None, description="a vessel that carries the end in the waves of the scene")
     ramp: Positive | None = Field(
         default=None, description="time over which harmonic motion, velocity and a file grow from zero, smoothly [s]"
     )
@@ -120,7 +148,7 @@ class Motion(Table):
 
     def shifts(self) -> list[str]:
         """The keys given that move the end; those of TURNS turn it, and a file may do both."""
-        named = (*SHIFTS, "velocity", "travel", "follow")
+        named = (*SHIFTS, "velocity", "travel", "follow", "vessel")
         return [name for name in named if getattr(self, name) is not None]
 
     def carried(self, t: float) -> tuple[Triple, Triple]:
@@ -137,12 +165,16 @@ class Motion(Table):
     @model_validator(mode="after")
     def _one_source(self) -> Motion:
         given = [*self.shifts(), *(name for name in TURNS if getattr(self, name) is not None)]
-        ramped = [name for name in given if name not in ("travel", "follow")]
+        ramped = [name for name in given if name not in ("travel", "follow", "vessel")]
+        if self.vessel is not None:
+            fix = "leave it out, or write all of the motion into a file; travel may move the vessel"
+            beside = [name for name in given if name not in ("vessel", "travel")]
+            refuse(Finding((name,), "nothing, because vessel already gives the motion", fix) for name in beside)
         if self.file is not None:
             fix = "put the whole motion into the file, or leave file out"
             refuse(Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
         elif not given:
-            expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, or file"
+            expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, vessel, or file"
             refuse([Finding((), expected, "say how the end moves, or leave motion out")])
         elif self.ramp is not None and not ramped:
             expected = "nothing, because a ramp is for velocity and for harmonic motion"
@@ -402,5 +434,7 @@ class Ends(Table):
     def files(self) -> list[str]:
         """Files that motions and loads of the ends are read from."""
         motions = [end.prescribed_motion.file for end in self.both if end.prescribed_motion is not None]
+        motions += [x.prescribed_motion.vessel.rao for x in self.both
+                    if x.prescribed_motion is not None and x.prescribed_motion.vessel is not None]  # fmt: skip
         loads = [given.load.file for end in self.both for given in end.loads]
         return sorted({path for path in (*motions, *loads) if path is not None})

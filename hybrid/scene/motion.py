@@ -19,8 +19,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.ends import SHIFTS, TURNS, Harmonic, Motion, smooth_step
+from hybrid.scene.ends import SHIFTS, TURNS, Harmonic, Motion, Vessel, smooth_step
 from hybrid.scene.motion_file import RecordRefused, read_record, spline
+from hybrid.scene.rao_file import point_harmonics
 
 Array = NDArray[np.float64]
 
@@ -54,7 +55,9 @@ class EndMotion:
 
     motion: the scene's table, or None for an end at rest; position: (3,) m, inertial, where the end
     is held (None for a guided end); frame: (3, 3), columns a1, a2, tangent in inertial axes, or None;
-    elevation: the surface of the sea, which a motion with `follow: waves` needs.  base: (3,) m, without motion.
+    elevation: the surface of the sea, which a motion with `follow: waves` needs;
+    waves: (J, 6) of `Sea.waves`, their ramp [s], and whether the end turns with a vessel, which a motion with `vessel`
+    needs.  base: (3,) m, without motion.
     SceneError if the motion file cannot be read.
     """
 
@@ -64,6 +67,7 @@ class EndMotion:
         position: ArrayLike | None,
         frame: ArrayLike | None = None,
         elevation: Elevation | None = None,
+        waves: tuple[Array, float, bool] | None = None,
     ) -> None:
         self.base = _constant(np.zeros(3) if position is None else position)
         self._frame = None if frame is None else _constant(frame)
@@ -73,6 +77,8 @@ class EndMotion:
         harmonics = {} if motion is None else motion.harmonics()
         self._shifts = _components(harmonics, SHIFTS, 1.0)
         self._turns = _components(harmonics, TURNS, math.pi / 180)
+        if motion is not None and motion.vessel is not None:
+            self._sail(motion.vessel, waves)
         self._carried = None
         if motion is not None and ((motion.velocity and any(motion.velocity)) or motion.travel is not None):
             self._carried = motion.carried
@@ -166,6 +172,20 @@ class EndMotion:
                 rate[axis] += amplitude * (dr * sine + r * w * cosine)
             turn, spin = _turn_by_angles(angle, rate)
         return None if self._frame is None else turn @ self._frame, spin
+
+    def _sail(self, vessel: Vessel, waves: tuple[Array, float, bool] | None) -> None:
+        """Move with a vessel in waves."""
+        if waves is None or not len(waves[0]):
+            raise ValueError("a vessel needs waves to move in")
+        components, ramp, turns = waves
+        try:
+            harmonics = point_harmonics(vessel.rao, components, np.array(vessel.origin), vessel.heading, self.base)
+        except RecordRefused as refused:
+            found = refused.finding
+            raise SceneError([Complaint("motion.vessel.rao", found.given or "", found.expected, found.fix)]) from None
+        self._ramp = ramp
+        self._shifts = [h for h in harmonics if h[0] < 3]
+        self._turns = [(axis - 3, a, w, phase) for axis, a, w, phase in harmonics if axis >= 3 and turns]
 
     def _followed(self, curve: Any, t: float) -> tuple[Array, Array]:
         """Value (3,) and rate of a spline, as far as it has grown."""

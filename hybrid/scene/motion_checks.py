@@ -14,7 +14,7 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import SHIFTS, End, Ends, Harmonic, Motion
+from hybrid.scene.ends import SHIFTS, End, Ends, Harmonic, Motion, Vessel
 from hybrid.scene.load_checks import load_findings, turning_times
 
 if TYPE_CHECKING:
@@ -26,6 +26,8 @@ AT_REST = 1e-6
 # Time steps that a period, and a ramp, must last at least: six steps a period are a poor answer, but the same motion.
 SAMPLES, RAMP_STEPS = 6, 3
 
+# m, between the position of an end and its fairlead.
+SAME_FAIRLEAD = 1e-3
 # Speed of tension waves, m/s, in what is given as inextensible: that of steel; ropes and chains are slower.
 STEEL_WAVES = 5000.0
 # Largest speed and acceleration of a smooth move, over way / time and way / time^2: 15/8, and that of the polynomial
@@ -52,6 +54,8 @@ def motion_findings(tables: Mapping[str, Any]) -> list[Finding]:
         record, wrong = None, list(_harmonic_jump(motion))
         if motion.file is not None:
             record, wrong = _judged(end, motion, time.duration if isinstance(time, Time) else None)
+        if motion.vessel is not None:
+            wrong += _vessel(end, motion.vessel)
         if not wrong and isinstance(cable, Cable):
             wrong = list(_too_fast(cable, motion, record))
         found += [Finding((*here, *f.at), f.expected, f.fix, f.given) for f in wrong]
@@ -112,6 +116,24 @@ def _judged(end: End, motion: Motion, duration: float | None) -> tuple[Record | 
         )
         return record, [Finding(("file",), expected, "kind: clamped can be moved", given)]
     return record, judge_record(record, end.held_position, duration, motion.ramp is not None)
+
+
+def _vessel(end: End, vessel: Vessel) -> Iterator[Finding]:
+    """A vessel whose table cannot be read, or whose fairlead is not where the end is held."""
+    from hybrid.scene.motion_file import RecordRefused
+    from hybrid.scene.rao_file import read_rao
+
+    try:
+        read_rao(vessel.rao)
+    except RecordRefused as refused:
+        found = refused.finding
+        yield Finding(("vessel", "rao"), found.expected, found.fix, found.given)
+    if vessel.fairlead is not None and end.held_position is not None:
+        place = vessel.place(vessel.fairlead)
+        if math.dist(place, end.held_position) > SAME_FAIRLEAD:
+            text = ", ".join(f"{x:.7g}" for x in place)
+            expected = "the position of the end, in axes of the vessel"
+            yield Finding(("vessel", "fairlead"), expected, f"the position of the end would be [{text}]")
 
 
 def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[Finding]:

@@ -149,6 +149,16 @@ def _history(path: str, _changed: int, _size: int) -> tuple[tuple[float, float, 
     return tuple((t, x, y, z) for t, x, y, z in table.tolist())
 
 
+def read_table(path: str | Path, checked: Callable[[str, list[str]], list[str]]) -> tuple[list[str], Array, list[int]]:
+    """Column names, numbers (n, columns) and the line of each row of a CSV file; checked: as of `_table`."""
+    try:
+        with Path(path).open(encoding="utf-8-sig") as lines:
+            header, values, _, numbers = _table(Path(path).name, lines, checked)
+    except (OSError, UnicodeDecodeError, ValueError):
+        raise RecordRefused("a CSV text file", "check the path", f"{path}, which cannot be read") from None
+    return header, np.array(values).reshape(len(numbers), len(header)), list(numbers)
+
+
 def _history_header(name: str, header: list[str]) -> list[str]:
     if sorted(header) == ["t", *SHIFT_COLUMNS]:
         return header

@@ -190,6 +190,10 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
         here = data
         for key in ("ends", end, table):
             here = here.get(key) if isinstance(here, dict) else None
+        carried = here.get("vessel") if isinstance(here, dict) else None
+        rao = carried.get("rao") if isinstance(carried, dict) else None
+        if isinstance(carried, dict) and isinstance(rao, str) and rao and "\0" not in rao:
+            carried["rao"] = str((folder / rao).absolute())
         name = here.get("file") if isinstance(here, dict) else None
         if isinstance(here, dict) and isinstance(name, str) and name and "\0" not in name:
             here["file"] = str((folder / name).absolute())

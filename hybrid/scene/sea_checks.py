@@ -94,11 +94,13 @@ def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
     sea = environment.fluid.waves if environment.fluid is not None else None
     for name, end in ends.named().items():
         motion = end.prescribed_motion
-        if motion is None or motion.follow is None:
+        if motion is None or (motion.follow is None and motion.vessel is None):
             continue
         if sea is None:
-            fix = "give environment.fluid.waves, with a surface and a ramp"
-            yield Finding(("ends", name, "motion", "follow"), "nothing, because there are no waves to follow", fix)
+            fix, key = "give environment.fluid.waves, with a surface and a ramp", "follow"
+            if motion.vessel is not None:
+                key = "vessel"
+            yield Finding(("ends", name, "motion", key), "nothing, because there are no waves to follow", fix)
         elif sea.ramp is None:
             expected = f"a number > 0, in s, because ends.{name} follows the waves and starts from rest"
             yield Finding((*_WAVES, "ramp"), expected, f"add `ramp: {2 * sea.main_period:.6g}` (s), two periods")
@@ -190,6 +192,7 @@ def arbiter_knows(environment: Environment, cable: Cable, ends: Ends, solver: st
         and not (isinstance(fluid.current, tuple) and isinstance(fluid.current[0], float)),
         "attachments": bool(cable.attachments),
         "bodies": bool(ends.bodies()),
+        "vessels": any(m is not None and m.vessel is not None for m in (x.prescribed_motion for x in ends.both)),
     }
     unknown = [name for name, there in beyond.items() if there]
     if unknown:
