@@ -131,8 +131,9 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
         if any(field.name == "torque" for field in observer.fields):
             name, text = f"{prefix}bending_stiffness", "bending stiffness, the smaller one of two directions"
             out.append((Field(name, "N m^2", text, s.shape, (dim,)), weakest_bending(scene, s)))
-            name, text = f"{prefix}diameter", "outer diameter; NaN: none given"
-            out.append((Field(name, "m", text, s.shape, (dim,), nan_ok=True), outer_diameter(scene, s)))
+            if np.isfinite(width := outer_diameter(scene, s)).any():
+                name, text = f"{prefix}diameter", "outer diameter; NaN: none given"
+                out.append((Field(name, "m", text, s.shape, (dim,), nan_ok=True), width))
     return out
 
 

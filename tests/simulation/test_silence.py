@@ -100,13 +100,16 @@ def test_a_normal_at_one_end_twists_nothing(normal, start):
     assert np.abs(found.torque).max() < 1e-12
 
 
-def test_joints_let_two_normals_be():
+@pytest.mark.parametrize("swivel", [False, True])
+def test_two_normals_twist_a_line_with_joints_as_they_twist_a_rod(swivel):
+    """By a quarter of a turn; not where an end is a swivel."""
     zones = {"kind": "zones", "zones": [{"rod": 0.3}, {"catenary": 0.4}, {"rod": 0.3}]}
     end = {"kind": "guided", "tangent": [1, 0, 0], "normal": [0, 0, 1], "force": [5, 0, 0]}
-    ends = {"start": clamped([0, 0, 0], [1, 0, 0], normal=[0, 1, 0]), "end": end}
+    ends = {"start": clamped([0, 0, 0], [1, 0, 0], normal=[0, 1, 0], swivel=swivel), "end": end}
     start = {"initial": {"kind": "straight", "direction": [1, 0, 0]}, "time": {"duration": 0.05, "step": 0.01}}
-    result = run(NO_GRAVITY, section(**TAUT), {"ends": ends, "model": zones}, start)
-    assert np.abs(result.torque).max() < 1e-12
+    joined, rod = (run(NO_GRAVITY, section(**TAUT), {"ends": ends, "model": x}, start).torque for x in (zones, "rod"))
+    np.testing.assert_allclose(joined, rod, rtol=1e-9, atol=1e-12)
+    assert (np.abs(rod).min() > 0.01) is not swivel
 
 
 def test_a_strut_that_stands_by_symmetry_is_noted():
