@@ -90,7 +90,7 @@ class Simulation:
         if output is not None:
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
-        self._closed, self._failed, self._stack = False, "", ExitStack()
+        self._closed, self._failed, self._stack, self._owner = False, "", ExitStack(), object()
         if isinstance(self._target, Path):
             self._stack.enter_context(locked(self._target))
         compile_beside(self.scene)
@@ -136,6 +136,8 @@ class Simulation:
         ValueError: a time that has passed, or beyond the scene's duration.
         """
         self._check_open()
+        if isinstance(until, bool) or not isinstance(until, int | float | np.integer | np.floating):
+            raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
         now, duration = self.t, self.scene.require_time().duration
         sliver = SLIVER * self._loop.run.resolution.step
         if not now + sliver < until <= duration + sliver:
@@ -196,9 +198,10 @@ class Simulation:
             self._check_plane(end, "position", there - self._driven[k].at(self.t)[0])
         if frame is not None:
             now = self._driven[k].at(self.t)[2]
-            wanted = np.array(frame, float)
-            if wanted.shape != (3, 3) or not np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6):
-                raise ValueError("frame: expected a rotation matrix (3, 3)")
+            wanted = _numbers(frame, "frame")
+            proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
+            if not (proper and np.linalg.det(wanted) > 0.0):
+                raise ValueError("frame: expected a rotation matrix (3, 3), right-handed")
             turn = rotation_vector(now.T @ wanted)
         self._next[k] = there, speed, turn
 
@@ -212,10 +215,11 @@ class Simulation:
             raise ValueError(f"ends.{end} is held: set_end moves it")
         if moment is not None and not self._loop.run.model.line.spin[-k]:
             raise ValueError(f"moment: the cable is a catenary at ends.{end}, which takes no moment")
-        self._check_plane(end, "force", _vector(force, "force"))
-        conditions.load("force", k, _vector(force, "force"), self.t)
+        wanted, turning = _vector(force, "force"), _vector(STILL if moment is None else moment, "moment")
+        self._check_plane(end, "force", wanted)
+        conditions.load("force", k, wanted, self.t)
         if moment is not None:
-            conditions.load("moment", k, _vector(moment, "moment"), self.t)
+            conditions.load("moment", k, turning, self.t)
         self._loop.run.run.move(conditions.moves())
 
     def release(self, end: str) -> None:
@@ -276,6 +280,7 @@ class Simulation:
 
         What has been computed until now is final; what follows is recorded when the next `save` is made.
         """
+        self._check_open()
         if not self._plain:
             self._loop.write_down(everything=True)
         self._recorder.commit()
@@ -283,11 +288,16 @@ class Simulation:
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
         loads = run.model.ends.keep_loads()
-        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model)
+        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner)
 
     def restore(self, saved: Any) -> None:
-        """Back to what `save` returned.  ValueError: a later `save` has made final what came after it."""
+        """Back to what `save` returned.
+
+        ValueError: a later `save` has made final what came after it, or another Simulation has returned it.
+        """
         self._check_open()
+        if not isinstance(saved, _Saved) or saved.owner is not self._owner:
+            raise ValueError("restore: expected what save() of this Simulation has returned")
         self._recorder.back_to(saved.mark)
         if isinstance(saved.state, bytes):
             self._loop = self._case.again(
@@ -369,13 +379,21 @@ class _Saved(NamedTuple):
     paths: Mapping[int, Floats]
     loads: Any
     model: Model
+    owner: object  # what tells one Simulation from another
 
 
 def _vector(x: Sequence[float] | Floats, name: str) -> Floats:
-    value = np.array(x, float)
+    value = _numbers(x, name)
     if value.shape != (3,) or not np.isfinite(value).all():
         raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
     return value
+
+
+def _numbers(x: Any, name: str) -> Floats:
+    try:
+        return np.array(x, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: expected numbers, found {x!r:.60}") from None
 
 
 def _in_space(scene: Scene) -> Scene:
