@@ -181,8 +181,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
             part = reach / shift
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
-        if line.bits & FRICTION and cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
-            part *= 0.5
+        if (line.bits & FRICTION or contact[NEAR] != 0) and cv > 0.0 and it in (7, 10, 13):
+            part *= 0.5  # it goes round between sticking and sliding, or feet of contact between two pieces
         if contact[ADDRESS] != 0:
             part = min(part, ask_contact(contact, contact_table, LIMIT))
         update(plane, space, line, new, cv, ca, part, task.turning, work)
