@@ -289,7 +289,7 @@ class ErrorController:
         self._judged += 1
         most = MOST_REFINEMENTS if self.moves else REFINEMENTS_AT_REST
         left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
-        stalls = falls > STALLED or verdict.ratio * falls**left > 1.0
+        stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
         hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
         met = verdict.ratio <= 1.0 and not (run.unresolved and self.free.mesh)
         if met or hopeless or sum(self.runs) > MOST_CPU:

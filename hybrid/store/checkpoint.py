@@ -99,7 +99,11 @@ def write_slot(slots: Sequence[h5py.Dataset], number: int, data: bytes) -> None:
 
 def read_checkpoint(file: h5py.File) -> Checkpoint:
     """The newest checkpoint that is whole and whose rows are all there.  ResultError if there is none."""
-    points, why = [], "it is an equilibrium, was kept in memory first, or ended before its first output"
+    points = []
+    why = (
+        "it is an equilibrium, was stepped from outside (hybrid.Simulation), was kept in memory first, or ended "
+        "before its first output"
+    )
     for name in SLOTS:
         try:
             data = _read(file, name)

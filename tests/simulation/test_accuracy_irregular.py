@@ -114,6 +114,14 @@ def test_values_that_do_not_converge_are_judged_by_statistics():
     assert "instant" in text and " m, end forces by " in text
 
 
+def test_motion_that_turns_out_irregular_after_its_last_refinement():
+    """What missed before is not judged any more, and no refinement is left: the run is kept as it is."""
+    control = estimated(False)
+    control.start(FINENESS)
+    control._judged, control._ratio = 6, np.inf
+    assert control._next_resolution() is None
+
+
 def test_a_line_that_stays_taut_is_judged_at_every_instant():
     """Where nothing snaps, runs that do not converge are too coarse: a finer one is begun, which these do not know."""
     control = estimated(False, slack=4e3)
