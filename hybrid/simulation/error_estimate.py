@@ -37,7 +37,7 @@ LEAST_RATIO = 1.1
 COARSER = 2.0
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
-# Part of the length of catenaries by which two runs may differ whose model errors count as the same.
+# Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
 OTHER_ZONES = 0.1
 # What a checkpoint calls the cells, the outputs and the catenaries of the run that model errors are of.
 MODEL_OF = "cells", "every", "catenary"
@@ -180,7 +180,7 @@ class Estimate:
         if self.run.cells > LEAST_RATIO * COARSER * cells or not then.size:
             return True
         here = now[every_of(now.size, every)]
-        return bool((np.abs(here - then) > OTHER_ZONES * here).any())
+        return bool((np.abs(here - then) > OTHER_ZONES * np.minimum(here, 1.0 - here)).any())
 
     def update(self, result: RunSample) -> None:
         """A finer run has become the result."""
