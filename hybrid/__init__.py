@@ -21,8 +21,9 @@ if TYPE_CHECKING:
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import import_moordyn
     from hybrid.model.plan import plan
-    from hybrid.scene.read import load_scene, parse_scene, scene_text, validate_scene
+    from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
     from hybrid.simulation.api import resume, run, static
     from hybrid.simulation.stepping import Simulation
     from hybrid.store.reader import Result
@@ -42,9 +43,11 @@ _HOME = {
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
+    "System": ("hybrid.scene.system", "System"),
     "export": ("hybrid.exports.api", "export"),
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
+    "load_system": ("hybrid.scene.read", "load_system"),
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
@@ -69,9 +72,11 @@ __all__ = [
     "Scene",
     "SceneError",
     "Simulation",
+    "System",
     "export",
     "import_moordyn",
     "load_scene",
+    "load_system",
     "open",
     "parse_scene",
     "plan",

@@ -14,6 +14,7 @@ import pytest
 
 import hybrid
 from hybrid.cli.commands import main
+from hybrid.scene.read import parse_either
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -112,7 +113,7 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):
-        hybrid.plan(hybrid.parse_scene(text, str(page)))
+        hybrid.plan(parse_either(text, str(page))[0])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)

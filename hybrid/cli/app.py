@@ -17,6 +17,8 @@ import hybrid
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
     from hybrid.scene.schema import Scene
+    from hybrid.scene.system import System
+    from hybrid.store.reader import Result
 
 REFUSED, FAILED, INTERRUPTED = 1, 2, 130
 
@@ -63,6 +65,7 @@ SceneFile = Annotated[Path, typer.Argument(metavar="SCENE.yaml", help="The scene
 RunFile = Annotated[Path | None, output_option("Result; else SCENE.h5, in this folder.")]
 StaticFile = Annotated[Path | None, output_option("Result; else SCENE.static.h5, here.")]
 Picture = Annotated[Path | None, output_option("PNG, PDF or SVG; else RUN.png, RUN.zones.png.")]
+LineName = Annotated[str | None, typer.Option("--line", metavar="NAME", help="Of several lines, this one.")]
 Settings = Annotated[
     list[str] | None, typer.Option("--set", metavar="KEY=VALUE", help="Change a value, as in time.step=0.005.")
 ]
@@ -128,15 +131,41 @@ def session(as_json: bool, quiet: bool) -> Iterator[Console]:
 
 
 def load(console: Console, path: Path, settings: list[str] | None) -> Scene:
-    """The scene of a command; keys with a former name are noted."""
-    from hybrid.scene.read import read_scene
+    """The scene of a command, of one cable; keys with a former name are noted."""
+    from hybrid.scene.read import one_cable
+
+    return one_cable(load_either(console, path, settings), [], str(path))[0]
+
+
+def load_either(console: Console, path: Path, settings: list[str] | None) -> Scene | System:
+    """The scene of a command, of one cable or of several lines; keys with a former name are noted."""
+    from hybrid.scene.read import read_either
 
     console.source, console.settings = str(path), settings or []
-    scene, renamed = read_scene(path, console.settings)
+    scene, renamed = read_either(path, console.settings)
     for key in renamed:
         console.json("note", text=str(key), **vars(key))
         console.note(f"note: {key}")
     return scene
+
+
+@contextmanager
+def opened_line(result: Path, line: str | None) -> Iterator[tuple[Result, Path]]:
+    """A result, of several lines that of one, and the name of its file, by which others are called."""
+    from hybrid.errors import ResultError
+
+    with hybrid.open(result) as whole:
+        names = list(whole.lines)
+        if line is None and not names:
+            yield whole, result
+            return
+        if line not in names:
+            known = ", ".join(names)
+            why = f"holds the lines {known}" if names else "holds one cable, and no lines by name"
+            fix = f"--line {names[0]}" if names else "leave --line out"
+            raise ResultError(f"{result} {why}\n    given:    --line {line or ''}\n    try:      {fix}")
+        with whole.line(line) as one:
+            yield one, result.with_name(f"{result.stem}.{line}{result.suffix}")
 
 
 def picture_beside(target: Path, plot: bool) -> Path | None:

@@ -33,6 +33,7 @@ from hybrid.cli.app import (
     app,
     flag,
     load,
+    load_either,
     output_option,
     picture_beside,
     session,
@@ -40,6 +41,7 @@ from hybrid.cli.app import (
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
 from hybrid.cli.plan_tables import contents_table, plan_lines
+from hybrid.cli.system_commands import plan_of_lines, run_lines, static_lines
 from hybrid.cli.tables import (
     equilibrium_facts,
     equilibrium_table,
@@ -72,8 +74,11 @@ def run(
 ) -> None:  # fmt: skip
     """Compute the motion of a cable and write it to a file."""
     with session(as_json, quiet) as console:
-        asked = load(console, scene, settings)
+        asked = load_either(console, scene, settings)
         duration = asked.require_time().duration
+        if not isinstance(asked, hybrid.Scene):
+            run_lines(console, asked, output or Path(f"{scene.stem}.h5"), plot, keep)
+            return
         target = console.will_write(output or Path(f"{scene.stem}.h5"))
         picture = picture_beside(target, plot)
         cold = console.compiling(asked)
@@ -119,7 +124,10 @@ def static(
 ) -> None:  # fmt: skip
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
-        asked = load(console, scene, settings)
+        asked = load_either(console, scene, settings)
+        if not isinstance(asked, hybrid.Scene):
+            static_lines(console, asked, output or Path(f"{scene.stem}.static.h5"), plot, keep)
+            return
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
         console.compiling(asked, static=True)
@@ -150,8 +158,10 @@ def plan(
 ) -> None:  # fmt: skip
     """Show what a run would compute, and by which keys of the scene; compute nothing."""
     with session(as_json, False) as console:
-        asked = load(console, scene, settings)
-
+        asked = load_either(console, scene, settings)
+        if not isinstance(asked, hybrid.Scene):
+            plan_of_lines(console, asked, verbose)
+            return
         made = hybrid.plan(asked)
         zones = [asdict(zone) | {"cells": n} for zone, n in zip(made.zones, made.cells, strict=True)]
         console.json("plan", **(asdict(made) | {"zones": zones, "cells": sum(made.cells)}))

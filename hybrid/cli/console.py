@@ -6,7 +6,7 @@ import json
 import os
 import sys
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
 from functools import cached_property
@@ -69,10 +69,15 @@ class Console:
 
         static: for its equilibrium alone, whose stability is judged.
         """
-        from hybrid.kernels.cache import is_warm
         from hybrid.simulation.first_use import kernels_of
 
-        if is_warm(kernels_of(scene, static)):
+        return self.compiling_kernels(kernels_of(scene, static))
+
+    def compiling_kernels(self, names: Sequence[str]) -> bool:
+        """The same of kernels by name, as file.function."""
+        from hybrid.kernels.cache import is_warm
+
+        if is_warm(list(names)):
             return False
         self.json("compiling")
         self.note("compiling the kernels for this machine (first use only, 5 to 40 s) ...")
@@ -181,9 +186,9 @@ class Console:
         t, text = None, self.left or "nothing was written"
         if self.written:
             with hybrid.open(self.written) as result:
-                t = float(result.times[-1]) if len(result.times) else None
+                t, several = float(result.times[-1]) if len(result.times) else None, bool(result.lines)
             text = f"{self.written} " + ("holds no output yet" if t is None else f"is complete up to t = {t:.6g} s")
-            if t is not None:
+            if t is not None and not several:
                 text += f"; `hybrid resume {self.written}` goes on"
         self.json("done", file=self.written, status="interrupted", t=t)
         self._err.print(f"interrupted; {text}", style="yellow", soft_wrap=True)

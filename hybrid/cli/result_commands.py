@@ -8,7 +8,21 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 import hybrid
-from hybrid.cli.app import Foreign, Json, Picture, Quiet, app, flag, numbers, output_option, session, window, words
+from hybrid.cli.app import (
+    Foreign,
+    Json,
+    LineName,
+    Picture,
+    Quiet,
+    app,
+    flag,
+    numbers,
+    opened_line,
+    output_option,
+    session,
+    window,
+    words,
+)
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -25,6 +39,7 @@ def plot(
     ] = None,
     zones: Annotated[bool, flag("--zones", help="Draw zones along s over time instead.")] = False,
     film: Annotated[bool, flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
+    line: LineName = None,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
@@ -34,7 +49,7 @@ def plot(
         raise typer.BadParameter("--times and --history choose what a page without --zones or --animate shows")
     if zones and film:
         raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
-    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+    with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         if film:
             _film(console, opened, result, output, overwrite)
             return
@@ -53,12 +68,13 @@ def plot(
 def report(
     result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to report.", show_default=False)],
     output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
+    line: LineName = None,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
     """Write one HTML file that explains a result: what to know first, moving pictures, events, energy, the scene."""
-    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+    with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         from hybrid.view.summary import facts_of
 
         page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite)
@@ -76,13 +92,14 @@ def export(
     at: Annotated[Any, typer.Option(metavar="S,S,..", parser=numbers, help="Only at these arc lengths (m).")] = None,
     names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,
     times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
+    line: LineName = None,
     keep: Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue."""
     from hybrid.exports.api import beside
 
-    with session(as_json, quiet) as console, hybrid.open(result) as opened:
+    with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         target = output or beside(result, format)
         made = hybrid.export(opened, target, format=format, names=names, times=times, at=at, overwrite=not keep)
         for text in made.notes:

@@ -40,6 +40,8 @@ from hybrid.kernels.rotations import (
 )
 
 UNIT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+# What Ends.held says of an end that a point of a system of lines holds (kernels.system): its place is an unknown.
+JOINED = 2
 # Part of the torsional stiffness that keeps a rod pinned at both ends from spinning freely.
 LEAST_SPIN_STIFFNESS = 1e-9
 
@@ -89,6 +91,7 @@ class Balance(NamedTuple):
     G2: Any  # by the chord after
     D: Any  # by the position of the node
     rhs: Any
+    gap: Any  # of a held node: the way that it has still to go, m
     held: bool
     size: float
 
@@ -219,7 +222,7 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
     n = line.h.shape[0]
     F, D, GL, GR = node_loads(line, sea, i, r, u, state, cell_before.chord, cell.chord, cv, ca, report)
     F = add(F, sub(force.f, force_before.f))
-    held = (i == 0 and ends.held[0] != 0) or (i == n and ends.held[1] != 0)
+    held = (i == 0 and ends.held[0] != 0) or (i == n and ends.held[1] == 1)
     if i == 0:
         F = add(F, get3(ends.force, 0))
         report[FORCE_A], report[FORCE_A + 1], report[FORCE_A + 2] = F
@@ -228,23 +231,23 @@ def balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, fo
         report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = F
     G1, G2 = madd(msub(force.Nm, force_before.N0), GL), madd(msub(force.N0, force_before.Np), GR)
     Dii = madd(msub(G1, G2), D)
-    rhs, size = scale(-1.0, F), 1.0
+    gap, size = Z3, 1.0
     if held:
         k = 0 if i == 0 else 1
-        rhs = (
+        gap = (
             ends.position[k, 0] - r[i, 0] - u[i, 0],
             ends.position[k, 1] - r[i, 1] - u[i, 1],
             ends.position[k, 2] - r[i, 2] - u[i, 2],
         )
     else:
         big = max(abs(F[0]), abs(F[1]), abs(F[2]))
-        if not big <= report[RESIDUAL]:
+        if not big <= report[RESIDUAL] and not (i == n and ends.held[1] == JOINED):  # a point balances other lines too
             report[RESIDUAL], report[RESIDUAL_NODE] = big, i
         # lengths in the unit of the balance, so that pivoting compares like with like
         size = abs(Dii[0]) + abs(Dii[4]) + abs(Dii[8])
         if not size > 0.0:
             size = 1.0
-    return Balance(G1, G2, Dii, rhs, held, size)
+    return Balance(G1, G2, Dii, scale(-1.0, F), gap, held, size)
 
 
 @inner
@@ -299,33 +302,44 @@ def size_of_spin(line, i, cell, here, there, ca):
 
 @inner
 def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed):
-    """The whole block row of node i."""
+    """The whole block row of node i, with its balance also where it is held."""
     for j in range(SIZE * WIDTH):
         W[j] = 0.0
-    row, d_before, d, rhs = force_before.row, cell_before.chord.d, cell.chord.d, node.rhs
+    row, d_before, d = force_before.row, cell_before.chord.d, cell.chord.d
     W[6], W[7], W[8] = -row[0], -row[1], -row[2]
     W[11], W[12], W[13] = row[0], row[1], row[2]
     W[10], W[23] = -force_before.hck, force_before.gap
-    if node.held:
-        hold = size_of_spin(line, i, cell, here, there, ca)
-        W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = hold, hold, hold
-        rhs = scale(hold, rhs)
-    else:
-        set_block(W, 1, 1, force_before.Nm, 1.0)
-        set_block(W, 1, 6, madd(force_before.Nm, node.G1), -1.0)
-        set_block(W, 1, 11, node.D, 1.0)
-        set_block(W, 1, 16, msub(node.G2, force.Np), 1.0)
-        set_block(W, 1, 20, force.Np, 1.0)
-        for j in range(3):
-            o = (j + 1) * WIDTH
-            W[o + 4] = -force_before.nm[j]
-            W[o + 9] = force.nm[j] - force_before.n0[j]
-            W[o + 10] = -d_before[j]
-            W[o + 14] = force.n0[j] - force_before.np[j]
-            W[o + 15] = d[j]
-            W[o + 19] = force.np[j]
-    W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = rhs
+    set_block(W, 1, 1, force_before.Nm, 1.0)
+    set_block(W, 1, 6, madd(force_before.Nm, node.G1), -1.0)
+    set_block(W, 1, 11, node.D, 1.0)
+    set_block(W, 1, 16, msub(node.G2, force.Np), 1.0)
+    set_block(W, 1, 20, force.Np, 1.0)
+    for j in range(3):
+        o = (j + 1) * WIDTH
+        W[o + 4] = -force_before.nm[j]
+        W[o + 9] = force.nm[j] - force_before.n0[j]
+        W[o + 10] = -d_before[j]
+        W[o + 14] = force.n0[j] - force_before.np[j]
+        W[o + 15] = d[j]
+        W[o + 19] = force.np[j]
+    W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = node.rhs
     fill_spin(W, line, state, i, cell, here, there, ca, passed)
+
+
+@kernel  # called for two nodes of a line, not inlined for all
+def hold(W, unit, x, y, z):
+    """Put the way (x, y, z) that a held node has still to go in place of its balance in the block row."""
+    for j in range(WIDTH, 4 * WIDTH):
+        W[j] = 0.0
+    W[WIDTH + 11], W[2 * WIDTH + 12], W[3 * WIDTH + 13] = unit, unit, unit
+    W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = unit * x, unit * y, unit * z
+
+
+@kernel
+def keep_row(rows, i, W):
+    """Keep a block row."""
+    for j in range(SIZE * WIDTH):
+        rows[i, j] = W[j]
 
 
 @inner
@@ -340,7 +354,7 @@ def eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide):
     sized = (size * row[0], size * row[1], size * row[2])
     hck, gap = size * force_before.hck, size * force_before.gap
     if node.held:
-        return eliminate_narrow(sized, hck, gap, Z3, Z9, UNIT, Z3, Z9, node.rhs, X, i, kept, size)
+        return eliminate_narrow(sized, hck, gap, Z3, Z9, UNIT, Z3, Z9, node.gap, X, i, kept, size)
     back, L = scale(-1.0, cell_before.chord.d), mscale(-1.0, node.G1)
     return eliminate_narrow(sized, hck, gap, back, L, node.D, cell.chord.d, node.G2, node.rhs, X, i, kept, size)
 
@@ -351,14 +365,18 @@ def march(line, sea, ends, r, state, cv, ca, work):
 
     Everything belongs to the end of the step.  work.u is the displacement since its start, r (N+1, 3) the position
     then; state.r is not read.  Returns -1, or the node whose block was singular.  work.rows with N+1 entries receives
-    every block row before elimination (for tests and independent solvers).
-    An X with room for more keeps the factors for another right-hand side (kernels.block_elimination).
+    every block row before elimination (for tests and independent solvers); with one that of a held start, which is then
+    its balance.  An X with room for more keeps the factors for another right-hand side, and one with room for the
+    factors of one block those of the last (kernels.block_elimination).
     """
     n = line.h.shape[0]
     u, W, X, report, rows = work.u, work.W, work.X, work.report, work.rows
-    kept, next_kept = 0, 0
+    keeps_start, keeps_rows = rows.shape[0] == 1, rows.shape[0] > 1
+    kept, next_kept, last_kept, room = 0, 0, 0, X.shape[0] - (n + 1) * ROW
     known = work.torsion.known
-    if X.shape[0] > (n + 1) * ROW and (known.shape[0] == 0 or known[2] + known[3] > 0.0):
+    if room == KEPT:
+        last_kept = (n + 1) * ROW
+    elif room > 0 and (known.shape[0] == 0 or known[2] + known[3] > 0.0):
         kept, next_kept = (n + 1) * ROW, KEPT
     for j in range(ASSEMBLED):
         report[j] = 0.0
@@ -377,13 +395,18 @@ def march(line, sea, ends, r, state, cv, ca, work):
         force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, report)
         node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         wide = bent or bent_before
-        if wide or rows.shape[0] > 0:
+        if wide or keeps_rows or (keeps_start and i == 0):
             fill(
                 W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, work.torsion.passed
             )  # fmt: skip
-            if rows.shape[0] > 0:
-                for j in range(SIZE * WIDTH):
-                    rows[i, j] = W[j]
+            if keeps_start and i == 0:
+                keep_row(rows, 0, W)
+            if node.held:
+                hold(W, size_of_spin(line, i, cell, here, there, ca), node.gap[0], node.gap[1], node.gap[2])
+            if keeps_rows:
+                keep_row(rows, i, W)
+        if i == n:
+            kept += last_kept
         if not eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide):
             return i
         if i == n - 1:

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 class Table:
     """The arguments of one kernel, by the names of its NamedTuple; `numbers` is what the kernel gets."""
 
-    def __init__(self, example: Any) -> None:
-        """example: with the types that all values have."""
+    def __init__(self, example: Any, room: NDArray[np.int64] | None = None) -> None:
+        """example: with the types that all values have; room: for the numbers, None: of its own."""
         self._places: dict[str, tuple[int, int, Any]] = {}  # begin and end among the numbers, and types
         self._sizes: dict[str, list[int]] = {}  # of the parts of a tuple
         self._bound: dict[str, Any] = {}
@@ -31,7 +31,7 @@ class Table:
             self._places[name] = at, at + _size(pattern), pattern
             self._sizes[name] = [_size(x) for x in pattern] if isinstance(pattern, tuple) else []
             at += _size(pattern)
-        self.numbers: NDArray[np.int64] = np.zeros(at, np.int64)
+        self.numbers: NDArray[np.int64] = np.zeros(at, np.int64) if room is None else room
         self.bind(**example._asdict())
 
     def bind(self, **values: Any) -> None:
@@ -49,6 +49,12 @@ class Table:
                 self._put_changes(at, pattern, value, before, name)
                 _keep(value, self.numbers[at:end].copy())
             self._bound[name] = value
+
+    def exchange(self, a: str, b: str) -> None:
+        """Put what is bound under each of two names of one type under the other."""
+        (i, j, _), (k, l, _) = self._places[a], self._places[b]
+        self.numbers[i:j], self.numbers[k:l] = self.numbers[k:l].copy(), self.numbers[i:j].copy()
+        self._bound[a], self._bound[b] = self._bound[b], self._bound[a]
 
     def _put_changes(self, at: int, pattern: Any, value: Any, before: Any, name: str) -> None:
         """A tuple at its place, where `before` is bound (None: nothing): what is the same is left as it is."""

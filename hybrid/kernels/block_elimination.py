@@ -18,7 +18,7 @@ matrix needs (`solve_again`): KEPT numbers a block,
 
     wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
     narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
-    both     62 unit of the length row;  63 whether it is wide
+    both     62 unit of the length row;  63 whether it is wide;  64..68 right-hand side of the pivot block
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ SIZE = 5  # unknowns of a block
 WIDTH = 24  # columns of W
 SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
-KEPT = 64  # numbers kept of a block, for another right-hand side
+KEPT = 69  # numbers kept of a block, for another right-hand side
 
 
 @inner
@@ -187,6 +187,7 @@ def eliminate_wide(W, X, i, kept, size):
         for r in range(SIZE):
             for j in range(SIZE):
                 X[kept + 37 + SIZE * r + j] = W[r * WIDTH + 10 + j]
+            X[kept + 64 + r] = W[r * WIDTH + 23]
     return solve_block(W, X, i)
 
 
@@ -218,6 +219,7 @@ def eliminate_narrow(row, hck, gap, back, L, D, ahead, U, b, X, i, kept, size):
         X[kept + 20], X[kept + 21], X[kept + 22], X[kept + 23] = A2[0], A2[1], A2[2], A2[3]
         X[kept + 24], X[kept + 25], X[kept + 26], X[kept + 27] = A3[0], A3[1], A3[2], A3[3]
         X[kept + 62], X[kept + 63] = size, 0.0
+        X[kept + 64], X[kept + 65], X[kept + 66], X[kept + 67] = A0[4], A1[4], A2[4], A3[4]
     B0 = (A0[0], A0[1], A0[2], A0[3], 0.0, 0.0, 0.0, 0.0, A0[4])
     B1 = (A1[0], A1[1], A1[2], A1[3], ahead[0], U[0], U[1], U[2], A1[4])
     B2 = (A2[0], A2[1], A2[2], A2[3], ahead[1], U[3], U[4], U[5], A2[4])

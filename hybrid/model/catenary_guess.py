@@ -39,8 +39,26 @@ class Hanging(NamedTuple):
     T: Floats
 
 
+class Pulls(NamedTuple):
+    """What a hanging line pulls its ends with."""
+
+    t: Floats  # (N, 3) N, force in the cells, along increasing s
+    e: Floats  # (N, 3) m, chords
+    stiffness: Floats  # (3, 3) N/m, of t[0] against the span
+
+
 def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> Hanging | None:
     """The shape of a line from `start` over `span` (3,) m under loads (N+1, 3) N; None when it stays slack."""
+    found = pulls(loads, h, ck, span)
+    if found is None or float((np.linalg.norm(found.e, axis=1) / h).min()) < SLACK:
+        return None
+    r = start + np.concatenate([np.zeros((1, 3)), np.cumsum(found.e, axis=0)])
+    r[-1] = start + span
+    return Hanging(r, np.linalg.norm(found.t, axis=1))
+
+
+def pulls(loads: Floats, h: Floats, ck: Floats, span: Floats) -> Pulls | None:
+    """Forces and chords of a line over `span` (3,) m, slack or not, under loads (N+1, 3) N; None without any load."""
     scale = float(np.abs(loads[1:-1].sum(axis=0)).max() + np.linalg.norm(loads[1:-1], axis=1).sum())
     if not scale > 0.0:
         return None
@@ -57,10 +75,10 @@ def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> H
     for _ in range(MOST_ITERATIONS):
         e = (h * (1.0 / size + soft))[:, None] * t
         gradient = e.sum(axis=0) - span
-        if np.abs(gradient).max() < 1e-9 * h.sum():
-            break
         d = t / size[:, None]
         hessian = np.eye(3) * float(h @ (1.0 / size + soft)) - np.einsum("i,ij,ik->jk", h / size, d, d)
+        if np.abs(gradient).max() < 1e-9 * h.sum():
+            break
         step, part = -np.linalg.solve(hessian, gradient), 1.0
         slope = float(gradient @ step)
         while part > 1e-9:
@@ -70,11 +88,7 @@ def hang(loads: Floats, h: Floats, ck: Floats, start: Floats, span: Floats) -> H
             part *= 0.5
         F, t, size, energy = F + part * step, t_new, size_new, energy_new
     e = (h * (1.0 / size + soft))[:, None] * t
-    if float((np.linalg.norm(e, axis=1) / h).min()) < SLACK:
-        return None
-    r = start + np.concatenate([np.zeros((1, 3)), np.cumsum(e, axis=0)])
-    r[-1] = start + span
-    return Hanging(r, np.linalg.norm(t, axis=1))
+    return Pulls(t, e, np.linalg.inv(hessian))
 
 
 def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool = False) -> Hanging | None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import warnings
 from dataclasses import dataclass, replace
 from math import ceil
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
 
@@ -18,8 +18,11 @@ from hybrid.model.model_costs import structural, with_model
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.run_time import processor_time
 from hybrid.model.sections import limits_along, outer_diameter
-from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.read import SceneLike, as_scene_or_system
 from hybrid.scene.schema import Scene
+
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
 
 
 class CriticalTorque(NamedTuple):
@@ -106,9 +109,46 @@ def count_steps(scene: Scene) -> int:
     return parts(scene.require_time().duration, first_resolution(scene).step)
 
 
-def plan(scene: SceneLike) -> Plan:
-    """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed."""
-    scene = as_scene(scene)
+@dataclass(frozen=True)
+class SystemPlan:
+    """What a system of lines requires: the plan of each line by name, and what they come to together."""
+
+    lines: dict[str, Plan]
+    free: tuple[str, ...]  # names of the points that are free
+    cells: int
+    unknowns: int
+    steps: int
+    step: float  # s
+    seconds: float  # of processor time, without what the points take
+
+
+def plan_system(system: System) -> SystemPlan:
+    """What would be computed for several lines; nothing is computed."""
+    plans = {}
+    for name in system.lines:
+        scene = system.scene_of(name, system.carried(name), system.guesses)
+        if scene.time:
+            refuse_too_much(scene)
+        plans[name] = _plan(scene)
+    every = list(plans.values())
+    return SystemPlan(
+        plans, system.free, sum(sum(x.cells) for x in every), sum(x.unknowns for x in every), every[0].steps,
+        every[0].step, sum(x.seconds for x in every),
+    )  # fmt: skip
+
+
+@overload
+def plan(scene: SceneLike) -> Plan: ...
+@overload
+def plan(scene: System) -> SystemPlan: ...
+def plan(scene: SceneLike | System) -> Plan | SystemPlan:
+    """What would be computed for a scene (a Scene, the path of a scene file, or a dict); nothing is computed.
+
+    Of several lines it is a SystemPlan.
+    """
+    scene = as_scene_or_system(scene)
+    if not isinstance(scene, Scene):
+        return plan_system(scene)
     if scene.time:
         refuse_too_much(scene)
     if not model_is_free(scene):

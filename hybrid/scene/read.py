@@ -12,7 +12,7 @@ from functools import cache
 from itertools import product
 from os import PathLike
 from pathlib import Path
-from typing import Any, get_type_hints
+from typing import TYPE_CHECKING, Any, get_type_hints
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -40,7 +40,35 @@ class RenamedKey(FutureWarning):
         super().__init__(f"{place}: {where}: {old} is now called {new}; please rename it")
 
 
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
+
 SceneLike = Scene | str | PathLike[str] | Mapping[str, Any]
+
+
+def as_scene_or_system(scene: SceneLike | System) -> Scene | System:
+    """As `as_scene`, of one cable or of several lines."""
+    if not isinstance(scene, Scene | str | PathLike | Mapping):
+        return scene if isinstance(scene, _system()) else as_scene(scene)  # type: ignore[arg-type]
+    if isinstance(scene, str | PathLike) and "\n" not in str(scene):
+        return _warn_renamed(*read_either(scene))
+    if isinstance(scene, Mapping) and names_lines(scene):
+        return _warn_renamed(*_validated(dict(scene), from_data(dict(scene)), [], ""))
+    return as_scene(scene)
+
+
+def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
+    """Read a scene file of several lines; overrides and errors as of `load_scene`."""
+    scene = _warn_renamed(*read_either(path, overrides))
+    if isinstance(scene, Scene):
+        fix = "hybrid.load_scene reads a scene of one cable"
+        raise SceneError([Complaint("cable", "one cable", "several lines, with `points` and `lines`", fix)], str(path))
+    return scene
+
+
+def read_either(path: str | PathLike[str], overrides: Sequence[str] = ()) -> tuple[Scene | System, list[RenamedKey]]:
+    """Read a scene file of one cable or of several lines; with the notes on renamed keys."""
+    return parse_either(_text_of(Path(path)), str(path), overrides)
 
 
 def as_scene(scene: SceneLike) -> Scene:
@@ -125,15 +153,32 @@ def _without_collection() -> Iterator[None]:
             gc.enable()
 
 
-@_without_collection()
 def _parsed(text: str, file: str, overrides: Sequence[str]) -> tuple[Scene, list[RenamedKey]]:
+    return one_cable(*parse_either(text, file, overrides), file)
+
+
+def one_cable(scene: Scene | System, renamed: list[RenamedKey], file: str = "") -> tuple[Scene, list[RenamedKey]]:
+    """The same; SceneError if it is of several lines, which is not what is asked for."""
+    if not isinstance(scene, Scene):
+        fix = "hybrid.run, hybrid.static and hybrid.plan take several lines; hybrid.load_system reads them"
+        raise SceneError(
+            [Complaint("lines", f"{len(scene.lines)} lines", "one cable, with `cable` and `ends`", fix)], file
+        )
+    return scene, renamed
+
+
+@_without_collection()
+def parse_either(text: str, file: str = "", overrides: Sequence[str] = ()) -> tuple[Scene | System, list[RenamedKey]]:
+    """Read a scene of one cable or of several lines from YAML text; with the notes on renamed keys."""
     try:
         root, complaints = from_text(text)
     except Unreadable as error:
         raise SceneError([error.complaint], file) from None
-    if isinstance(root.value, dict):
-        complaints += [c for c in (override(root, each, Scene) for each in overrides) if c is not None]
     data = root.plain()
+    schema: type[Table] = _system() if names_lines(data) else Scene
+    if isinstance(root.value, dict):
+        complaints += [c for c in (override(root, each, schema) for each in overrides) if c is not None]
+        data = root.plain()
     _resolve_motion_files(data, Path(file).parent)
     return _validated(data, root, complaints, file)
 
@@ -146,7 +191,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
         return error
     if isinstance(root.value, dict):
         for each in overrides:
-            override(root, each, Scene)
+            override(root, each, _system() if names_lines(root.plain()) else Scene)
     complaints = []
     for complaint in error.complaints:
         at = tuple(int(x) if x.isdigit() else x for x in re.findall(r"\w+", complaint.where))
@@ -159,10 +204,10 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
 
 def validate_scene(data: Any) -> Scene:
     """A scene from Python data (nested dicts, lists, numbers); SceneError with every complaint."""
-    return _warn_renamed(*_validated(data, from_data(data), [], ""))
+    return _warn_renamed(*one_cable(*_validated(data, from_data(data), [], "")))
 
 
-def scene_text(scene: Scene) -> str:
+def scene_text(scene: Scene | System) -> str:
     """The scene as YAML; `parse_scene` reads it back to an equal scene."""
     import yaml
 
@@ -181,14 +226,29 @@ def _text_in_yaml(dumper: Any, text: str) -> Any:
     return dumper.represent_scalar("tag:yaml.org,2002:str", text, style="'" if quoted else None)
 
 
+def names_lines(data: Any) -> bool:
+    """Whether the tables of a scene are those of several lines."""
+    return isinstance(data, Mapping) and ("lines" in data or "points" in data) and "cable" not in data
+
+
 # --- helpers -----------------------------------------------------------------------------------
+
+
+def _system() -> type[System]:
+    """The schema of several lines, which takes some time to make."""
+    from hybrid.scene.system import System
+
+    return System
 
 
 def _resolve_motion_files(data: Any, folder: Path) -> None:
     """Make the paths of files of motions and loads absolute, so that the scene can be used from anywhere."""
-    for end, table in product(("start", "end"), ("motion", "force", "moment", "thrust")):
+    points = data.get("points") if isinstance(data, dict) else None
+    files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust"))]
+    files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
+    for path in files:
         here = data
-        for key in ("ends", end, table):
+        for key in path:
             here = here.get(key) if isinstance(here, dict) else None
         carried = here.get("vessel") if isinstance(here, dict) else None
         rao = carried.get("rao") if isinstance(carried, dict) else None
@@ -199,7 +259,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
             here["file"] = str((folder / name).absolute())
 
 
-def _warn_renamed(scene: Scene, renamed: list[RenamedKey]) -> Scene:
+def _warn_renamed(scene: Any, renamed: list[RenamedKey]) -> Any:
     for each in renamed:
         warnings.warn(each, stacklevel=3)
     return scene
@@ -217,12 +277,15 @@ def _renamed(data: Any, scene: Any, path: Place = ()) -> Iterator[tuple[Place, s
                 if isinstance(value, str) and value in renamed.now:
                     yield (*path, key), value, renamed.now[value]
             yield from _renamed(value, getattr(scene, now, None), (*path, key))
+    elif isinstance(scene, dict) and isinstance(data, Mapping):
+        for key, value in data.items():
+            yield from _renamed(value, scene.get(key), (*path, key))
     elif isinstance(scene, tuple) and isinstance(data, list | tuple):
         for i, (entry, made) in enumerate(zip(data, scene, strict=False)):
             yield from _renamed(entry, made, (*path, i))
 
 
-def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
+def _notes(data: Any, scene: Scene | System, root: Node, file: str) -> list[RenamedKey]:
     """A note for each renamed key or word, where it stands first."""
     notes: dict[tuple[str, str], RenamedKey] = {}
     for path, old, now in _renamed(data, scene):
@@ -231,10 +294,17 @@ def _notes(data: Any, scene: Scene, root: Node, file: str) -> list[RenamedKey]:
     return list(notes.values())
 
 
-def _validated(data: Any, root: Node, complaints: list[Complaint], file: str) -> tuple[Scene, list[RenamedKey]]:
-    scene: Scene | None = None
+def _validated(
+    data: Any, root: Node, complaints: list[Complaint], file: str
+) -> tuple[Scene | System, list[RenamedKey]]:
+    scene: Scene | System | None = None
     found: list[tuple[Finding, bool]] = []
-    if not isinstance(data, dict | Scene):
+    if names_lines(data):
+        try:
+            scene = _system().model_validate(data)
+        except ValidationError as error:
+            found = [each for one in error.errors(include_url=False) for each in explain(_system(), one)]
+    elif not isinstance(data, dict | Scene):
         fix = "begin with tables such as `cable:` and `ends:`"
         found = [(Finding((), "a table with cable, ends, initial and model", fix), False)]
     else:

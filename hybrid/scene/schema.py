@@ -132,7 +132,7 @@ def _standard(schema: Any) -> Any:
     return [_standard(x) for x in schema] if isinstance(schema, list) else schema
 
 
-def missing_time(scene: Scene) -> Complaint:
+def missing_time(scene: object) -> Complaint:
     """The complaint of a consumer that computes motion and finds no `time` in the scene."""
     return Complaint(
         where="time",

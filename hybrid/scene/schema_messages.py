@@ -45,6 +45,8 @@ def _type_in_words(annotation: Any, metadata: tuple[Any, ...]) -> str:
         return ("a number" if annotation is float else "a whole number") + _bounds(metadata)
     if annotation is bool:
         return "true or false"
+    if get_origin(annotation) is dict:
+        return "a table with a name for each entry"
     if get_origin(annotation) is Literal:
         return f"one of: {', '.join(map(str, get_args(annotation)))}"
     if get_origin(annotation) is tuple:

@@ -57,13 +57,20 @@ def tables(annotation: Any) -> list[type[Table]]:
 
 
 def item(annotation: Any, index: int) -> Any:
-    """The type of one entry of a list; None if there is none."""
+    """The type of one entry of a list, or of a table whose keys are names; None if there is none."""
     found = []
     for a, _ in arms(annotation):
         args = get_args(a)
+        if get_origin(a) is dict:
+            found.append(args[1])
         if get_origin(a) is tuple and args:
             found.append(args[0] if args[-1] is Ellipsis else args[min(index, len(args) - 1)])
     return reduce(or_, found) if found else None
+
+
+def _named(annotation: Any) -> bool:
+    """Whether a type is a table whose keys are names."""
+    return any(get_origin(a) is dict for a, _ in arms(annotation))
 
 
 def is_tag(part: Any) -> bool:
@@ -74,8 +81,10 @@ def follow(root: type[Table], loc: Place) -> Spot:
     """What the schema has at pydantic's location `loc`."""
     spot = Spot(root, ())
     for part in loc:
-        if isinstance(part, int):
-            spot = Spot(item(spot.annotation, part), (), spot.owner, spot.field, spot.kind)
+        if isinstance(part, int) or _named(spot.annotation):
+            spot = Spot(
+                item(spot.annotation, 0 if isinstance(part, str) else part), (), spot.owner, spot.field, spot.kind
+            )
         elif is_tag(part):
             every = list(arms(spot.annotation, spot.metadata))
             chosen = [(a, m) for a, m in every if Tag(part) in m]
@@ -96,8 +105,8 @@ def tables_at(root: type[Table], path: Place) -> list[type[Table]]:
     """The tables that any branch of the schema has at `path`."""
     annotations: list[Any] = [root]
     for part in path:
-        if isinstance(part, int):
-            annotations = [item(a, part) for a in annotations]
+        if isinstance(part, int) or any(_named(a) for a in annotations):
+            annotations = [item(a, 0 if isinstance(part, str) else part) for a in annotations]
         else:
             found = [t.model_fields.get(t.former.get(part, part)) for a in annotations for t in tables(a)]
             annotations = [field.annotation for field in found if field is not None]

@@ -296,7 +296,10 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
         if isinstance(part, int):
             refusal = _no_entry(here, path[:depth], part)
         else:
-            refusal = _no_key(here, path[:depth], part, keys_at(schema, path[:depth]))
+            known = keys_at(schema, path[:depth])
+            if not known and isinstance(here.value, dict):  # a table whose keys are names
+                known = list(here.value)
+            refusal = _no_key(here, path[:depth], part, known)
         if refusal is not None:
             return Complaint(name, text, *refusal)
         if isinstance(part, str):

@@ -16,6 +16,7 @@ from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from functools import partial
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, ResultError, SceneError
@@ -32,7 +33,7 @@ from hybrid.model.resolution import (
     zones_are_free,
 )
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import SceneLike, as_scene
+from hybrid.scene.read import SceneLike, as_scene_or_system, scene_text
 from hybrid.scene.schema import AdaptiveModel, Scene, missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
@@ -52,6 +53,9 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.reader import Result, open_result, written_result
 from hybrid.store.stored_rows import remove_rows
 
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
+
 # s between two signals of which the second ends a run at once: process managers may send the same one twice.
 IMPATIENT = 1.0
 
@@ -59,7 +63,7 @@ Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 
 
 def run(
-    scene: SceneLike,
+    scene: SceneLike | System,
     output: str | Path | None = None,
     *,
     progress: bool | Listener = False,
@@ -68,8 +72,8 @@ def run(
 ) -> Result:
     """Integrate a scene over its duration.
 
-    scene: a Scene, the path of a scene file, or a dict of its tables.  output: the HDF5 file to write; None keeps the
-    result in memory.  progress: True for a line on the error stream, or a function that gets a
+    scene: a Scene, a System of lines, the path of a scene file, or a dict of its tables.  output: the HDF5 file to
+    write; None keeps the result in memory.  progress: True for a line on the error stream, or a function that gets a
     `hybrid.simulation.progress.Progress` about ten times a second.  overwrite: replace an existing result (never
     another program's file).  criterion: for zones that move, one more: it gets a `hybrid.NodeState` at every step and
     gives a number (N+1,) per node, 1 or more where the cable must be a rod.
@@ -77,9 +81,13 @@ def run(
     Raises SceneError when the scene is refused, ResultError when the output cannot be written, and ComputationError
     when the computation stops; what was computed until then is in the file, and the last good state beside it.
     """
-    scene = as_scene(scene)
+    scene = as_scene_or_system(scene)
     if scene.time is None:
         raise SceneError([missing_time(scene)])
+    if not isinstance(scene, Scene):
+        if criterion is not None:
+            raise TypeError("a criterion is for zones that move: several lines have none")
+        return _several_lines(scene, output, overwrite, progress)
     check_motions(scene)
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import run_shooting
@@ -98,12 +106,14 @@ def run(
     return written_result(target)
 
 
-def static(scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
+def static(scene: SceneLike | System, output: str | Path | None = None, *, overwrite: bool = True) -> Result:
     """Find the equilibrium of a scene at t = 0 under its full loads; the result has one output.
 
     scene, output, overwrite and errors: as of `run`.
     """
-    scene = as_scene(scene)
+    scene = as_scene_or_system(scene)
+    if not isinstance(scene, Scene):
+        return _several_lines(scene, output, overwrite, None)
     check_motions(scene)
     if scene.solver == "shooting":
         from hybrid.simulation.arbiter import static_shooting
@@ -161,6 +171,23 @@ def resume(
         with _supervised(case, progress):
             _compute(case, target, path, remaining)
     return written_result(target)
+
+
+def _several_lines(
+    system: System, output: str | Path | None, overwrite: bool, progress: bool | Listener | None
+) -> Result:
+    """The motion of several lines, or, with progress None, their equilibrium."""
+    from hybrid.simulation.system_run import run_system, static_system
+
+    target = _target(output, overwrite)
+    duration = system.require_time().duration if progress is not None else 1.0
+    with locked(_path(output)):
+        if progress is None:
+            static_system(system, target, scene_text(system))
+        else:
+            with _interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
+                run_system(system, target, scene_text(system), reporter, stopped)
+    return open_result(target)
 
 
 def _compute(

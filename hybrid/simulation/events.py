@@ -28,6 +28,10 @@ class EventLog:
         more = {"criterion": criterion, "value": value, "threshold": threshold, "energy": energy}
         self._waiting.append(((t, s_a, s_b, kind, text), more))
 
+    def waiting(self) -> list[tuple[float, float, float, str, str]]:
+        """Those that wait: t (s), s_a, s_b (m), kind, text."""
+        return [event for event, _ in self._waiting]
+
     def write_to(self, sink: Sink) -> None:
         """Write all that wait."""
         for event, more in self._waiting:

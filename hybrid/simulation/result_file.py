@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -20,6 +21,9 @@ from hybrid.solve.statics import Equilibrium
 from hybrid.store.format import Field
 from hybrid.store.named_arrays import Tree
 from hybrid.store.writer import Recorder
+
+if TYPE_CHECKING:
+    from hybrid.solve.system_statics import SystemEquilibrium
 
 STEP_FIELDS = (
     Field("t", "s", "time at the end of the step"),
@@ -43,7 +47,7 @@ def result_recorder(
     observer: Observer,
     target: Path | io.BytesIO,
     texts: Mapping[str, str],
-    found: Equilibrium | None,
+    found: Equilibrium | SystemEquilibrium | None,
     envelope: Envelope,
     outputs: int = 0,
     before: Tree | None = None,

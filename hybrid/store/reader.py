@@ -18,6 +18,7 @@ Layout, format 1 (`record` writes it)::
     /mesh/{s,always}                nodes that there may be, and whether they are there outside of rod zones as well
     /scene                          the scene, as YAML text
     /changes                        scenes that held from some time on, as JSON; only where there are any
+    /lines/<name>/*                 of several lines, each with this layout (`lines`)
     /checkpoint                     from which a run goes on (`checkpoint`); for the program alone
 
 A table grows by whole rows and its dimension scale grows last, so the length of the
@@ -42,6 +43,7 @@ from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
+from hybrid.store.lines import GROUP, Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
 from hybrid.store.records import (
     THERE,
@@ -60,7 +62,7 @@ if TYPE_CHECKING:
     import xarray
 
 TEXTS = ("scene", "changes")
-HIDDEN = ("checkpoint",)  # what is for the program alone
+HIDDEN = ("checkpoint", GROUP)  # what is for the program alone, and results of lines
 
 
 class Result:
@@ -70,9 +72,9 @@ class Result:
     is.  Use `refresh` to see what a running computation has added since.
     """
 
-    def __init__(self, source: str | Path | io.BytesIO, summed: bool = True) -> None:
-        """summed: as of `open_file`."""
-        self._source = Path(source) if isinstance(source, str) else source
+    def __init__(self, source: str | Path | io.BytesIO, summed: bool = True, line: str = "") -> None:
+        """summed: as of `open_file`; line: name of a line of a result of several lines, of which alone it is then."""
+        self._source, self._line = Path(source) if isinstance(source, str) else source, line
         self._open(summed)
 
     def _open(self, summed: bool = True) -> None:
@@ -80,6 +82,7 @@ class Result:
         try:
             with readable(self._source):
                 check_format(self._file, self._source)
+                self._root: Any = self._file[f"{GROUP}/{self._line}"] if self._line else self._file
                 self._scan()
         except BaseException:
             self._file.close()
@@ -95,7 +98,7 @@ class Result:
             name = path.decode()
             if name.split("/")[0] in HIDDEN or name in TEXTS:
                 return
-            found = h5o.open(self._file.id, path)
+            found = h5o.open(self._root.id, path)
             if isinstance(found, h5d.DatasetID):
                 if name in OLD_NAMES:
                     self._stored[OLD_NAMES[name]] = name
@@ -104,7 +107,7 @@ class Result:
             elif isinstance(found, h5g.GroupID):
                 groups.add(name)
 
-        self._file.id.links.visit(visit)
+        self._root.id.links.visit(visit)
         self.names, self._data = tuple(data), data
         self._dims, self.units = Looked(data, _dims), Looked(data, _units, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
@@ -113,7 +116,7 @@ class Result:
         self._rows = {n: self._refreshed(n).shape[0] for n in sorted(scales, key=lambda n: n != "t")}
         self._groups = sorted(groups)
         self.attributes: dict[str, Any] = Attributes(
-            {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._file.attrs.items()}
+            {OLD_ATTRIBUTES.get(k, k): _plain(v) for k, v in self._root.attrs.items()}
         )
         table = self["zones"]
         rows = zip(*(table[k].tolist() for k in Zone._fields), strict=True)
@@ -128,7 +131,7 @@ class Result:
 
     def _dataset(self, name: str) -> Any:
         self._refreshed(name)
-        return self._file[self._stored.get(name, name)]
+        return self._root[self._stored.get(name, name)]
 
     def close(self) -> None:
         """Let go of the file; what was read already stays."""
@@ -155,6 +158,9 @@ class Result:
             return name
         if name in self._groups:
             raise UnknownName(f"'{name}' is a group; ask for {' or '.join(f'{name}/{key}' for key in self[name])}")
+        if self.lines:
+            ask = f"ask one of them, as in result.lines['{next(iter(self.lines))}']"
+            raise UnknownName(f"the result is of several lines, and has no '{name}' itself; {ask}")
         known = [*(n for n in self.names if "/" not in n), *self._groups, "scene_text"]
         known += [a for a, n in ALIASES.items() if n in self._dims]
         near = [n for n in self.names if "/" in n and n.split("/")[1] == name.split("/")[-1]]
@@ -290,6 +296,17 @@ class Result:
         return self._source if isinstance(self._source, Path) else None
 
     @property
+    def lines(self) -> Lines:
+        """The lines of a result of several lines by name, each a result of its own; of one line there are none."""
+        if self._line or not self._file or GROUP not in self._file:
+            return Lines(self, ())
+        return Lines(self, tuple(plain_text(name) for name in self._file[GROUP].attrs["order"]))
+
+    def line(self, name: str) -> Result:
+        """A line of a result of several lines, as a result of its own; `lines` has their names."""
+        return Result(self._source, line=name)
+
+    @property
     def events(self) -> list[Event]:
         """What happened and why, in the order of time."""
         with readable(self._source):
@@ -311,12 +328,12 @@ class Result:
     def scene_text(self) -> str:
         """The scene that was run, as YAML text."""
         with readable(self._source):
-            return plain_text(self._file["scene"][()])
+            return plain_text(self._root["scene"][()])
 
     @property
     def changes_text(self) -> str:
         """Scenes that held from some time on, as JSON [{"t": s, "scene": YAML}, ...]; empty if there were none."""
-        return plain_text(self._file["changes"][()]) if "changes" in self._file else ""
+        return plain_text(self._root["changes"][()]) if "changes" in self._root else ""
 
     @property
     def title(self) -> str:

@@ -1,0 +1,116 @@
+"""What run, static and plan do for a scene of several lines."""
+
+from __future__ import annotations
+
+import time as clock
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import hybrid
+from hybrid.cli.plan_tables import contents_table
+from hybrid.cli.tables import extremes_facts
+
+if TYPE_CHECKING:
+    from hybrid.cli.console import Console
+    from hybrid.scene.system import System
+    from hybrid.store.reader import Result
+
+# Kernels beside those of a line, by the last.
+KERNELS = ("system.solve_system", "run.in_space", "energies.observe")
+
+
+def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
+    """Compute the motion of several lines."""
+    from hybrid.cli.progress_line import span
+
+    console.will_write(target)
+    console.compiling_kernels(KERNELS)
+    begin = clock.perf_counter()
+    with console.progress() as tell:
+        result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
+    wall = clock.perf_counter() - begin
+    steps = len(result.lines[next(iter(result.lines))]["steps/t"])
+    text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time; error not estimated"
+    _ended(console, result, target, plot, text, steps=steps, wall=wall)
+
+
+def static_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
+    """Find the equilibrium of several lines."""
+    from hybrid.cli.progress_line import span
+
+    console.will_write(target)
+    console.compiling_kernels(KERNELS)
+    begin = clock.perf_counter()
+    result = hybrid.static(asked, target, overwrite=not keep)
+    wall = clock.perf_counter() - begin
+    path, residual = (result.attributes[f"static_{x}"] for x in ("path", "residual"))
+    text = f"equilibrium in {span(wall)} of wall time ({path}; residual force {residual:.2g} N)"
+    _ended(console, result, target, plot, text, path=path, residual=residual, wall=wall)
+
+
+def _ended(console: Console, result: Result, target: Path, plot: bool, text: str, **facts: Any) -> None:
+    """Print what lines and points have reached; plot: draw every line."""
+    pictures = []
+    for name, line in result.lines.items():
+        if plot:
+            pictures.append(target.with_suffix(f".{name}.png"))
+            hybrid.plot(line, pictures[-1])
+    lines = {name: extremes_facts(line) for name, line in result.lines.items()}
+    points = {
+        name: {key: result[f"points/{name}/{key}"][-1].tolist() for key in keys}
+        for name, keys in _points(result).items()
+    }
+    console.events(result.events)
+    console.show(lambda: _table(lines, points))
+    console.done(text, target, *pictures, status=result.status, lines=lines, points=points, **facts)
+
+
+def _points(result: Result) -> dict[str, list[str]]:
+    """What is known of each point, by its name."""
+    found: dict[str, list[str]] = {}
+    for full in result.names:
+        if full.startswith("points/"):
+            name, _, key = full.removeprefix("points/").rpartition("/")
+            found.setdefault(name, []).append(key)
+    return found
+
+
+def _table(lines: dict[str, Any], points: dict[str, Any]) -> Any:
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    for name, facts in lines.items():
+        most, least = facts["tension_max"], facts["tension_min"]
+        at = f"{most['value']:.5g} N at s = {most['s']:.5g} m"
+        table.add_row(f"line {name}", f"tension {least['value']:.5g} to {at}")
+    for name, facts in points.items():
+        force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
+        table.add_row(f"point {name}", f"{_vector(facts['position'])} m{force}")
+    table.columns[0].style = "bold"
+    return table
+
+
+def _vector(x: list[float]) -> str:
+    zero = 1e-9 * max(abs(c) for c in x)
+    return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
+
+
+def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
+    """Show what a run of several lines would compute."""
+    made = hybrid.plan(asked)
+    console.json("plan", **asdict(made))
+    rows = [asked.title or "untitled scene"]
+    for name, line in made.lines.items():
+        kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
+        joined = asked.lines[name]
+        rows.append(f"line {name:<12s}{joined.start} to {joined.end}, {kinds}, {sum(line.cells)} cells")
+    rows.append(f"{'free points':<17s}{', '.join(made.free) or 'none'}")
+    steps = f"{made.steps} steps of {made.step:.4g} s" if made.steps else "statics only"
+    rows.append(f"{'time':<17s}{steps}; {made.cells} cells in all")
+    console.show(lambda: "\n".join(rows))
+    if verbose:
+        for name, line in made.lines.items():
+            console.show(partial(str, f"line {name}"))
+            console.show(partial(contents_table, line))

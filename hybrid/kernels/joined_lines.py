@@ -1,0 +1,199 @@
+"""One line of a system, as its ends feel it: the eliminated line as a linear relation between its two ends.
+
+The march leaves of a line (kernels.block_elimination) a relation  x_i = b_i - A_i x_{i+1} - C_i dr_{i+2}  and, of an end
+that is joined to a point, the last block not yet solved: four rows, the length of the last cell and the balance of the
+last node, for the tension of that cell and the point.  Where the start is joined as well, its place q is an unknown:
+
+    x_i = b_i - A_i x_{i+1} - C_i dr_{i+2} + D_i q,
+
+the D_i from the same factors (`carry_start`), and the balance of the start, which the march has replaced by its place,
+is carried to the other end as a linear functional of what follows (`balance_of_start`).
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, SPAN, solve4, solve5
+from hybrid.kernels.compile import inner
+
+# Numbers of a functional: of block i, of block i+1, of r_{i+2}, what is left when all are zero, of q.
+NEXT, AFTER, LEFT, OF_START = 5, 10, 13, 14
+FUNCTIONAL = 17
+
+
+@inner
+def last_block(X, n):
+    """Where in X the factors of the last block are."""
+    base = (n + 1) * ROW
+    return base if X.shape[0] - base == KEPT else base + n * KEPT
+
+
+@inner
+def end_row(X, k, r, c):
+    """The number of the last block in row r, for dT (c = 0) or dr (1 to 3); k: where its factors are in X."""
+    return X[k + 37 + SIZE * r + c] if X[k + 63] > 0.0 else X[k + 12 + 4 * r + c]
+
+
+@inner
+def carry_block(X, W, x, i, o, b, unit, n, solved):
+    """D_i for the start's coordinate b: row o of x from those before; not `solved`, as a right-hand side of block n."""
+    k = (n + 1) * ROW + i * KEPT
+    if X[k + 63] > 0.0:
+        for r in range(SIZE):
+            x[o, r] = 0.0
+        if i == 0:
+            x[o, b + 1] = unit
+        if i >= 2:
+            for r in range(3):
+                for j in range(4):
+                    x[o, r + 1] -= X[k + 4 * r + j] * x[o - 2, j + 1]
+        if i >= 1:
+            for r in range(SIZE):
+                y = x[o, r]
+                for j in range(SIZE):
+                    y -= X[k + 12 + SIZE * r + j] * x[o - 1, j]
+                x[o, r] = y
+        if solved:
+            solve5(X, k + 37, W, x, o)
+        return
+    b0 = 0.0
+    b1, b2, b3 = 0.0, 0.0, 0.0
+    if i == 0:
+        b1, b2, b3 = (unit if b == 0 else 0.0), (unit if b == 1 else 0.0), (unit if b == 2 else 0.0)
+    else:
+        y0, y1, y2 = x[o - 1, 1], x[o - 1, 2], x[o - 1, 3]
+        b0 += X[k + 9] * y0 + X[k + 10] * y1 + X[k + 11] * y2
+        b1 -= X[k] * y0 + X[k + 1] * y1 + X[k + 2] * y2
+        b2 -= X[k + 3] * y0 + X[k + 4] * y1 + X[k + 5] * y2
+        b3 -= X[k + 6] * y0 + X[k + 7] * y1 + X[k + 8] * y2
+    x[o, 0], x[o, 1], x[o, 2], x[o, 3], x[o, 4] = b0, b1, b2, b3, 0.0
+    if solved:
+        x[o, 0], x[o, 1], x[o, 2], x[o, 3] = solve4(
+            (X[k + 12], X[k + 13], X[k + 14], X[k + 15], b0),
+            (X[k + 16], X[k + 17], X[k + 18], X[k + 19], b1),
+            (X[k + 20], X[k + 21], X[k + 22], X[k + 23], b2),
+            (X[k + 24], X[k + 25], X[k + 26], X[k + 27], b3),
+        )
+
+
+@inner
+def carry_start(X, W, columns, first, n, joined):
+    """D_i of all blocks into columns[:, first : first + n + 1]; joined: whether the last block is left unsolved."""
+    base = (n + 1) * ROW
+    unit = X[base + 37 + SIZE + 1] if X[base + 63] > 0.0 else X[base + 17]  # of the row that holds the start
+    for i in range(n + 1):
+        for b in range(3):
+            carry_block(X, W, columns[b], i, first + i, b, unit, n, not (joined and i == n))
+
+
+@inner
+def balance_of_start(X, row, columns, first, n, joined, out):
+    """The balance of the start (3 functionals, in `out`) of the last block, the start's place and nothing else.
+
+    row: block row of the start with its balance, columns 10 to 22 and right-hand side 23 of its rows 1 to 3.
+    """
+    for a in range(3):
+        f, o = out[a], (a + 1) * 24
+        for j in range(13):
+            f[j] = row[o + 10 + j]
+        f[LEFT] = -row[o + 23]
+        for j in range(3):
+            f[OF_START + j] = 0.0
+        for i in range(n if joined else n + 1):
+            p = i * ROW
+            a0, a1, a2, a3, a4 = f[0], f[1], f[2], f[3], f[4]
+            q, s, t, v = p + SPAN, p + 2 * SPAN, p + 3 * SPAN, p + 4 * SPAN
+            f[LEFT] += a0 * X[p + 8] + a1 * X[q + 8] + a2 * X[s + 8] + a3 * X[t + 8] + a4 * X[v + 8]
+            for b in range(3):
+                x = columns[b]
+                f[OF_START + b] += (
+                    a0 * x[first + i, 0] + a1 * x[first + i, 1] + a2 * x[first + i, 2]
+                    + a3 * x[first + i, 3] + a4 * x[first + i, 4]
+                )  # fmt: skip
+            for j in range(SIZE):
+                f[j] = f[NEXT + j] - (a0 * X[p + j] + a1 * X[q + j] + a2 * X[s + j] + a3 * X[t + j] + a4 * X[v + j])
+                f[NEXT + j] = 0.0
+            for j in range(3):
+                m = SIZE + j
+                f[NEXT + 1 + j] = f[AFTER + j] - (
+                    a0 * X[p + m] + a1 * X[q + m] + a2 * X[s + m] + a3 * X[t + m] + a4 * X[v + m]
+                )
+                f[AFTER + j] = 0.0
+
+
+@inner
+def solve_back(X, columns, first, carries, q, x, joined):
+    """As `substitute`, for a line whose last block is known, in x[n] (joined), and whose start moves by q (carries)."""
+    n = x.shape[0] - 1
+    y, z0, z1, z2 = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
+    total, last = 0.0, n
+    if joined:
+        y, last = (x[n, 0], x[n, 1], x[n, 2], x[n, 3], 0.0), n - 1
+        x[n, 4] = 0.0
+    for i in range(last, -1, -1):
+        p = i * ROW
+        for k in range(SIZE):
+            m = p + SPAN * k
+            x[i, k] = (
+                X[m + 8]
+                - X[m] * y[0] - X[m + 1] * y[1] - X[m + 2] * y[2] - X[m + 3] * y[3] - X[m + 4] * y[4]
+                - X[m + 5] * z0 - X[m + 6] * z1 - X[m + 7] * z2
+            )  # fmt: skip
+            if carries:
+                for b in range(3):
+                    x[i, k] += columns[b, first + i, k] * q[b]
+            total += abs(x[i, k])
+        z0, z1, z2 = y[1], y[2], y[3]
+        y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
+    if carries:
+        x[0, 1], x[0, 2], x[0, 3] = q  # to the last digit as the other lines at that point have it
+    return total < math.inf
+
+
+@inner
+def solve_dense(A, m):
+    """Solve m equations in the rows of A (m, m+1), the last column the right-hand side, where the solution is left.
+
+    By elimination with row pivoting, of rows and columns scaled to a largest number of about 1; False: it is singular.
+    Columns 0 to m-1 of A's last row hold the scales of the columns; A has m+1 rows.
+    """
+    for c in range(m):
+        big = 0.0
+        for r in range(m):
+            big = max(big, abs(A[r, c]))
+        if not 0.0 < big < math.inf:
+            return False
+        A[m, c] = 1.0 / big
+    for r in range(m):
+        big = 0.0
+        for c in range(m):
+            A[r, c] *= A[m, c]
+            big = max(big, abs(A[r, c]))
+        if not big > 0.0:
+            return False
+        for c in range(m + 1):
+            A[r, c] /= big
+    for c in range(m):
+        best, where = abs(A[c, c]), c
+        for r in range(c + 1, m):
+            if abs(A[r, c]) > best:
+                best, where = abs(A[r, c]), r
+        if not best > 0.0:
+            return False
+        if where != c:
+            for j in range(c, m + 1):
+                A[c, j], A[where, j] = A[where, j], A[c, j]
+        for r in range(c + 1, m):
+            f = A[r, c] / A[c, c]
+            if f != 0.0:
+                for j in range(c + 1, m + 1):
+                    A[r, j] -= f * A[c, j]
+    for c in range(m - 1, -1, -1):
+        y = A[c, m]
+        for j in range(c + 1, m):
+            y -= A[c, j] * A[j, m]
+        A[c, m] = y / A[c, c]
+    for c in range(m):
+        A[c, m] *= A[m, c]
+    return True

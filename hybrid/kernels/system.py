@@ -1,0 +1,338 @@
+"""Newton's method for lines that meet at points: one nonlinear loop for all of them, in space.
+
+Every line is marched along s by the kernel of a single line, which is called by its address; what it hands over is a
+relation between its ends (kernels.joined_lines).  The unknowns of the small system are the tensions of the last cells
+and the places of the points; each line is then solved back.  Symbols and stopping rule as in kernels.newton.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.books import RATES, STORED
+from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.configuration import first_bad, measure, update
+from hybrid.kernels.extremes import first_strains, note_extremes
+from hybrid.kernels.forces import FRICTION, SEABED
+from hybrid.kernels.generalized_alpha import Scheme, scheme
+from hybrid.kernels.joined_lines import (
+    LEFT,
+    OF_START,
+    balance_of_start,
+    carry_start,
+    end_row,
+    last_block,
+    solve_back,
+    solve_dense,
+)
+from hybrid.kernels.newton import (
+    ASSEMBLY,
+    CORRECTION,
+    LARGEST_TURN,
+    LOW_TENSION,
+    NOT_CONVERGED,
+    NOT_FINITE,
+    OK,
+    ROUND_OFF,
+    SINGULAR,
+    SLACK,
+    STEP,
+    TOLERANCE,
+    TURNED_TOO_FAR,
+    WHOLE,
+    Task,
+    round_off_tension,
+)
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.powers import book_work, find_powers
+from hybrid.kernels.references import caller
+from hybrid.kernels.report import (
+    FORCE_A,
+    FORCE_B,
+    RESIDUAL,
+    RESIDUAL_NODE,
+    SEABED_ENERGY,
+    SLACKEST,
+    SLACKEST_CELL,
+)
+from hybrid.kernels.run import read
+from hybrid.kernels.seabed import stored
+from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
+
+call_solver = caller((0, 0, 0.0, 0))
+# Where cv and ca of the task are among the numbers of a job, whose first field it is.
+TASK_CV, TASK_CA = Task._fields.index("cv"), Task._fields.index("ca")
+START, END = 0, 1
+
+
+@inner
+def march_lines(solver, tables, joints, net):
+    """March all lines; net (P, 3): force on each point, N.  Returns -1 or a line that failed, and its bad node."""
+    for p in range(net.shape[0]):
+        net[p, 0], net[p, 1], net[p, 2] = 0.0, 0.0, 0.0
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        n = job.line.h.shape[0]
+        start, end = joints[l, START], joints[l, END]
+        if start >= 0:
+            for k in range(3):
+                job.ends.position[0, k] = job.old.r[0, k] + job.work.u[0, k]
+        outcome, _, _, where = call_solver(solver, tables[l])
+        if outcome != OK and not (outcome == SINGULAR and end >= 0 and where == n):  # the last block is not solved yet
+            return l, where
+        report = job.work.report
+        for k in range(3):
+            if start >= 0:
+                net[start, k] += report[FORCE_A + k]
+            if end >= 0:
+                net[end, k] += report[FORCE_B + k]
+    return -1, -1
+
+
+@inner
+def count_tensions(joints):
+    """How many lines hand over their last block, with the tension of its cell."""
+    found = 0
+    for l in range(joints.shape[0]):
+        if joints[l, END] >= 0:
+            found += 1
+    return found
+
+
+@inner
+def assemble_points(tables, joints, first, columns, functional, A, m):
+    """Equations (m, m+1) of the last tensions and of the points, from what the lines hand over."""
+    for r in range(m):
+        for c in range(m + 1):
+            A[r, c] = 0.0
+    row, tensions = 0, count_tensions(joints)
+    for l in range(tables.shape[0]):
+        start, end = joints[l, START], joints[l, END]
+        if start < 0 and end < 0:
+            continue
+        job = read(tables[l])
+        n, X, work = job.line.h.shape[0], job.work.X, job.work
+        k, at, to, o = 0, tensions + 3 * start, tensions + 3 * end, first[l]
+        if start >= 0:
+            carry_start(X, work.W, columns, o, n, end >= 0)
+            balance_of_start(X, work.rows[0], columns, o, n, end >= 0, functional)
+            for a in range(3):
+                f = functional[a]
+                for b in range(3):
+                    A[at + a, at + b] += f[OF_START + b]
+                A[at + a, m] -= f[LEFT]
+                if end >= 0:
+                    A[at + a, row] += f[0]
+                    for b in range(3):
+                        A[at + a, to + b] += f[1 + b]
+        if end >= 0:
+            k = last_block(X, n)
+            for r in range(4):
+                e = row if r == 0 else to + r - 1
+                A[e, row] += end_row(X, k, r, 0)
+                for b in range(3):
+                    A[e, to + b] += end_row(X, k, r, 1 + b)
+                    if start >= 0:
+                        A[e, at + b] -= columns[b, o + n, r]
+                A[e, m] += X[k + 64 + r]
+            row += 1
+
+
+@inner
+def correct_lines(tables, joints, first, columns, A, m):
+    """The correction of every line from that of the points; returns -1, or a line whose correction is not finite."""
+    row, tensions = 0, count_tensions(joints)
+    for l in range(tables.shape[0]):
+        job, start, end = read(tables[l]), joints[l, START], joints[l, END]
+        x, n, q = job.work.x, job.line.h.shape[0], (0.0, 0.0, 0.0)
+        if end >= 0:
+            to = tensions + 3 * end
+            x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], A[to, m], A[to + 1, m], A[to + 2, m]
+            row += 1
+        if start >= 0:
+            at = tensions + 3 * start
+            q = (A[at, m], A[at + 1, m], A[at + 2, m])
+        if not solve_back(job.work.X, columns, first[l], start >= 0, q, x, end >= 0):
+            return l
+    return -1
+
+
+@inner
+def size_up(tables, ca):
+    """Size of a correction: largest shift as a part of the line's reach, turn and its line and cell, and what Newton
+
+    compares with its tolerance.
+    """
+    shift, turn, size, worst, where = 0.0, 0.0, 0.0, 0, -1
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        reach, scale, _ = job.task.limits
+        far, turned, cell, change, big = measure(job.new.e, job.new.T, job.work.x)
+        shift = max(shift, far / reach)
+        if not turned <= turn:
+            turn, worst, where = turned, l, cell
+        mine = max(turned, WHOLE * far / reach)
+        if not change < round_off_tension(job.line, ca, scale):
+            mine = max(mine, change / max(big, LOW_TENSION * scale))
+        if not mine <= size:
+            size = mine
+    return shift, turn, size, worst, where
+
+
+@inner
+def begin_lines(tables, s):
+    """Predict a step of all lines; returns -1, or a line that turns too far, its turn and its cell."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        turn, cell = begin_step(None, 1, job.line, job.sea, job.old, job.new, job.work.u, s, 1.0)
+        if not turn < LARGEST_STEP_TURN:
+            return l, turn, cell
+    return -1, 0.0, -1
+
+
+@inner
+def end_lines(tables, floors, s, task, good):
+    """Rates after a step of all lines, and if it is good their reports.
+
+    Returns -1, or a line whose cell turns too far or is slack, and that turn (0: slack) and cell.
+    """
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        find_rates(1, job.line, job.sea, job.old, job.new, job.work.u, s)
+        if good:
+            turn, cell = end_step(
+                None, 1, job.line, job.sea, job.ends, job.old, job.new, s, task, job.was, job.now, job.work,
+                job.books.strains,
+            )  # fmt: skip
+            if not turn < LARGEST_STEP_TURN:
+                return l, turn, cell
+            report = job.work.report
+            if not report[SLACKEST] > floors[l]:
+                return l, 0.0, int(report[SLACKEST_CELL])
+    return -1, 0.0, -1
+
+
+@inner
+def move_joints(job, start, end):
+    """Velocity of the ends that are joined to points, for the powers; that of held ends is set from outside."""
+    n, velocity, v = job.line.h.shape[0], job.books.velocity, job.new.v
+    for k in range(3):
+        if start >= 0:
+            velocity[0, k] = v[0, k]
+        if end >= 0:
+            velocity[1, k] = v[n, k]
+
+
+@inner
+def keep_report(books, report):
+    for k in range(report.shape[0]):
+        books.report[0, k] = report[k]
+
+
+@inner
+def begin_books(tables, joints, t):
+    """Powers of the states as they are, what the seabed stores, and extremes where they are kept; t: s, now."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        line, sea, new, books, report = job.line, job.sea, job.new, job.books, job.work.report
+        if line.bits & SEABED:
+            report[SEABED_ENERGY] = stored(line, sea, new.r)
+            books.clock[STORED] = report[SEABED_ENERGY]
+            for i in range(new.r.shape[0]):
+                new.bed[i, 0], new.bed[i, 1], new.bed[i, 2] = get3(sea.bed, i)
+        move_joints(job, joints[l, START], joints[l, END])
+        find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        if books.extremes.shape[1] > 0:
+            keep_report(books, report)
+            first_strains(line, job.ends, new, books)
+            note_extremes(line, sea, job.ends, new, books, t)
+
+
+@inner
+def keep_books(tables, joints, dt, t):
+    """Work of a step of all lines, and extremes where they are kept; t: s, its end."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        line, new, books, report = job.line, job.new, job.books, job.work.report
+        move_joints(job, joints[l, START], joints[l, END])
+        for k in range(RATES):
+            books.power[1, k] = books.power[0, k]
+        find_powers(line, job.ends, books.velocity, new, report, books.power[0])
+        book_work(line, dt, report, books)
+        if books.extremes.shape[1] > 0:
+            keep_report(books, report)
+            note_extremes(line, job.sea, job.ends, new, books, t)
+
+
+@kernel
+def solve_system(task, t, solver, tables, numbers, joints, floors, first, columns, functional, net, A):
+    """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
+
+    t: s, of the new states, for the books; tables: (L, ..) jobs of the lines, their task ASSEMBLY; numbers: the same
+    memory as float64; floors: (L,) N, tension at or below which a catenary cell is slack; joints: (L, 2) points that start and end are joined to, -1 where they are held; first: (L,) where columns
+    (3, .., 5) of a line begin whose start is joined; functional: (3, FUNCTIONAL), net: (P, 3) and A: (m+1, m+1), m
+    tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
+    Returns outcome, iterations, predicted next correction, line and cell or node.
+    """
+    m, most, count = A.shape[0] - 1, task.limits.most, tables.shape[0]
+    s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
+    if task.what == STEP:
+        s = scheme(task.rho, task.before, task.dt)
+        line, turn, cell = begin_lines(tables, s)
+        if line >= 0:
+            return TURNED_TOO_FAR, 0, turn, line, cell
+    rubs = 0
+    for l in range(count):
+        numbers[l, TASK_CV], numbers[l, TASK_CA] = s.cv, s.ca
+        rubs |= read(tables[l]).line.bits & FRICTION
+    before, left = math.inf, math.inf
+    outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
+    while it < most and outcome == NOT_CONVERGED:
+        it += 1
+        line, where = march_lines(solver, tables, joints, net)
+        if line >= 0:
+            outcome = SINGULAR
+            if not read(tables[line]).work.report[RESIDUAL] < math.inf:
+                outcome, where = NOT_FINITE, int(read(tables[line]).work.report[RESIDUAL_NODE])
+            break
+        if task.what == ASSEMBLY:
+            outcome = OK
+            break
+        assemble_points(tables, joints, first, columns, functional, A, m)
+        if m > 0 and not solve_dense(A, m):
+            outcome = SINGULAR
+            break
+        line = correct_lines(tables, joints, first, columns, A, m)
+        if line >= 0:
+            bad = read(tables[line])
+            outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
+            break
+        if task.what == CORRECTION:
+            outcome = OK
+            break
+        shift, turn, size, line, where = size_up(tables, s.ca)
+        part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
+        if turn * part > LARGEST_TURN:
+            part = LARGEST_TURN / turn
+        if rubs != 0 and s.cv > 0.0 and it in (7, 10, 13):  # it goes round between sticking and sliding
+            part *= 0.5
+        for l in range(count):
+            job = read(tables[l])
+            update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
+        ratio = size / before
+        left = size * min(1.0, ratio * ratio)
+        if part == 1.0:
+            if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
+                outcome = OK
+            elif it > 4 and size < ROUND_OFF and ratio > 0.3:
+                outcome, left = OK, size
+        before = size if part == 1.0 else math.inf
+    if task.what == STEP:
+        bad_line, turn, cell = end_lines(tables, floors, s, task, outcome == OK)
+        if bad_line >= 0:
+            outcome, line, where = TURNED_TOO_FAR if turn > 0.0 else SLACK, bad_line, cell
+        elif outcome == OK:
+            keep_books(tables, joints, task.dt, t)
+    if task.what == ASSEMBLY and outcome == OK:
+        begin_books(tables, joints, t)
+    return outcome, it, left, line, where

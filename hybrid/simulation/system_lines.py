@@ -1,0 +1,141 @@
+"""One line of a system as a result: its outputs, its extremes and what is doubtful about it."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+
+import numpy as np
+
+from hybrid.kernels.books import LOG, Books
+from hybrid.kernels.entry import sharpest
+from hybrid.kernels.forces import FRICTION
+from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
+from hybrid.kernels.run import blank_books
+from hybrid.kernels.state import Batch, Ends, State, Work, batch_of_one
+from hybrid.model.build import Model
+from hybrid.model.output_points import output_points
+from hybrid.model.sections import section_changes
+from hybrid.outputs.probes import Observer
+from hybrid.scene.read import scene_text
+from hybrid.scene.schema import Scene
+from hybrid.simulation.diagnostics import Diagnostics, stretch_text
+from hybrid.simulation.envelope import Envelope, marks_of
+from hybrid.simulation.events import EventLog
+from hybrid.simulation.result_file import result_recorder
+from hybrid.solve.run import no_extremes
+from hybrid.solve.system import JoinedLine, SystemTaken
+from hybrid.solve.system_statics import LineFailed, SystemEquilibrium
+from hybrid.store.writer import Recorder
+
+# Outputs of a line that wait for one another: quantities of all of them are computed together.
+WAITING = 64
+
+
+class LineResult:
+    """What is recorded of one line."""
+
+    def __init__(
+        self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium, outputs: int
+    ) -> None:
+        """number: of the line in its system; outputs: after the first, 0 of an equilibrium."""
+        self.number, self.name, self.model, self.scene = number, name, model, scene
+        self.events, self.target = EventLog(), io.BytesIO()
+        self.diagnostics = Diagnostics(model, self.events)
+        self._moves = outputs > 0
+        s, jumps = output_points(scene)
+        self.observer = Observer(
+            model.line, model.sea.values, model.zones, s, self._moves, model.attached, jumps=jumps,
+            changes=section_changes(scene),
+        )  # fmt: skip
+        self.envelope = Envelope(scene, model, self._moves)
+        self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
+        self.recorder: Recorder = result_recorder(
+            scene, model, self.observer, self.target, {"scene": scene_text(scene)}, found, self.envelope, outputs
+        )
+        self.books = self._own_books(found.states[number])
+        self._waiting: list[Batch] = []
+        self._log: list[tuple[float, ...]] = []
+        self.diagnostics.begin()
+
+    def _own_books(self, state: State) -> Books:
+        """Books that keep the extremes of all steps; displacements count from a state."""
+        line, marks = self.model.line, marks_of(self.scene, self.model)
+        nodes, marked = line.s.size, np.flatnonzero(marks)
+        right = np.arange(nodes)
+        right[marked] = nodes + np.arange(marked.size)
+        self.envelope.count_from(self.model, state.r)
+        books = blank_books(line.h.size)
+        books.loaded[:] = self.model.loaded_ends
+        return books._replace(
+            strains=np.zeros((nodes, 3)), marks=marks, right=right, start=state.r.copy(),
+            extremes=no_extremes(nodes + marked.size),
+        )  # fmt: skip
+
+    def note_equilibrium(self, x: JoinedLine, state: State, t: float | None) -> None:
+        """What an equilibrium leaves open; t: s, where a motion starts from it, None: it is the result."""
+        line = self.model.line
+        if line.bits & FRICTION:
+            text = "this equilibrium of several lines is the one without friction on the seabed"
+            self.events.event(0.0, 0.0, self.model.length, "static friction neglected", text)
+        if line.element.any():
+            text = "whether rods would buckle out of an equilibrium of several lines is not judged"
+            self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
+        self.judge(t, sharpest(x.line, x.ends, state), state)
+
+    # --- steps and outputs --------------------------------------------------------------------------
+
+    def log(self, t: float, dt: float, taken: SystemTaken, repeats: int, work: Work, cpu: float) -> None:
+        """Log a step that ended at t (s)."""
+        report = work.report
+        a, b = report[FORCE_A : FORCE_A + 3], report[FORCE_A + 3 : FORCE_A + 6]
+        pulls = float(np.sqrt(a @ a)), float(np.sqrt(b @ b))
+        error = float(report[LOCAL_ERROR])
+        self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
+
+    def output(self, t: float, ends: Ends, state: State, work: Work) -> None:
+        """Record a state at t (s); both ends count as held, by their points."""
+        held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
+        self._waiting.append(batch_of_one(t, held, state, work.report, self.books.work[0], self.model.sea.values))
+        if len(self._waiting) >= WAITING or not self._moves:
+            self.write_down()
+
+    def write_down(self) -> None:
+        """Record the outputs that wait.  LineFailed where going on would make no sense."""
+        if self._log:
+            assert len(self._log[0]) == len(LOG) + 1
+            self.recorder.log_rows(np.array(self._log))
+            self._log.clear()
+        if not self._waiting:
+            return
+        waiting, self._waiting = self._waiting, []
+        batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
+        values = self.observer.values_of(batch)
+        self.recorder.save_batch(batch.t.copy(), values, self.observer.zone_rows)
+        if not self._moves:
+            self.diagnostics.mesh(batch)
+            return
+        stop = self.diagnostics.outputs(batch, values)
+        if stop is not None:
+            raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
+
+    def judge(self, t: float | None, sharp: Sequence[float], state: State) -> None:
+        """Look at a state for what its mesh does not resolve (an event) and for strain beyond what a section bears."""
+        at = t or 0.0
+        stretched = self.diagnostics.stretch(state)
+        stop = stretched or self.diagnostics.shape(at, sharp, state)
+        if stop is not None:
+            detail = stretch_text(self.model, state) if stretched else ""
+            raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
+
+    # --- the end ------------------------------------------------------------------------------------
+
+    def close(self, t: float, status: str, message: str) -> list[tuple[float, float, float, str, str]]:
+        """Write the envelope up to t (s) and close; events (t, s_a, s_b, kind, text) of the line."""
+        values = self.envelope.values(self.model.line.s, self.books.extremes, t)
+        self.recorder.replace(values)
+        self.envelope.note_broken(values, self.events.event)
+        noted = self.events.waiting()
+        self.events.write_to(self.recorder)
+        self.recorder.close(status, message)
+        return noted

@@ -1,0 +1,291 @@
+"""Several lines that meet at points: their equilibrium and their motion, each line a result of its own in one file."""
+
+from __future__ import annotations
+
+import io
+import time as clock
+from collections.abc import Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ComputationError, Outcome, ResultError
+from hybrid.kernels.cache import cache_folder
+from hybrid.kernels.report import BEND, FORCE_A, TWIST_NODE
+from hybrid.kernels.state import Floats, State
+from hybrid.model.plan import output_times, parts
+from hybrid.model.resolution import first_resolution
+from hybrid.model.system import SystemModel, balanced_places, build_system
+from hybrid.scene.system import FixedPoint, System
+from hybrid.simulation.progress import RESULT, ProgressReporter
+from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.time_loop import SAME_STOP, apart
+from hybrid.solve.system import JoinedLine, SystemSolver, SystemTaken, joined_ends
+from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
+from hybrid.store.format import Field
+from hybrid.store.lines import write_lines
+from hybrid.store.writer import Recorder
+
+# A step that fails is repeated in halves, down to this part of it.
+SHORTEST = 2.0**-12
+# Steps between two reports of the progress, and between two looks at what the mesh resolves.
+LOOK = 16
+
+
+def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
+    """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
+    try:
+        return solve_system_statics(joined_lines(model, t), len(model.free), _starts(system, model))
+    except LineFailed as failed:
+        raise named(failed, model) from None
+
+
+def _starts(system: System, model: SystemModel) -> Iterator[Start]:
+    """Shapes from which the equilibrium is looked for."""
+    yield "lines hung between the first places", [x.start for x in model.models]
+    places = balanced_places(system, model)
+    if places is not None and model.free:
+        yield "lines hung between places that balance", [x.start for x in build_system(system, places).models]
+
+
+def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
+    """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
+    lines = []
+    for x, joints in zip(model.models, model.joints, strict=True):
+        floor = x.slack_floor if x.slack == "stop" else -np.inf
+        ends = joined_ends(x.ends.at(t), joints)
+        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints))
+    return lines
+
+
+def named(failed: LineFailed, model: SystemModel) -> ComputationError:
+    """The same with the name of the line in its detail."""
+    where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
+    detail = f"{where}; {failed.detail}" if failed.detail else where
+    return ComputationError(failed.outcome, failed.t, failed.s, detail)
+
+
+class SystemRun:
+    """One system, computed into a file or into memory."""
+
+    def __init__(self, system: System, target: Path | io.BytesIO, text: str, moves: bool) -> None:
+        """text: the scene as YAML; moves: whether its motion is wanted, else its equilibrium under full loads."""
+        self.system, self.target, self.moves = system, target, moves
+        self.model = build_system(system)
+        names = self.model.names
+        self.scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in names]
+        self.times = output_times(self.scenes[0]) if moves else []
+        self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
+        self.lines = [
+            LineResult(k, name, scene, model, self.found, len(self.times))
+            for k, (name, scene, model) in enumerate(zip(names, self.scenes, self.model.models, strict=True))
+        ]
+        self.t, self.steps = 0.0, 0
+        self.states: list[State] = [state.copy() for state in self.found.states]
+        self.recorder = self._points_recorder(text)
+
+    # --- the file -----------------------------------------------------------------------------------
+
+    def _points_recorder(self, text: str) -> Recorder:
+        """The result of the points: place and velocity of all, and the force on those that are held."""
+        fields = []
+        for name, point in self.system.points.items():
+            fields.append(
+                Field(f"points/{name}/position", "m", f"position of point {name}", (3,), ("xyz",), "inertial")
+            )
+            fields.append(
+                Field(f"points/{name}/velocity", "m/s", f"velocity of point {name}", (3,), ("xyz",), "inertial")
+            )
+            if isinstance(point, FixedPoint):
+                what = f"force of the lines on point {name}, which its support bears"
+                fields.append(Field(f"points/{name}/force", "N", what, (3,), ("xyz",), "inertial"))
+        attributes: dict[str, str | float | int] = {
+            "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
+            "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
+            "static_residual": self.found.residual,
+        }  # fmt: skip
+        target = io.BytesIO() if isinstance(self.target, io.BytesIO) else self.target
+        self._root = target
+        return Recorder(
+            target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, texts={"scene": text},
+            outputs=len(self.times) + 1, overwrite=True, templates=cache_folder().parent,
+        )  # fmt: skip
+
+    def _output(self, solver: SystemSolver) -> None:
+        """Record points and lines as they are."""
+        values: dict[str, Any] = {}
+        for name, point in self.system.points.items():
+            at = [(self.model.names.index(line), -(end == "end")) for line, end in self.system.lines_at(name)]
+            line, node = at[0]
+            values[f"points/{name}/position"] = self.states[line].r[node].copy()
+            values[f"points/{name}/velocity"] = self.states[line].v[node].copy()
+            if isinstance(point, FixedPoint):
+                reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in at]
+                values[f"points/{name}/force"] = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
+        self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
+        for line_, x, state, work in zip(self.lines, solver.lines, self.states, solver.work, strict=True):
+            line_.output(self.t, x.ends, state, work)
+
+    def _close(self, status: str, message: str) -> None:
+        """Close all, with the events of the lines in the result of the points too, and put the lines into its file."""
+        images = {}
+        for line in self.lines:
+            for t, s_a, s_b, kind, text in line.close(self.t, status, message):
+                self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
+            images[line.name] = line.target.getvalue()
+        self.recorder.close(status, message)
+        write_lines(self._root, images)
+        if isinstance(self.target, io.BytesIO) and isinstance(self._root, io.BytesIO):
+            self.target.write(self._root.getvalue())
+
+    # --- what is computed ---------------------------------------------------------------------------
+
+    def record_equilibrium(self) -> None:
+        """Record the equilibrium that was found."""
+        try:
+            solver = self.found.solver
+            solver.keep_books([line.books for line in self.lines])
+            solver.evaluate_forces(self.states, 0.0)
+            for line, x, state in zip(self.lines, solver.lines, self.states, strict=True):
+                line.note_equilibrium(x, state, None)
+            self._output(solver)
+            text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
+            self._close("complete", text)
+        except LineFailed as failed:
+            raise self._failed(failed) from None
+
+    def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
+        """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
+        time = self.system.require_time()
+        begin = clock.process_time()
+        solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free))
+        solver.keep_books([line.books for line in self.lines])
+        try:
+            self._settle(solver)
+            for line, x, state in zip(self.lines, solver.lines, self.states, strict=True):
+                line.note_equilibrium(x, state, 0.0)
+                line.diagnostics.scheme(time.rho_inf)
+            self._output(solver)
+            other = [state.copy() for state in self.states]
+            breaks = sorted({x for model in self.model.models for x in model.ends.breaks if x < time.duration})
+            step = time.step or time.duration
+            before = 0.0
+            for stop in apart([*self.times, *breaks], 0.0, step):
+                span, first = stop - self.t, self.t
+                count = parts(span, step)
+                for k in range(count):
+                    end = stop if k == count - 1 else first + (k + 1) * span / count
+                    other, before = self._step(solver, other, end, before, time.rho_inf, begin)
+                    if self.steps % LOOK == 0:
+                        self._look(solver)
+                        reporter(self.t, self.steps, 0, self.model.models[0].zones)
+                        if interrupted():
+                            raise KeyboardInterrupt
+                if any(abs(x - stop) <= SAME_STOP * step for x in breaks):
+                    for model in self.model.models:
+                        model.ends.set_loads(self.t)
+                    self._settle(solver)
+                    before = 0.0
+                if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
+                    self._look(solver)
+                    self._output(solver)
+            for line in self.lines:
+                line.write_down()
+            reporter(self.t, self.steps, 0, self.model.models[0].zones, True)
+            self._close("complete", f"{self.steps} steps")
+        except LineFailed as failed:
+            raise self._failed(failed) from None
+        except KeyboardInterrupt:
+            self._write_rest()
+            self._close("interrupted", f"stopped from outside at t = {self.t:.6g} s")
+            raise
+
+    def _failed(self, failed: LineFailed) -> ComputationError:
+        """What a failure becomes: a file with all that there is, and an error that names the line."""
+        error = named(failed, self.model)
+        self._write_rest()
+        for line in self.lines:
+            if line.number == failed.line or failed.line < 0:
+                s = failed.s or 0.0
+                line.events.event(failed.t or 0.0, s, s, failed.outcome.name.lower(), str(error))
+        with suppress(ResultError):
+            self._close("failed", str(error))
+        return error
+
+    def _write_rest(self) -> None:
+        for line in self.lines:
+            with suppress(LineFailed):
+                line.write_down()
+
+    def _settle(self, solver: SystemSolver) -> None:
+        """Accelerations and tensions that are consistent with positions, velocities and loads."""
+        step = self.system.require_time().step or 1.0
+        accelerations: list[Floats] = []
+        for line, model in zip(self.lines, self.model.models, strict=True):
+            accelerations.append(model.ends.acceleration(self.t, 1e-3 * step))
+            model.ends.at(self.t)
+            model.sea.at(self.t)
+            line.books.velocity[:] = model.ends.velocity
+        taken = solver.consistent_accelerations(self.states, accelerations, self.t)
+        if taken.outcome != Outcome.OK:
+            raise self._stopped(solver, taken, 0.0)
+
+    def _step(
+        self, solver: SystemSolver, other: list[State], end: float, before: float, rho: float, begin: float
+    ) -> tuple[list[State], float]:
+        """To `end` (s), in one step or in halves; the states not in use, and the length of the last step."""
+        shortest = SHORTEST * (end - self.t)
+        dt, repeats = end - self.t, 0
+        while self.t < end:
+            dt = min(dt, end - self.t)
+            t = end if end - self.t - dt < 0.5 * shortest else self.t + dt
+            for line, model in zip(self.lines, self.model.models, strict=True):
+                model.ends.at(t)
+                model.sea.at(t)
+                line.books.velocity[:] = model.ends.velocity
+            taken = solver.step(self.states, other, t - self.t, rho, before, t)
+            if taken.outcome != Outcome.OK:
+                dt, repeats = 0.5 * dt, repeats + 1
+                if dt < shortest:
+                    raise self._stopped(solver, taken, 2.0 * dt)
+                continue
+            before = t - self.t
+            self.t, self.states, other = t, other, self.states
+            self.steps += 1
+            cpu = clock.process_time() - begin
+            for line, work in zip(self.lines, solver.work, strict=True):
+                line.log(t, before, taken, repeats, work, cpu)
+            repeats = 0
+        return other, before
+
+    def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
+        """Why no step leads on."""
+        detail = f"smallest step tried {dt:.3g} s; {taken.iterations} Newton iterations in the last try"
+        if dt == 0.0:
+            detail = "no accelerations are consistent with the shape and the loads"
+        s = None
+        if taken.line >= 0:
+            nodes = solver.lines[taken.line].line.s
+            s = float(nodes[min(max(taken.where, 0), nodes.size - 1)])
+        return LineFailed(taken.line, taken.outcome, self.t, s, detail)
+
+    def _look(self, solver: SystemSolver) -> None:
+        """Whether meshes resolve the lines, and sections bear them."""
+        for line, state, work in zip(self.lines, self.states, solver.work, strict=True):
+            line.judge(self.t, work.report[BEND : TWIST_NODE + 1].tolist(), state)
+
+
+def run_system(
+    system: System, target: Path | io.BytesIO, text: str, reporter: ProgressReporter, interrupted: Callable[[], bool]
+) -> None:
+    """Compute the motion of a system into a file or into memory."""
+    run = SystemRun(system, target, text, moves=True)
+    reporter.begin(RESULT, first_resolution(run.scenes[0]))
+    run.record_motion(reporter, interrupted)
+
+
+def static_system(system: System, target: Path | io.BytesIO, text: str) -> None:
+    """Compute the equilibrium of a system under full loads into a file or into memory."""
+    SystemRun(system, target, text, moves=False).record_equilibrium()

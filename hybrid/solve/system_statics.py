@@ -1,0 +1,149 @@
+"""The equilibrium of lines that meet at points, from whatever shapes are given, by the ways of a single line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
+from hybrid.kernels.state import State
+from hybrid.solve.statics import CALM, GYRATION, LIMP, RELAXING_STEPS, SOFT_BED
+from hybrid.solve.system import JoinedLine, SystemSolver, SystemTaken
+
+
+@dataclass(frozen=True)
+class SystemEquilibrium:
+    """A static solution: states of the lines, how it was found (`path`), iterations, and its proof, the largest force
+    out of balance at a node or a point (N)."""
+
+    states: tuple[State, ...]
+    path: tuple[str, ...]
+    iterations: int
+    residual: float
+    solver: SystemSolver  # whose reports are those of the solution
+
+    @property
+    def summary(self) -> str:
+        """How it was found, in one line."""
+        failed = len(self.path) - 1
+        others = f" (after {failed} other way{'s' * (failed > 1)})" if failed else ""
+        return f"{self.path[-1].split(':')[0]}, {self.iterations} iterations{others}"
+
+
+class LineFailed(ComputationError):
+    """A computation of a system stopped: number of the line where it did, -1 for a point."""
+
+    def __init__(self, line: int, *error: object, **named: object) -> None:
+        super().__init__(*error, **named)  # type: ignore[arg-type]
+        self.line = line
+
+
+Start = tuple[str, Sequence[State]]
+
+
+def solve_system_statics(lines: Sequence[JoinedLine], points: int, starts: Iterable[Start]) -> SystemEquilibrium:
+    """Equilibrium of a system without friction; starts: shapes to begin with, with their names, made when asked for.
+
+    Tries Newton from each start; then, over a seabed or in a current, from a soft bed and no current on; then a damped
+    motion to rest.  Raises LineFailed when none arrives at lines under tension.
+    """
+    bits = FRICTION | WAVES
+    solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points)
+    path: list[str] = []
+    total, failed = 0, list[SystemTaken]()
+    for how, taken, states in _attempts(solver, points, starts):
+        total += taken.iterations
+        path.append(f"{how}: {taken.outcome.cause if taken.outcome else 'found'} ({total} iterations in all)")
+        if taken.outcome == Outcome.OK:
+            residual = solver.evaluate_forces(states, solver.anchor).residual
+            return SystemEquilibrium(tuple(states), tuple(path), total, residual, solver)
+        failed.append(taken)
+    worst = next((x for x in failed if x.outcome == Outcome.SLACK), failed[0])
+    line = worst.line
+    s = float(lines[line].line.s[min(max(worst.where, 0), lines[line].line.s.size - 1)]) if line >= 0 else 0.0
+    raise LineFailed(line, worst.outcome, None, s, "\n              ".join(path))
+
+
+def _attempts(
+    solver: SystemSolver, points: int, starts: Iterable[Start]
+) -> Iterator[tuple[str, SystemTaken, Sequence[State]]]:
+    """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
+    given: list[Start] = []
+    for name, start in starts:
+        given.append((name, start))
+        yield f"Newton from {name}", *solver.newton(start)
+    if any(x.line.bits & (SEABED | FLOW) for x in solver.lines):
+        for name, start in given:
+            how, taken, states = _eased(solver, points, start)
+            yield f"{how}, from {name}", taken, states
+    for name, start in given:
+        yield f"damped motion to rest from {name}, then Newton", *solver.newton(_relax(solver, points, start))
+
+
+def _easier(x: JoinedLine, part: float) -> JoinedLine:
+    """A line over a softer bed, in less current and with less bending; part: 0 the easiest to 1."""
+    now = x.sea.now.copy()
+    now[1] *= part
+    softest = min(1.0, x.sea.onset / (SOFT_BED * x.length)) if x.line.bits & SEABED else 1.0
+    soft = softest ** (1.0 - part)
+    sea = x.sea._replace(stiffness=x.sea.stiffness * soft, onset=x.sea.onset / soft, now=now)
+    return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
+
+
+def _eased(solver: SystemSolver, points: int, start: Sequence[State]) -> tuple[str, SystemTaken, Sequence[State]]:
+    """Continuation from an easy sea to the real one.  A part of the way that fails is halved."""
+    states, done, part, steps = start, -1.0, 1.0, 0
+    while True:
+        goal = min(1.0, done + part)
+        last = goal >= 1.0
+        here = solver if last else SystemSolver([_easier(x, max(goal, 0.0)) for x in solver.lines], points)
+        taken, found = here.newton(states)
+        steps += 1
+        if taken.outcome == Outcome.OK or (taken.outcome == Outcome.SLACK and not last):
+            states, done = found, goal
+            part = min(1.5 * part, 0.25) if done <= 0.0 else 1.5 * part
+        else:
+            part *= 0.5
+        if done >= 1.0 or part < 1e-3 or (done < 0.0 and part <= 0.5):
+            return f"from a soft seabed, no current and little bending in {steps} steps", taken, states
+
+
+def _relax(solver: SystemSolver, points: int, start: Sequence[State]) -> Sequence[State]:
+    """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move."""
+    lines = []
+    mass = sum(float(x.line.mass.sum()) for x in solver.lines)
+    time_scale = float(np.sqrt(mass * solver.length / solver.scale))
+    for x in solver.lines:
+        line = x.line
+        gyration = line.spin * 0.5 * (line.mass[:-1] + line.mass[1:]) * (GYRATION * x.length) ** 2
+        damped = line._replace(
+            damp=np.nan_to_num(line.damp) + 2.0 * line.mass / time_scale,
+            polar=np.nan_to_num(line.polar) + gyration, rotary=np.nan_to_num(line.rotary),
+            bits=line.bits | MASS_DAMPING | ROTARY,
+        )  # fmt: skip
+        lines.append(x._replace(line=damped, floor=-np.inf))
+    here = SystemSolver(lines, points)
+    old = [state.copy() for state in start]
+    new = [state.copy() for state in start]
+    dt, calm = 1e-3 * time_scale, 0
+    for _ in range(RELAXING_STEPS):
+        taken = here.step(old, new, dt, 0.0, dt)
+        if taken.outcome != Outcome.OK:
+            dt *= 0.25
+            if dt < 1e-9 * time_scale:
+                break
+            for state in old:
+                for rate in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
+                    rate[:] = 0.0
+            continue
+        moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new, old, strict=True))
+        old, new = new, old
+        calm = calm + 1 if moved < CALM * solver.length * dt / time_scale else 0
+        if taken.iterations <= 5:
+            dt = min(2.0 * dt, time_scale)
+        if calm >= 3:
+            break
+    return old

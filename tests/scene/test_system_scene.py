@@ -1,0 +1,100 @@
+"""Scenes of several lines: what is read, and what is refused with its place and what to try."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError, SceneError
+from hybrid.scene.read import parse_either, scene_text
+from hybrid.scene.system import FixedPoint, FreePoint, JoinedLine, System, SystemOutput
+
+PAGE = Path(__file__).parents[2] / "docs" / "lines.md"
+TEXT = """\
+environment:
+  fluid: {density: 1025, surface: 30}
+points:
+  west: {position: [-150, 0, -100]}
+  east: {position: [150, 0, -100]}
+  buoy: {kind: free, initial_guess: [0, 0, 5], mass: 1000, volume: 20}
+lines:
+  west: {start: west, end: buoy, sections: [{length: 185, mass: 10, diameter: 0.05, axial_stiffness: 1.0e+7}]}
+  east: {start: buoy, end: east, sections: [{length: 185, mass: 10, diameter: 0.05, axial_stiffness: 1.0e+7}]}
+time: {duration: 20, step: 0.05}
+"""
+
+
+def system(text: str, *settings: str) -> System:
+    found, _ = parse_either(text, "lines.yaml", settings)
+    assert isinstance(found, System)
+    return found
+
+
+def test_a_system_is_read_changed_and_written() -> None:
+    found = system(TEXT, "time.step=0.1", "points.buoy.mass=1200", "lines.west.mesh={cells: 20}")
+    assert found.time is not None and found.time.step == 0.1
+    assert found.free == ("buoy",) and found.lines_at("buoy") == [("west", "end"), ("east", "start")]
+    assert found.carried("west") == ("end",) and found.carried("east") == ()
+    assert found.lines["west"].mesh is not None and found.lines["west"].chosen_model.kind == "catenary"
+    assert system(scene_text(found)) == found
+    plan = hybrid.plan(found)
+    assert plan.cells == 120 and plan.free == ("buoy",) and plan.steps == 200
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "where", "says"),
+    [
+        ("end: east,", "end: eats,", 9, "lines.east.end", "did you mean east?"),
+        ("kind: free,", "kind: fre,", 6, "points.buoy.kind", "did you mean free?"),
+        ("mass: 1000", "mas: 1000", 6, "points.buoy.mas", "did you mean mass?"),
+        ("mass: 1000, ", "", 6, "points.buoy.mass", "because the point has volume"),
+        ("[150, 0, -100]", "[150, 0]", 5, "points.east.position", "three numbers"),
+        ("step: 0.05", "tolerance: 0.1", 10, "time.step", "a fixed step"),
+        ("start: buoy, end: east", "start: east, end: east", 9, "lines.east.end", "a point other than east"),
+        ("  east: {position", "  idle: {position: [0, 0, 0]}\n  east: {position", 5, "points.idle", "leave it out"),
+        ("  fluid: {density: 1025, surface: 30}", "  gravity: 9.81", 6, "points.buoy.volume", "fluid"),
+        ("time:", "accuracy: 1%\ntime:", 10, "accuracy", "a key of a scene"),
+        ("mass: 10, diameter: 0.05, axial", "mass: 10, diameter: 0.05, drag: 3, axial", 8, "lines.west.sections[0].drag",
+         "normal: 3"),
+    ],
+)  # fmt: skip
+def test_refused_with_place_and_remedy(old: str, new: str, line: int, where: str, says: str) -> None:
+    assert old in TEXT
+    with pytest.raises(SceneError) as refused:
+        parse_either(TEXT.replace(old, new, 1), "lines.yaml")
+    found = {complaint.where: complaint for complaint in refused.value.complaints}
+    assert where in found, str(refused.value)
+    assert found[where].line == line and says in found[where].text(), found[where].text()
+
+
+def test_points_that_nothing_holds_are_refused() -> None:
+    text = TEXT.replace("  buoy: {", "  a: {initial_guess: [0, 0, 9]}\n  b: {initial_guess: [5, 0, 9]}\n  buoy: {")
+    text = text.replace("lines:\n", "lines:\n  loose: {start: a, end: b, sections: [{length: 9, mass: 1}]}\n")
+    with pytest.raises(SceneError, match="nothing holds it"):
+        parse_either(text)
+
+
+def test_a_guess_out_of_reach_is_only_a_guess() -> None:
+    found = system(TEXT.replace("initial_guess: [0, 0, 5]", "initial_guess: [0, 0, 500]"))
+    result = hybrid.static(found)
+    assert abs(result["points/buoy/position"][-1, 0]) < 1e-6 and result["points/buoy/position"][-1, 2] < 30
+
+
+def test_points_farther_apart_than_lines_reach_are_refused_with_the_line() -> None:
+    with pytest.raises(ComputationError, match=r"line (west|east)"):
+        hybrid.static(system(TEXT.replace("[150, 0, -100]", "[900, 0, -100]")))
+
+
+def test_zones_that_move_are_refused() -> None:
+    text = TEXT.replace("end: buoy, sections", "end: buoy, model: adaptive, sections", 1)
+    with pytest.raises(SceneError, match="zones that stay"):
+        parse_either(text)
+
+
+@pytest.mark.parametrize("table", [FixedPoint, FreePoint, JoinedLine, SystemOutput])
+def test_every_key_is_on_the_page(table: type) -> None:
+    page = PAGE.read_text(encoding="utf-8")
+    for key in table.model_fields:
+        assert f"`{key}`" in page, key

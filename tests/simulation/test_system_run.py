@@ -1,0 +1,188 @@
+"""Several lines in motion: a system of one line is that line, energies close, files hold every line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError, ResultError, SceneError
+
+WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
+SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
+SECTION = {"length": 108, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
+BODY = {"mass": 400, "volume": 3.0, "height": 2.0, "drag_area": 2.0, "added_mass": 300}
+PINNED = {"position": [0, 0, -100.0]}
+TIME = {"duration": 12.0, "step": 0.05}
+
+
+def buoy(**tables: Any) -> dict[str, Any]:
+    """A buoy at the surface on one line, as a system."""
+    return {
+        "environment": SEA,
+        "points": {"anchor": PINNED, "buoy": {"kind": "free", "initial_guess": [40, 5, -1]} | BODY},
+        "lines": {"riser": {"start": "anchor", "end": "buoy", "sections": [SECTION], "mesh": {"cells": 30}}},
+        "time": TIME,
+    } | tables
+
+
+def mooring(**tables: Any) -> dict[str, Any]:
+    """Two legs from the seabed to a float, and a hose with bending from there to a vessel that heaves."""
+    leg = SECTION | {"length": 140, "added_mass": {"normal": 1.0}}
+    heave = {"heave": {"amplitude": 1.5, "period": 8}, "ramp": 6}
+    return {
+        "title": "float", "environment": SEA | {"seabed": {"z": -100, "stiffness": 5000}},
+        "points": {
+            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3},
+            "vessel": {"position": [70, 0, 2], "motion": heave},
+        },
+        "lines": {
+            "west": {"start": "west", "end": "float", "sections": [leg], "mesh": {"cells": 30}},
+            "east": {"start": "float", "end": "east", "sections": [leg], "mesh": {"cells": 30}},
+            "hose": {
+                "start": "float", "end": "vessel", "mesh": {"cells": 30},
+                "sections": [{"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6,
+                              "bending_stiffness": 300, "drag": {"normal": 1.1}, "max_tension": 3000}],
+            },
+        },
+        "time": TIME,
+    } | tables  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def moved() -> hybrid.Result:
+    return hybrid.run(mooring())
+
+
+def test_a_system_of_one_line_is_the_cable_with_a_body_at_its_end() -> None:
+    """The same equations, by the small system instead of the march alone: equal to what Newton leaves in 240 steps."""
+    one = hybrid.run(
+        {
+            "environment": SEA, "cable": {"sections": [SECTION]},
+            "ends": {"start": PINNED | {"kind": "pinned"}, "end": {"kind": "body", "initial_guess": [40, 5, -1]} | BODY},
+            "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 30}, "dimension": 3,
+            "time": TIME, "output": {"exact": True, "errors": False},
+        }
+    )  # fmt: skip
+    system = hybrid.run(buoy())
+    line = system.lines["riser"]
+    assert np.array_equal(line.times, one.times) and len(one.times) == 101
+    assert np.abs(one.position[-1] - one.position[0]).max() > 0.3
+    assert np.abs(line.position - one.position).max() < 1e-7 * 108
+    assert np.abs(line.tension - one.tension).max() < 1e-5 * one.tension.max()
+    for name in ("energy/kinetic", "energy/potential", "work/drag", "work/waves"):
+        assert np.abs(line[name] - one[name]).max() < 1e-5 * np.abs(one[name]).max(), name
+    assert np.abs(line.envelope["tension_max"] - one.envelope["tension_max"]).max() < 1e-5 * one.tension.max()
+    assert np.array_equal(system["points/buoy/position"], line.position[:, -1])
+
+
+def test_every_line_and_point_is_in_the_result(moved: hybrid.Result) -> None:
+    assert list(moved.lines) == ["west", "east", "hose"]
+    at = moved["points/float/position"]
+    for name, node in (("west", -1), ("east", 0), ("hose", 0)):
+        line = moved.lines[name]
+        assert line.status == "complete" and line.title == f"float, line {name}"
+        assert np.abs(line.position[:, node] - at).max() < 1e-12
+    hose = moved.lines["hose"]
+    assert np.abs(hose.position[:, -1] - moved["points/vessel/position"]).max() < 1e-12
+    assert np.abs(hose.reaction_end + moved["points/vessel/force"]).max() < 1e-9 * np.abs(hose.reaction_end).max()
+    assert "bending_moment" in hose and "bending_moment" not in moved.lines["west"]
+    assert any("line hose" in e.text and e.kind == "stability not judged" for e in moved.events)
+    with pytest.raises(KeyError, match="west, east, hose"):
+        moved.lines["north"]
+    with pytest.raises(ResultError, match="several lines"):
+        moved["tension"]
+
+
+def test_forces_at_the_free_point_balance(moved: hybrid.Result) -> None:
+    """What the lines and the water put into the float comes out of it: no force is left, at any output."""
+    total = sum(moved.lines[x][f"reaction_{end}"] for x, end in (("west", "end"), ("east", "start"), ("hose", "start")))
+    largest = max(np.abs(line.tension).max() for line in moved.lines.values())
+    assert np.abs(total).max() < 1e-5 * largest
+
+
+def test_energy_of_all_lines_closes_with_second_order() -> None:
+    """Energy that no work accounts for falls as the square of the step, summed over the lines (work at points cancels)."""
+    left = []
+    for step in (0.1, 0.05):
+        result = hybrid.run(mooring(time={"duration": 8.0, "step": step, "rho_inf": 1.0}, output={"every": 0.4}))
+        lines = result.lines.values()
+        put_in = max(float(np.abs(x["work/end"]).max()) for x in lines)
+        left.append(max(abs(sum(float(x["work/scheme"][k]) for x in lines)) for k in range(21)) / put_in)
+    assert left[0] < 0.02 and left[1] < 0.4 * left[0]
+
+
+def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
+    target = tmp_path / "float.h5"
+    written = hybrid.run(mooring(), target)
+    with hybrid.open(target) as again:
+        assert again.file == target
+        for name, line in again.lines.items():
+            assert np.array_equal(line.tension, moved.lines[name].tension)
+            assert line.dims("tension") == ("t", "s") and line.units["tension"] == "N"
+    (tmp_path / "again.yaml").write_text(written.scene_text)
+    assert hybrid.load_system(tmp_path / "again.yaml") == hybrid.System.model_validate(mooring())
+    hybrid.export(written.lines["hose"], tmp_path / "hose.csv")
+    assert (tmp_path / "hose.csv").stat().st_size > 5_000
+    with pytest.raises(ResultError, match="no checkpoint"):
+        hybrid.resume(target)
+
+
+def test_the_limit_of_a_section_is_judged_by_every_step(moved: hybrid.Result) -> None:
+    hose = moved.lines["hose"]
+    broken = [e for e in hose.events if e.kind == "tension above limit"]
+    assert bool(broken) == (hose.envelope["tension_max"].max() > 3000)
+
+
+def test_chains_on_the_seabed_bear_what_they_weigh() -> None:
+    """A float on two chains: what the anchors and the bed bear is the weight less the lift of the float, to 1e-6."""
+    chain = {"length": 190, "mass": 20.0, "diameter": 0.05, "axial_stiffness": 1e7}
+    tables = {
+        "environment": {"fluid": {"density": 1025}, "seabed": {"z": -100, "stiffness": 5000}},
+        "points": {
+            "west": {"position": [-150, 0, -100]}, "east": {"position": [150, 10, -100]},
+            "float": {"kind": "free", "initial_guess": [10, 0, -20], "mass": 900, "volume": 3.5},
+        },
+        "lines": {
+            "west": {"start": "west", "end": "float", "sections": [chain], "mesh": {"cells": 60}},
+            "east": {"start": "float", "end": "east", "sections": [chain], "mesh": {"cells": 60}},
+        },
+    }  # fmt: skip
+    result = hybrid.static(tables)
+    assert all(line.grounded_length[-1] > 20.0 for line in result.lines.values())
+    g = 9.81
+    weight = 2 * 190 * g * (20.0 - 1025 * np.pi / 4 * 0.05**2) + g * (900 - 1025 * 3.5)
+    borne = -sum(result[f"points/{x}/force"][-1, 2] for x in ("west", "east"))
+    contact = sum(float(line.contact_force[-1]) for line in result.lines.values())
+    assert abs(borne + contact - weight) < 1e-6 * weight
+    level = [result[f"points/{x}/force"][-1, :2] for x in ("west", "east")]
+    assert np.abs(level[0] + level[1]).max() < 1e-6 * np.abs(level[0]).max()
+
+
+def test_a_line_that_stays_stretched_beyond_its_limit_stops_with_its_name() -> None:
+    section = SECTION | {"max_strain": 1e-4}
+    tables = buoy(lines={"riser": {"start": "anchor", "end": "buoy", "sections": [section], "mesh": {"cells": 30}}})
+    with pytest.raises(ComputationError, match="line riser"):
+        hybrid.run(tables)
+
+
+def test_what_takes_one_cable_refuses_several() -> None:
+    for ask in (hybrid.validate_scene, hybrid.Simulation):
+        with pytest.raises(SceneError, match="one cable"):
+            ask(buoy())
+    with pytest.raises(SceneError, match="duration"):
+        hybrid.run({k: x for k, x in buoy().items() if k != "time"})
+
+
+def test_a_force_on_a_point_that_is_let_go_ends_where_it_says() -> None:
+    """A step ends where the force does; then the point accelerates by what held it."""
+    tables = mooring(time={"duration": 3.0, "step": 0.05}, output={"every": 0.25})
+    tables["points"]["float"] |= {"force": {"value": [0, 3000, 0], "until": 1.13}}
+    result = hybrid.run(tables)
+    assert np.abs(result.lines["west"]["steps/t"] - 1.13).min() < 1e-9
+    side = result["points/float/position"][:, 1]
+    assert side[0] > 1.0 and side[4] == pytest.approx(side[0], abs=0.1) and side[-1] < side[0] - 0.3

@@ -1,0 +1,227 @@
+"""Lines that meet at points: a line that is cut is the same line, and closed forms of bridles and moorings."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import root
+
+import hybrid
+from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.newton import TOLERANCE
+from hybrid.model.build import Model, build
+from hybrid.simulation.system_run import SystemRun
+from hybrid.solve.statics import solve_statics
+from hybrid.solve.stepper import Stepper
+from hybrid.solve.system import JoinedLine, SystemSolver, joined_ends
+
+LENGTH, CELLS = 100.0, 40
+A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
+SECTION = {"mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "drag": {"normal": 1.2}, "added_mass": {"normal": 1}}
+WATER = {"fluid": {"density": 1025, "current": [0.3, 0.2, 0]}}
+
+
+def piece(kind: str, length: float, a: np.ndarray, b: np.ndarray, cells: int) -> Model:
+    section = SECTION | {"length": length} | ({"bending_stiffness": 20.0} if kind == "rod" else {})
+    ends = {"start": {"kind": "pinned", "position": a.tolist()}, "end": {"kind": "pinned", "position": b.tolist()}}
+    tables: dict[str, Any] = {
+        "cable": {"sections": [section]}, "ends": ends, "initial": "equilibrium", "model": kind,
+        "mesh": {"cells": cells}, "environment": WATER,
+    }  # fmt: skip
+    return build(hybrid.validate_scene(tables))
+
+
+class Cut:
+    """A line in one piece with hinges, and the same line cut at them, pieces in any orientation."""
+
+    def __init__(self, kind: str, cuts: Sequence[int], flips: Sequence[int]) -> None:
+        self.whole = piece(kind, LENGTH, A, B, CELLS)
+        element = self.whole.line.element.copy()
+        element[list(cuts)] = 0
+        self.line, self.flips = self.whole.line._replace(element=element), flips
+        self.edges = [0, *cuts, CELLS]
+        self.sea, self.ends = self.whole.sea.at(np.inf), self.whole.ends.at(np.inf)
+        found = solve_statics(self.line, self.sea, self.ends, self.whole.start, LENGTH, self.whole.tension_scale)
+        self.state = found.state
+        off = np.random.default_rng(1).uniform(-0.6, 0.6, (len(cuts), 3))
+        places = [A, *(self.state.r[list(cuts)] + off), B]
+        lines, self.start = [], []
+        for i, flipped in enumerate(flips):
+            ends, joints = (places[i], places[i + 1]), (i - 1, i if i < len(cuts) else -1)
+            if flipped:
+                ends, joints = ends[::-1], joints[::-1]
+            n = self.edges[i + 1] - self.edges[i]
+            model = piece(kind, LENGTH * n / CELLS, *ends, n)
+            held, scale = joined_ends(model.ends.at(np.inf), joints), model.tension_scale
+            lines.append(JoinedLine(model.line, model.sea.at(np.inf), held, model.length, scale, -np.inf, joints))
+            self.start.append(model.start)
+        self.solver = SystemSolver(lines, len(cuts))
+
+    def apart(self, states: Sequence[Any], name: str, state: Any) -> float:
+        """Largest difference of an array of nodes or cells from that of the line in one piece."""
+        whole, worst = getattr(state, name), 0.0
+        for i, each in enumerate(states):
+            mine = getattr(each, name)[::-1] if self.flips[i] else getattr(each, name)
+            worst = max(worst, float(np.abs(mine - whole[self.edges[i] :][: len(mine)]).max()))
+        return worst
+
+    def move(self, position: np.ndarray) -> None:
+        """Move the end of the line, in one piece and in pieces."""
+        self.ends.position[1] = position
+        self.solver.lines[-1].ends.position[0 if self.flips[-1] else 1] = position
+
+
+@pytest.mark.parametrize("kind", ["catenary", "rod"])
+@pytest.mark.parametrize(
+    ("cuts", "flips"), [([16], (0, 0)), ([16], (1, 1)), ([8, 16, 30], (0, 1, 1, 1)), ([8, 12, 20, 32], (1, 0, 1, 0, 1))]
+)
+def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], flips: tuple[int, ...]) -> None:
+    """Statics to 1e-9 of the length, Newton from places 0.6 m off; a step in motion to Newton's tolerance."""
+    cut = Cut(kind, cuts, flips)
+    taken, states = cut.solver.newton(cut.start)
+    assert taken.outcome == Outcome.OK and taken.iterations <= 12
+    assert taken.residual < 1e-9 * np.abs(cut.state.T).max()
+    assert cut.apart(states, "r", cut.state) < 1e-9 * LENGTH
+    assert cut.apart(states, "T", cut.state) < 1e-9 * cut.state.T.max()
+
+    stepper = Stepper(cut.line, LENGTH, cut.whole.tension_scale)
+    old, others = cut.state.copy(), [x.copy() for x in states]
+    assert stepper.consistent_accelerations(cut.sea, cut.ends, np.zeros((2, 3)), old).outcome == Outcome.OK
+    assert cut.solver.consistent_accelerations(states, [np.zeros((2, 3))] * len(flips)).outcome == Outcome.OK
+    new, dt, before, iterations = old.copy(), 0.05, 0.0, [0, 0]
+    for k in range(1, 81):
+        cut.move(B + np.array([0.1, 0.0, 0.3]) * (1.0 - np.cos(2.0 * np.pi * k * dt / 3.0)))
+        one = stepper.step(cut.sea, cut.ends, old, new, dt, 0.8, before)
+        many = cut.solver.step(states, others, dt, 0.8, before)
+        assert one.outcome == many.outcome == Outcome.OK
+        old, new, states, others, before = new, old, others, states, dt
+        iterations = [iterations[0] + one.iterations, iterations[1] + many.iterations]
+    assert iterations[1] <= iterations[0] + 8  # pieces are smaller: the same shift is a larger part of them
+    # what Newton leaves in a step, in 80 steps
+    assert cut.apart(states, "r", old) < 10 * TOLERANCE * LENGTH
+    assert cut.apart(states, "T", old) < 100 * TOLERANCE * old.T.max()
+
+
+def test_what_consistent_accelerations_are() -> None:
+    """A heavy point let go: cut and uncut lines accelerate alike, on both sides of the cut."""
+    cut = Cut("catenary", [16], (0, 0))
+    _, states = cut.solver.newton(cut.start)
+    state = cut.state.copy()
+    state.v[:, 2] = np.sin(np.pi * cut.whole.line.s / LENGTH)
+    for i, each in enumerate(states):  # the same to the last digit: lengths make tension
+        nodes = slice(cut.edges[i], cut.edges[i + 1] + 1)
+        each.r[:], each.v[:] = state.r[nodes], state.v[nodes]
+        each.e[:], each.T[:] = state.e[nodes][: each.T.size], state.T[nodes][: each.T.size]
+    Stepper(cut.line, LENGTH, cut.whole.tension_scale).consistent_accelerations(
+        cut.sea, cut.ends, np.zeros((2, 3)), state
+    )
+    cut.solver.consistent_accelerations(states, [np.zeros((2, 3))] * 2)
+    assert np.abs(state.vd).max() > 0.1
+    assert cut.apart(states, "vd", state) < 1e-9 * np.abs(state.vd).max()
+
+
+# --- closed forms --------------------------------------------------------------------------------------
+
+
+def equilibrium(tables: dict[str, Any]) -> SystemRun:
+    """The equilibrium of a system, not yet written."""
+    import io
+
+    return SystemRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+
+
+def test_a_bridle_without_weight_against_its_force_polygon() -> None:
+    """Three elastic legs without weight: their lengths and the force polygon are six equations, solved apart."""
+    EA, legs, force = 2e5, (12.0, 15.0, 8.0), np.array([300.0, 80.0, -900.0])
+    a, b = np.array([-8.0, 0.0, 0.0]), np.array([9.0, 2.0, 1.0])
+
+    def line(start: str, end: str, length: float) -> dict[str, Any]:
+        sections = [{"length": length, "mass": 0.5, "axial_stiffness": EA}]
+        return {"start": start, "end": end, "sections": sections, "mesh": {"cells": 4}}
+
+    found = equilibrium(
+        {
+            "environment": {"gravity": 0.0},
+            "points": {
+                "a": {"position": a.tolist()}, "b": {"position": b.tolist()},
+                "knot": {"kind": "free", "initial_guess": [1, 0, -9]},
+                "load": {"kind": "free", "initial_guess": [2, 1, -17], "force": force.tolist()},
+            },
+            "lines": {
+                "left": line("a", "knot", legs[0]), "right": line("knot", "b", legs[1]),
+                "down": line("knot", "load", legs[2]),
+            },
+        }
+    )  # fmt: skip
+
+    def pull(span: np.ndarray, length: float) -> np.ndarray:
+        distance = np.linalg.norm(span)
+        return EA * (distance / length - 1.0) * span / distance
+
+    def balance(x: np.ndarray) -> np.ndarray:
+        knot, load = x[:3], x[3:]
+        down = pull(load - knot, legs[2])
+        return np.concatenate([pull(a - knot, legs[0]) + pull(b - knot, legs[1]) + down, force - down]) / 1e3
+
+    exact = root(balance, np.array([1.0, 0, -9, 2, 1, -17]), tol=1e-14).x
+    left, _, down = found.found.states
+    assert np.abs(left.r[-1] - exact[:3]).max() < 1e-9 * legs[1]
+    assert np.abs(down.r[-1] - exact[3:]).max() < 1e-9 * legs[1]
+    assert np.abs(down.T - np.linalg.norm(force)).max() < 1e-9 * np.linalg.norm(force)
+
+
+@pytest.mark.parametrize("flipped", [0, 1])
+def test_a_symmetric_mooring_of_three_lines_against_one_of_them(flipped: int) -> None:
+    """By symmetry the buoy stands in the middle, and a third of its lift ends in each line: a chain of links, exactly."""
+    n, length, mass, EA, g, lift = 30, 60.0, 8.0, 1e7, 9.81, 9000.0
+    radius, depth = 40.0, 50.0
+    points: dict[str, Any] = {
+        f"anchor{k}": {"position": [radius * np.cos(x), radius * np.sin(x), -depth]}
+        for k, x in enumerate(2.0 * np.pi * np.arange(3) / 3.0)
+    }
+    points["buoy"] = {"kind": "free", "initial_guess": [3, -2, -6], "force": [0, 0, lift]}
+    sections = [{"length": length, "mass": mass, "axial_stiffness": EA}]
+    lines = {}
+    for k in range(3):
+        ends = ("buoy", f"anchor{k}") if flipped and k == 1 else (f"anchor{k}", "buoy")
+        lines[f"line{k}"] = {"start": ends[0], "end": ends[1], "sections": sections, "mesh": {"cells": n}}
+    states = equilibrium({"points": points, "lines": lines}).found.states
+
+    h, w = length / n, mass * length / n * g
+
+    def reached(level: float) -> np.ndarray:
+        up = lift / 3.0 - 0.5 * w - w * np.arange(n)  # vertical force in the links from the buoy down
+        T = np.hypot(level, up)
+        return h * (1.0 + T / EA) * np.array([level / T, up / T])
+
+    level = root(lambda x: reached(x[0])[0].sum() - radius, np.array([3000.0]), tol=1e-14).x[0]
+    top = -depth + reached(level)[1].sum()
+    for k, state in enumerate(states):
+        buoy = state.r[0] if flipped and k == 1 else state.r[-1]
+        assert np.abs(buoy - [0.0, 0.0, top]).max() < 1e-9 * length
+        T = np.hypot(level, lift / 3.0 - 0.5 * w - w * np.arange(n))
+        mine = state.T if flipped and k == 1 else state.T[::-1]
+        assert np.abs(mine - T).max() < 1e-9 * T.max()
+
+
+def test_lines_that_go_slack_are_refused_with_their_name() -> None:
+    """A point that is pulled along one line leaves the other, too long for it, without tension."""
+    section = {"mass": 1.0, "axial_stiffness": 1e6}
+    tables = {
+        "environment": {"gravity": 0.0},
+        "points": {
+            "a": {"position": [0, 0, 0]}, "b": {"position": [10, 0, 0]},
+            "knot": {"kind": "free", "initial_guess": [5, 0, -1], "force": [-100, 0, 0]},
+        },
+        "lines": {
+            "short": {"start": "a", "end": "knot", "sections": [section | {"length": 6}], "mesh": {"cells": 4}},
+            "long": {"start": "knot", "end": "b", "sections": [section | {"length": 18}], "mesh": {"cells": 4}},
+        },
+    }  # fmt: skip
+    with pytest.raises(ComputationError) as refused:
+        equilibrium(tables)
+    assert refused.value.outcome in (Outcome.SLACK, Outcome.SINGULAR, Outcome.NOT_CONVERGED)
+    assert "line " in str(refused.value) or "the points" in str(refused.value)
