@@ -91,6 +91,7 @@ class Simulation:
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
         self._closed, self._failed, self._stack, self._owner = False, "", ExitStack(), object()
+        self._saves = 0  # how often `save` was called
         if isinstance(self._target, Path):
             self._stack.enter_context(locked(self._target))
         compile_beside(self.scene)
@@ -133,9 +134,12 @@ class Simulation:
     def advance(self, until: float) -> float:
         """Steps to a time `until` (s), where one ends; returns it.  Ends that are set reach their place there.
 
-        ValueError: a time that has passed, or beyond the scene's duration.
+        ValueError: a time that has passed, or beyond the scene's duration; a step has failed and nothing was restored.
         """
         self._check_open()
+        if self._failed:
+            reason = self._failed.splitlines()[0]
+            raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
         if isinstance(until, bool) or not isinstance(until, int | float | np.integer | np.floating):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
         now, duration = self.t, self.scene.require_time().duration
@@ -288,7 +292,8 @@ class Simulation:
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
         loads = run.model.ends.keep_loads()
-        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner)
+        self._saves += 1
+        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner, self._saves)
 
     def restore(self, saved: Any) -> None:
         """Back to what `save` returned.
@@ -298,6 +303,8 @@ class Simulation:
         self._check_open()
         if not isinstance(saved, _Saved) or saved.owner is not self._owner:
             raise ValueError("restore: expected what save() of this Simulation has returned")
+        if saved.number < self._saves:
+            raise ValueError("a later save() has made final what came after this one")
         self._recorder.back_to(saved.mark)
         if isinstance(saved.state, bytes):
             self._loop = self._case.again(
@@ -380,6 +387,7 @@ class _Saved(NamedTuple):
     loads: Any
     model: Model
     owner: object  # what tells one Simulation from another
+    number: int  # of the save, from 1
 
 
 def _vector(x: Sequence[float] | Floats, name: str) -> Floats:

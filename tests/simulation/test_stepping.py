@@ -316,3 +316,30 @@ def test_stops_that_differ_by_round_off_are_one() -> None:
     ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}
     result = hybrid.run(rod(ends=ends, output={"every": 0.03, "exact": True}))
     assert result["steps/dt"].min() > 1e-3 and result.status == "complete"
+
+
+@pytest.mark.parametrize("model", ["rod", "{kind: adaptive, tolerance: 2.0e-5}"])
+def test_only_the_last_save_is_restored(model: str) -> None:
+    with hybrid.Simulation(touchdown(f"model={model}", PINNED)) as simulation:
+        first = simulation.save()
+        driven(simulation, 3)
+        second = simulation.save()
+        driven(simulation, 3)
+        with pytest.raises(ValueError, match="later save"):
+            simulation.restore(first)
+        assert simulation.t == pytest.approx(0.3)
+        simulation.restore(second)
+        assert simulation.t == pytest.approx(0.15)
+
+
+def test_after_a_failed_step_it_asks_for_a_restore() -> None:
+    with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
+        saved = simulation.save()
+        simulation.set_end("end", [150.0, 0.0, 0.0])
+        with pytest.raises(hybrid.ComputationError):
+            simulation.step()
+        with pytest.raises(ValueError, match="a step has failed"):
+            simulation.step()
+        simulation.restore(saved)
+        driven(simulation, 2)
+        assert simulation.t == pytest.approx(0.1)
