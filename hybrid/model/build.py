@@ -250,13 +250,25 @@ def given_zones(scene: Scene, layout: Layout) -> np.ndarray:
 
 def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
     """The most (K,) rad/m by which turns, motions and moments of the ends can twist a cable that is all rod, at s."""
-    twisted = prescribed_twist(scene.ends)
-    moments = [load.value for end in scene.ends.both for load in end.loads if load.what == "moment"]
+    twisted, resists = prescribed_twist(scene.ends), _resists_spin(scene, cable)
+    given = [[load.value for load in end.loads if load.what == "moment"] for end in scene.ends.both]
+    takes = [end.holds_twist or bool(loads) or resists for end, loads in zip(scene.ends.both, given, strict=True)]
+    moments = given[0] * takes[1] + given[1] * takes[0]
     if scene.dimension == 2 or not (twisted or moments):
         return np.zeros(s.size)
     give = 1.0 / cable.B[:, 2]
     torque = twisted / float(give @ np.diff(cable.bounds)) + sum(float(np.linalg.norm(x)) for x in moments)
     return np.asarray(np.minimum(torque * give, MOST_FOR_TWIST * TWIST / scene.length)[cable.piece(s)])
+
+
+def _resists_spin(scene: Scene, cable: Material) -> bool:
+    """Whether a rod takes the torque of one end although the other turns freely: by inertia or by its sections.
+
+    Along round, straight sections without inertia the torque is the same everywhere: an end that turns freely makes it
+    0, whatever moment the other one bears, and that moment only bends.
+    """
+    inert = not isinstance(scene.model, AdaptiveModel) and bool(cable.polar.any())  # rods that come and go have none
+    return inert or bool(cable.kappa[:, :2].any() or (cable.B[:, 0] != cable.B[:, 1]).any())
 
 
 def _placed(

@@ -6,6 +6,8 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.model.build import twist_rate
+from hybrid.model.material import material
 
 # Estimated over true error, as asked of the project; where it is below, an event must say that it is uncertain.
 SHARP = 0.7, 3.0
@@ -137,3 +139,26 @@ def test_cells_show_a_twist_by_a_moment():
     })  # fmt: skip
     assert result.attributes["cells"] >= 160
     np.testing.assert_allclose(result["twist"][0], 2.0, rtol=1e-3)
+
+
+@pytest.mark.parametrize(
+    "start, more, twisted",
+    [
+        ({"kind": "pinned", "position": [0, 0, 0]}, {}, False),
+        ({"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0], "swivel": True}, {}, False),
+        ({"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}, {}, True),
+        ({"kind": "free", "moment": [0, -2.0, 0]}, {}, True),
+        ({"kind": "pinned", "position": [0, 0, 0]}, {"bending_stiffness": [1, 2]}, True),
+        ({"kind": "pinned", "position": [0, 0, 0]}, {"diameter": 0.02}, True),
+    ],
+)
+def test_a_moment_twists_only_what_takes_its_torque(start, more, twisted):
+    """Torque is uniform along round sections without inertia: an end that turns freely makes it 0."""
+    section = {"length": 20, "mass": 1, "bending_stiffness": 1, "torsional_stiffness": 1} | more
+    scene = hybrid.validate_scene({
+        "cable": {"sections": [section]}, "model": "rod", "time": {"duration": 1.0, "step": 0.1},
+        "initial": {"kind": "straight", "origin": [0, 0, 0], "direction": [1, 0, 0]},
+        "ends": {"start": start, "end": {"kind": "free", "moment": [0, 2.0, 0]}},
+    })  # fmt: skip
+    rate = twist_rate(scene, material(scene), np.array([10.0]))
+    assert rate[0] == pytest.approx((4.0 if "moment" in start else 2.0) if twisted else 0.0)
