@@ -20,7 +20,8 @@ CELLS, STEPS, POINTS = 2.0, 4.0, 201
 # Rod cells in a base cell of zones that move.
 MOST_PARTS = 24.0
 # Part of the outputs of an irregular motion whose curvature cells must show.  With 1 (the largest) the ten storms of
-# bench/test_bench_irregular.py take 3.5 times as long and are no better; with 0.9 largest forces are wrong unsaid.
+# bench/test_bench_irregular.py take about three times as long and are hardly better; with 0.9 largest forces are wrong
+# without an event.  Chosen on these ten.
 OFTEN = 0.98
 # Share of an error of curvature, moment or tension along the line that zones may make.
 OF_ALONG = 0.5
