@@ -253,8 +253,7 @@ def twists() -> Iterator[Case]:
     """A taut shaft clamped at both ends, one of them rolled by up to 50 turns."""
     source = (
         "M = GJ θ/L while it is straight, and straight is stable below Greenhill's 2 sqrt(EI T); round-off 1e-9; more than "
-        "2 rad a cell: stopped; beyond Greenhill: an event says that only symmetry keeps it straight; zones that move carry no "
-        "torque while a part is catenary, and say so"
+        "2 rad a cell: stopped; beyond Greenhill: an event says that only symmetry keeps it straight"
     )
     draws = spread(
         25, 40, turns=[0.1, 0.5, 3.0, 10.0, 50.0], n=[8, 20, 60, 200], EI=(1e-9, 1e6), L=(0.1, 1e4), part=[0.1, 0.5, 0.9, 1.5], axis=list(AXES),

@@ -90,7 +90,6 @@ CASES = {
     "guided surge": (EVERYTHING, "motion: {pitch: {amplitude: 3.0", "motion: {surge: §{amplitude: 3.0", "ends.end.motion.surge", "clamped"),
     "pinned roll": (OCEAN, "heave", "roll", "ends.end.motion.roll", "clamped"),
     "motion twice": (OCEAN, "ramp: 16.0", "file: x.csv", "ends.end.motion.heave", "leave file out"),
-    "ramp with file": (OCEAN, HEAVE, "{file: x.csv, ramp: §3}", "ends.end.motion.ramp", "leave ramp out"),
     "no motion": (OCEAN, HEAVE, "§{}", "ends.end.motion", "leave motion out"),
     "no ramp": (OCEAN, HEAVE, "§{heave: {amplitude: 2.0, period: 8.0}}", "ends.end.motion", "give `ramp: 16`"),
     "no ramp, phase 90": (OCEAN, HEAVE, "§{heave: {amplitude: 2.0, period: 8.0, phase: 90}}", "ends.end.motion", "give `ramp: 16`"),
