@@ -55,14 +55,14 @@ def node_rows_times(l, X, p):
 
 
 @inner
-def keep(X, k, size, K, lower, B0, B1, B2):
+def keep(X, k, size, K, lower, pivot):
     """Keep at X[k:] what another right-hand side needs of a block; lower: of the balance, two rows over dT, dr before."""
     for j in range(4):
         X[k + j] = K[j]
     for j in range(6):
         X[k + LOWER + 3 + j] = lower[j]
-    for j in range(3):
-        X[k + PIVOT + j], X[k + PIVOT + 3 + j], X[k + PIVOT + 6 + j] = B0[j], B1[j], B2[j]
+    for j in range(9):
+        X[k + PIVOT + j] = pivot[j]
     X[k + SIZE_AT] = size
 
 
@@ -90,7 +90,8 @@ def eliminate2(row, hck, gap, K, L, back, D, ahead, U, V, b, X, i, kept, size):
     B2 = (back[1] - z[0], D2[0] - z[1], D2[1] - z[2], ahead[1], U[2] - z[3], U[3] - z[4], V[2], V[3], b2 - z[5])
     if kept > 0:
         X[kept + LOWER], X[kept + LOWER + 1], X[kept + LOWER + 2] = 0.0, -row[0], -row[1]
-        keep(X, kept, size, K, (t1, L1[0], L1[1], t2, L2[0], L2[1]), B0, B1, B2)
+        pivot = (B0[0], B0[1], B0[2], B1[0], B1[1], B1[2], B2[0], B2[1], B2[2])
+        keep(X, kept, size, K, (t1, L1[0], L1[1], t2, L2[0], L2[1]), pivot)
     # Gauss-Jordan in registers; a pivot of zero makes everything infinite or NaN, which is seen at the end
     if abs(B1[0]) > abs(B0[0]):
         B0, B1 = B1, B0
@@ -138,7 +139,8 @@ def eliminate_chain(row, hck, gap, L, back, D, ahead, U, b, X, i, kept, size):
         B2 = subtract_chain(B2, (L[2], L[3]), X, p, q)
     if kept > 0:
         X[kept + LOWER], X[kept + LOWER + 1], X[kept + LOWER + 2] = 0.0, -row[0], -row[1]
-        keep(X, kept, size, (0.0, 0.0, 0.0, 0.0), (0.0, L[0], L[1], 0.0, L[2], L[3]), B0, B1, B2)
+        pivot = (B0[0], B0[1], B0[2], B1[0], B1[1], B1[2], B2[0], B2[1], B2[2])
+        keep(X, kept, size, (0.0, 0.0, 0.0, 0.0), (0.0, L[0], L[1], 0.0, L[2], L[3]), pivot)
     G0 = (B0[0], B0[1], B0[2], 0.0, 0.0, 0.0, B0[3])
     G1 = (B1[0], B1[1], B1[2], ahead[0], U[0], U[1], B1[3])
     G2 = (B2[0], B2[1], B2[2], ahead[1], U[2], U[3], B2[3])
