@@ -57,7 +57,7 @@ def beside(
     finally:
         if any(not future.done() for future in futures):
             stop()
-        pool.shutdown(wait=False, cancel_futures=True)
+        pool.shutdown(wait=True, cancel_futures=True)  # so that none writes a file after it was removed
 
 
 def _found(task: Callable[[], Found], future: Future[Found], look: Callable[[], None]) -> Found:
