@@ -101,6 +101,17 @@ def along_polyline(points: Floats, s: Floats) -> Floats:
     return np.column_stack([np.interp(s * knots[-1] / s[-1], knots, points[:, k]) for k in range(3)])
 
 
+def dead_loads(line: Line) -> Floats:
+    """Weight and full buoyancy (N+1, 3) N on the nodes of a line, which do not change as it moves."""
+    loads = line.force.copy()
+    if line.bits & SURFACE:
+        loads[:-1, 2] += line.buoy
+        loads[1:, 2] += line.buoy
+        if line.bits & BODIES:
+            loads[:, 2] += line.point_buoy
+    return loads
+
+
 def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
     """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
 
@@ -116,12 +127,7 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
     stiff = any(end.held_tangent for end in scene.ends.both)
     if not any(places) or (stiff and not all(places)):  # what is clamped at one end starts along its clamp
         return None
-    loads = line.force.copy()
-    if line.bits & SURFACE:
-        loads[:-1, 2] += line.buoy
-        loads[1:, 2] += line.buoy
-        if line.bits & BODIES:
-            loads[:, 2] += line.point_buoy
+    loads = dead_loads(line)
     floating = _floating_end(scene, line)
     if floating is not None:
         loads[floating, 2] -= line.point_buoy[floating]

@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.forces import BODIES, SURFACE
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
+from hybrid.model.initial_shape import dead_loads
 from hybrid.scene.system import FixedPoint, System
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
@@ -117,13 +117,7 @@ def balanced_places(system: System, model: SystemModel) -> Floats | None:
 
 def _loads(model: Model) -> Floats:
     """Dead loads (N+1, 3) N on the nodes of a line: weight, full buoyancy, forces at its ends."""
-    line = model.line
-    loads = line.force.copy()
-    if line.bits & SURFACE:
-        loads[:-1, 2] += line.buoy
-        loads[1:, 2] += line.buoy
-        if line.bits & BODIES:
-            loads[:, 2] += line.point_buoy
+    loads = dead_loads(model.line)
     force = model.ends.at(np.inf).force
     loads[0] += force[0]
     loads[-1] += force[1]

@@ -1,9 +1,14 @@
-"""Motion files that do not start at rest where the end is: the event that says how they are blended in."""
+"""What an end does that the start of a cable does not fit: blended in, with an event that says how.
+
+Motion files that do not start at rest where the end is, and tangents that the initial shape does not have.
+"""
 
 from __future__ import annotations
 
 import numpy as np
 
+from hybrid.kernels.state import State
+from hybrid.model.build import Model
 from hybrid.scene.motion_file import read_record
 from hybrid.scene.schema import Scene
 from hybrid.simulation.events import EventLog
@@ -34,3 +39,19 @@ def note_blended(scene: Scene, events: EventLog) -> None:
             "followed exactly from then on"
         )
         events.event(0.0, s, s, "motion blended in", text)
+
+
+def rotate_ends_in(scene: Scene, model: Model, state: State, events: EventLog) -> None:
+    """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
+    e = state.e
+    d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
+    which = [bool(model.line.element[0]), bool(model.line.element[-1])]
+    duration = min(model.time_scale, 0.5 * scene.require_time().duration)
+    for k, angle in model.ends.bring_in(d, which, duration):
+        s = float(model.line.s[-k])
+        text = (
+            f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
+            f"it is rotated to it, and a force there grows, over the first {duration:.3g} s; "
+            f"start from an equilibrium to avoid this"
+        )
+        events.event(0.0, s, s, "end rotated in", text)

@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.binding import Table
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.self_contact_law import OUTER
@@ -29,7 +30,9 @@ from hybrid.kernels.self_distance import (
 )
 from hybrid.kernels.state import Floats, State
 from hybrid.model.build import Model
+from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
+from hybrid.solve.self_contact import SelfContact
 from hybrid.store.format import Field
 
 GROUP = "self_distance"
@@ -142,3 +145,12 @@ def is_bent(state: State) -> bool:
     along, c = state.e @ (state.r[-1] - state.r[0]), state.r[-1] - state.r[0]
     size = np.linalg.norm(state.e, axis=1) * np.linalg.norm(c)
     return bool((~((along > 0.0) & (along >= TURNED * size))).any())
+
+
+def refuse_start_in_itself(contact: SelfContact, scene: Scene, model: Model) -> None:
+    """SceneError: parts of the line are in each other at the start, and contact could not tell to which side."""
+    if not np.isfinite(contact.energy()):
+        s, other = (float(model.line.s[k]) for k in contact.deepest)
+        given = f"{scene.initial.kind}, where the line is within itself at s = {s:.6g} m and s = {other:.6g} m"
+        fix = "another start, a smaller diameter, or contact: {self: false}"
+        raise SceneError([Complaint("initial", given, "a start in which the line does not cross itself", fix)])

@@ -18,6 +18,7 @@ from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, Stop
 from hybrid.simulation.failure import explanation, failed_node, first_remedy, snapshot
+from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.releases import due
 from hybrid.simulation.restart import LoadChange
 from hybrid.simulation.restore import program, resolution_tree
@@ -107,7 +108,7 @@ class TimeLoop:
         try:
             for change in changes[run.changes :]:
                 self.until(change.t, exact)
-                run.change_loads(change.scene)
+                change_loads(run, change.scene)
                 self._settle()
                 self._checkpoint()
             self.until(duration, exact)

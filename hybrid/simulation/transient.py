@@ -8,33 +8,30 @@ decides that a healthy step was the last: simulation.time_loop.
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
 from hybrid.adapt.manager import Change
-from hybrid.errors import Complaint, Outcome, SceneError
+from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.state import State, blank_state
 from hybrid.kernels.step_law import FIRST
-from hybrid.model.build import Model, build
+from hybrid.model.build import Model
 from hybrid.model.plan import parts
-from hybrid.model.plane import in_space, planar
-from hybrid.model.release import released_as
 from hybrid.model.resolution import Resolution
 from hybrid.model.scales import wave_step
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
-from hybrid.simulation.blended import note_blended
+from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
-from hybrid.simulation.plane_monitor import PlaneMonitor, same_plane
+from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
-from hybrid.simulation.self_watch import diameters
-from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
+from hybrid.simulation.self_watch import diameters, refuse_start_in_itself
+from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.statics import Equilibrium
@@ -155,7 +152,7 @@ class Transient:
             note_blended(self.scene, self.events)
         if equilibrium is None:
             state = model.start.copy()
-            self._rotate_ends_in(state)
+            rotate_ends_in(self.scene, model, state, self.events)
             if not state.v.any():
                 self.stepper.static_friction(model.sea.at(0.0), model.ends.at(0.0), state)
         else:
@@ -165,7 +162,8 @@ class Transient:
             self.envelope.count_from(begun, state.r)
         self.set_model(begun, state)
         if self.run.contact is not None:
-            self._refuse_to_start_in_itself(self.run.contact)
+            self.stepper.work.u[:] = 0.0
+            refuse_start_in_itself(self.run.contact, self.scene, begun)
         self._find_accelerations()
         if self.switching is not None:
             self.switching.begin(begun.ends.values, state)
@@ -176,31 +174,6 @@ class Transient:
         self.run.place(state.r[first].copy())
         if self.envelope is not None:
             self.envelope.itself.look_at_start(self.run, self.events.event)
-
-    def _refuse_to_start_in_itself(self, contact: SelfContact) -> None:
-        """SceneError: parts of the line are in each other at the start, and contact could not tell to which side."""
-        self.stepper.work.u[:] = 0.0
-        if not np.isfinite(contact.energy()):
-            s, other = (float(self.model.line.s[k]) for k in contact.deepest)
-            given = f"{self.scene.initial.kind}, where the line is within itself at s = {s:.6g} m and s = {other:.6g} m"
-            fix = "another start, a smaller diameter, or contact: {self: false}"
-            raise SceneError([Complaint("initial", given, "a start in which the line does not cross itself", fix)])
-
-    def _rotate_ends_in(self, state: State) -> None:
-        """Tangents that the initial shape does not have are reached smoothly, and an event says so."""
-        assert self.scene.time is not None
-        model, e = self.model, state.e
-        d = (e[0] / np.linalg.norm(e[0]), e[-1] / np.linalg.norm(e[-1]))
-        which = [bool(model.line.element[0]), bool(model.line.element[-1])]
-        duration = min(model.time_scale, 0.5 * self.scene.time.duration)
-        for k, angle in model.ends.bring_in(d, which, duration):
-            s = float(model.line.s[-k])
-            text = (
-                f"the initial shape misses the tangent prescribed at s = {s:g} m by {np.degrees(angle):.3g} deg: "
-                f"it is rotated to it, and a force there grows, over the first {duration:.3g} s; "
-                f"start from an equilibrium to avoid this"
-            )
-            self.events.event(0.0, s, s, "end rotated in", text)
 
     def _find_accelerations(self, new_leg: bool = True) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
@@ -419,33 +392,6 @@ class Transient:
         self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
             run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
-
-    def change_loads(self, scene: Scene) -> None:
-        """Other loads, and other motions of the ends, from now on; the cable stays what it is and where it is."""
-        old, monitor, state = self.model, self.plane_monitor, self.state.copy()
-        model = build(scene, self.resolution, old.mesh)
-        if self.switching is not None:
-            model = on_layout(model, self.switching.manager.layout)
-            self.switching.release_joints(state)
-        model = released_as(model, old.ends.released, self.t)
-        model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
-        model.ends.go_on_from(old.ends, self.t)
-        self.scene, self.changes = scene, self.changes + 1
-        leaves = bool(monitor.speed) and not same_plane(old.plane, model.plane)
-        if old.plane is not None and not leaves:
-            model = replace(model, line=planar(model.line, old.plane), plane=old.plane)
-        elif leaves:
-            model = monitor.leave(replace(model, plane=old.plane), self.run, state)
-        else:
-            model = replace(model, line=in_space(model.line), plane=None)
-        self.set_model(model, state)
-        if self.switching is not None:
-            self.switching.manager.load(model.ends.moments)
-        text = (
-            f"from t = {self.t:.6g} s on other loads act, or the ends move otherwise, as `hybrid resume` was asked to"
-        )
-        self.events.event(self.t, 0.0, model.length, "loads change", text)
-        self.restart()
 
     def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""

@@ -37,9 +37,20 @@ def amend(
     values (n, ...) of n outputs; others: gives attributes, and events of all the cable (kind, text), after the last
     block, from the events that the result has; done: whether nothing is left to go on with.
     """
+
+    def add(file: h5py.File) -> None:
+        if done and BEFORE in file:
+            del file[BEFORE]
+        _add(file, fields, blocks, others)
+
+    change_complete(target, add)
+
+
+def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], None]) -> None:
+    """Change a complete result, in a copy that takes its place; ResultError where it cannot be written."""
     if isinstance(target, io.BytesIO):
         with in_memory(target.getvalue()) as file:
-            _add(file, fields, blocks, others)
+            change(file)
             file.flush()
             image = file.id.get_file_image()
         target.seek(0)
@@ -51,9 +62,7 @@ def amend(
     try:
         copy_unsigned(target, new)
         with redrafted(new) as file:
-            if done and BEFORE in file:
-                del file[BEFORE]
-            _add(file, fields, blocks, others)
+            change(file)
         sign(new)
         os.replace(new, target)
     except (OSError, RuntimeError) as error:

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import io
-import os
 from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import h5py
 
-from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
-from hybrid.store.integrity import copy_unsigned, sign
+from hybrid.store.amend import change_complete
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -21,27 +19,7 @@ GROUP = "lines"
 
 def write_lines(target: Path | io.BytesIO, images: Mapping[str, bytes]) -> None:
     """Put results, each the bytes of a file, into a complete result; ResultError where it cannot be written."""
-    if isinstance(target, io.BytesIO):
-        with in_memory(target.getvalue()) as file:
-            _add(file, images)
-            file.flush()
-            image = file.id.get_file_image()
-        target.seek(0)
-        target.truncate()
-        target.write(image)
-        return
-    target = target.expanduser().resolve()
-    new = beside(target)  # and then in its place: somebody may be reading
-    try:
-        copy_unsigned(target, new)
-        with redrafted(new) as file:
-            _add(file, images)
-        sign(new)
-        os.replace(new, target)
-    except (OSError, RuntimeError) as error:
-        raise unwritable(target, error, "free some disk space; close programs that hold the file") from error
-    finally:
-        new.unlink(missing_ok=True)
+    change_complete(target, lambda file: _add(file, images))
 
 
 def _add(file: h5py.File, images: Mapping[str, bytes]) -> None:

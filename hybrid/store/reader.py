@@ -37,7 +37,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from h5py import h5a, h5d, h5ds, h5g, h5o, h5s
+from h5py import h5d, h5ds, h5g, h5o
 
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
@@ -45,6 +45,7 @@ from hybrid.store.hdf5_file import check_format, open_file
 from hybrid.store.integrity import readable
 from hybrid.store.lines import GROUP, Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
+from hybrid.store.plain_datasets import dims_of, units_of, values_of
 from hybrid.store.records import (
     THERE,
     Attributes,
@@ -109,7 +110,7 @@ class Result:
 
         self._root.id.links.visit(visit)
         self.names, self._data = tuple(data), data
-        self._dims, self.units = Looked(data, _dims), Looked(data, _units, ALIASES)
+        self._dims, self.units = Looked(data, dims_of), Looked(data, units_of, ALIASES)
         # Taken once, so that everything read later shows the same moment of a file that grows.
         # t first: the zones of an output are complete before its time is.
         scales = [n for n, each in data.items() if h5ds.is_scale(each) and self._dims[n] == (n,)]
@@ -177,7 +178,7 @@ class Result:
                 raise ResultError(f"'{name}' was not read before the result was closed; open the file again")
             dims, _ = self._dims[name], self.units[name]  # which stay with it when the file is closed
             with readable(self._source):
-                array = _values(self._refreshed(name), self._rows.get(dims[0]) if dims else None)
+                array = values_of(self._refreshed(name), self._rows.get(dims[0]) if dims else None)
             if array.dtype.kind == "S":
                 array = np.char.decode(array, "utf-8", "replace")
             array.setflags(write=False)  # it is shared by everyone who asks again
@@ -420,33 +421,6 @@ def _interpolate(array: np.ndarray, axis: int, grid: np.ndarray, where: Any, dim
 def _current(name: str) -> str:
     """The name a dataset has now, from an alias or from the name an older version gave it."""
     return ALIASES.get(name) or OLD_NAMES.get(name, name)
-
-
-def _values(data: Any, rows: int | None) -> np.ndarray:
-    """The first rows of a dataset of HDF5's own interface; None: all of it."""
-    shape = data.shape if rows is None else (rows, *data.shape[1:])
-    out = np.empty(shape, data.dtype)
-    if out.size:
-        there = data.get_space()
-        if rows is not None:
-            there.select_hyperslab((0,) * len(shape), shape)
-        data.read(h5s.create_simple(shape) if shape else h5s.create(h5s.SCALAR), there, out)
-    return out
-
-
-def _dims(data: Any) -> tuple[str, ...]:
-    """Names of the dimensions of a dataset of HDF5's own interface."""
-    return tuple(plain_text(h5ds.get_label(data, k)) for k in range(data.rank))
-
-
-def _units(data: Any) -> str:
-    """The unit of a dataset of HDF5's own interface; empty if it has none."""
-    if not h5a.exists(data, b"units"):
-        return ""
-    attribute = h5a.open(data, b"units")
-    value = np.empty(attribute.shape, attribute.dtype)
-    attribute.read(value)
-    return plain_text(value[()])
 
 
 def _plain(value: Any) -> Any:
