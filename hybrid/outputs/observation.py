@@ -16,8 +16,9 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.kernels.energies import observe
+from hybrid.kernels.link import link_of
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY, SELF_CONTACT_ENERGY
-from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea
+from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, sum_down, touchdown
@@ -308,6 +309,19 @@ class Observation:
         t /= np.maximum(size(t), 1e-12)[:, None]
         bending = moment - dot(moment, t)[:, None] * t
         return np.asarray((bending * bending).sum(axis=1)[self.grid.side_nodes])
+
+    @cached_property
+    def link(self) -> Floats:
+        """(4, nb): turns of twist, writhe and link, crossings; of what was computed."""
+        if self._corrects is not None:
+            return self._corrects.link
+        b, rows = self.batch, []
+        ends = map(Ends, b.held, b.position, b.frame, b.spin, b.force, b.moment)
+        for k, row in enumerate(
+            zip(ends, b.r, b.e, b.a1, b.turn if b.turn.size else [NO_TURN] * b.t.size, strict=True)
+        ):
+            rows.append(link_of(b.line(k, self.line), *row))
+        return np.stack(rows, axis=1)
 
     # ---- at the ends --------------------------------------------------------------------------
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
@@ -36,7 +37,8 @@ class Probe:
 
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
-MAY_BE_NAN = ("touchdown", "touchdown_position")  # of a line that touches nothing
+# Of a line that touches nothing; where a section without torsional stiffness becomes catenary.
+MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link")
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
@@ -63,6 +65,12 @@ PROBES: dict[str, Probe] = {
         "m", "arc lengths of the first and last point in contact; NaN: none", _E, lambda v: v.touchdown.edges, "seabed"
     ),
     "touchdown_position": Probe("m", "where they are", _EX, lambda v: v.touchdown.places, "seabed", frame="inertial"),
+    "turns/twist": Probe("", "twist of the material frame from end to end, turns", (), lambda v: v.link[TWIST], "link"),
+    "turns/writhe": Probe("", "writhe of the centreline, closed beyond its ends", (), lambda v: v.link[WRITHE], "link"),
+    "turns/link": Probe("", "twist and writhe: turns between the ends", (), lambda v: v.link[LINK], "link"),
+    "turns/crossings": Probe(
+        "", "signed crossings as seen from the side: right-handed loops", (), lambda v: v.link[CROSSINGS], "link"
+    ),
     "energy/kinetic": Probe("J", "kinetic energy, with rotary inertia", (), lambda v: v.energies["kinetic"]),
     "energy/potential": Probe(
         "J", "potential energy of weight and buoyancy, zero at z = 0", (), lambda v: v.energies["potential"]
@@ -158,6 +166,7 @@ class Observer:
         self._place(line, sea, zones, s)
         has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
         has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
+        has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
         has |= {"self_contact"} if line.bits & SELF_CONTACT else set()
         self._probes = {
             name: p

@@ -64,3 +64,15 @@ def test_the_localised_loop():
     assert torque / 0.8 + 4.0 * math.acos(m) == pytest.approx(16.0 * math.pi, rel=1e-3)
     needed = formation_tension(np.array([torque]), np.ones(1))[0]
     assert needed == pytest.approx(tension, rel=0.12) and needed < tension  # near the margin of forming
+
+
+@pytest.mark.parametrize(("slack", "turns"), [(0.0614, 8.0), (0.0614, -8.0), (0.004, 1.3)])
+def test_link_is_the_turns_put_in(slack, turns):
+    """Twist goes into writhe, and their sum stays; a closed polygon has no error of cells in it."""
+    found = clamped(slack, turns)
+    assert found["turns/link"][0] == pytest.approx(turns, abs=1e-9)
+    assert found["turns/twist"][0] == pytest.approx(found["torque"][0].mean() / (0.8 * 2.0 * math.pi), rel=2e-3)
+    if abs(turns) == 8.0:  # 4 acos m of the localised loop, in turns
+        m = abs(found["torque"][0].mean()) / (2.0 * math.sqrt(found["reaction_end"][0, 0]))
+        writhe = math.copysign(4.0 * math.acos(m) / (2.0 * math.pi), turns)
+        assert found["turns/writhe"][0] == pytest.approx(writhe, rel=0.02)

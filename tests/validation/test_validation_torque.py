@@ -74,6 +74,8 @@ def test_torque_in_motion():
     torque = rod["torque"][:]
     assert np.ptp(torque.mean(axis=1)) > 0.2  # it changes by more than a tenth
     np.testing.assert_allclose(mixed["torque"][:].mean(axis=1), torque.mean(axis=1), rtol=1e-3)
+    np.testing.assert_allclose(mixed["turns/link"], rod["turns/link"], atol=1e-9)
+    assert np.ptp(rod["turns/link"][:]) > 0.3
     scheme = [np.abs(x["work/scheme"][:]).max() for x in (rod, mixed)]
     assert scheme[1] < 1.1 * scheme[0]
     assert np.abs(mixed["work/zones"][:]).max() > 0.0
