@@ -27,7 +27,7 @@ from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
 # Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
 # (kernels.self_contact).
 ADDRESS, ASKED, NEAR = range(3)
-PREPARE, LIMIT, TOUCH, FINISH = range(4)
+PREPARE, LIMIT, TOUCH, FINISH, REST = range(5)
 call_contact = caller(0.0)
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it

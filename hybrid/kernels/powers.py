@@ -6,7 +6,7 @@ import math
 
 from hybrid.kernels.books import CONTACT, FRICTION, RATES, STORED, WORKS
 from hybrid.kernels.compile import inner
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import (
     ADDED_MASS_POWER,
@@ -17,6 +17,7 @@ from hybrid.kernels.report import (
     MASS_DAMPING_POWER,
     MOMENT_A,
     SEABED_ENERGY,
+    SELF_FRICTION_WORK,
     STIFFNESS_DAMPING_POWER,
     WAVE_POWER,
 )
@@ -76,6 +77,8 @@ def book_work(line, dt, report, books):
         work[0, CONTACT] += report[CONTACT_WORK] + report[SEABED_ENERGY] - clock[STORED]
         work[0, FRICTION] += report[FRICTION_WORK]
         clock[STORED] = report[SEABED_ENERGY]
+    if line.bits & SELF_CONTACT:
+        work[0, FRICTION] += report[SELF_FRICTION_WORK]
 
 
 @inner

@@ -22,6 +22,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     WRONG_PIVOTS              how many pivots of the push's equations have the wrong sign      -
     LOCAL_ERROR, ..._NODE     local error of position that the step makes, and its node        m, -
     SELF_CONTACT_ENERGY       energy of the contact of the line with itself                    J
+    SELF_FRICTION_WORK        work of its friction in the step, and what that has stored more  J
 """
 
 from __future__ import annotations
@@ -37,5 +38,5 @@ SLACKEST, SLACKEST_CELL = 26, 27
 SEABED_ENERGY = 28
 PUSH_ENERGY, WRONG_PIVOTS = 29, 30
 LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
-SELF_CONTACT_ENERGY = 33
-REPORT_SIZE = 34
+SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
+REPORT_SIZE = 35

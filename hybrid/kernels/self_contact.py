@@ -18,19 +18,36 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.block_elimination import solve_again
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, TRY_END
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, NOW, PARITY, RHO, STEP_BEFORE, TRY_END
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.newton import ASKED, LIMIT, NEAR, PREPARE, TOUCH
+from hybrid.kernels.generalized_alpha import scheme
+from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, REST, TOUCH
 from hybrid.kernels.references import reader
+from hybrid.kernels.report import SELF_FRICTION_WORK
+from hybrid.kernels.self_contact_friction import (
+    GRIP,
+    add_held,
+    add_held_product,
+    hold_point,
+    keep_grips,
+    link_grips,
+)
 from hybrid.kernels.self_contact_law import add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import (
     ENERGY,
+    FRESH,
+    FRICTION,
+    GRIPS,
     MOST_PRODUCTS,
     NODES,
     OVERFLOW,
     PART,
     POINTS,
+    SINCE,
+    SLIP_WORK,
     SPEED,
+    STORED,
+    TRIED,
     Contact,
     blank_contact,
     fill_tree,
@@ -73,33 +90,51 @@ read = reader(blank_contact_job())
 
 
 @inner
-def respond(ends, contact, work, with_gradient):
+def respond(line, ends, contact, work, with_gradient):
     """contact.z = A^-1 (H x + g), g where asked; x of the nodes in contact."""
+    held_on = contact.numbers[FRICTION] > 0.0
     x, y, b, count = contact.x, contact.y, contact.b, contact.counts[NODES]
     for k in range(count):
         i = contact.nodes[k]
-        y[i, 0], y[i, 1], y[i, 2] = 0.0, 0.0, 0.0
+        y[i, 0], y[i, 1], y[i, 2], y[i, 3] = 0.0, 0.0, 0.0, 0.0
     for k in range(contact.counts[POINTS]):
         add_product(contact.points[k], x, y)
         if with_gradient:
             add_gradient(contact.points[k], y)
+        if held_on:
+            add_held_product(line, contact, k, x, y)
+            if with_gradient:
+                add_held(line, contact, k, y)
     last = y.shape[0] - 1
     for k in range(count):
         i = contact.nodes[k]
         held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
         for j in range(3):
             b[i, 1 + j] = 0.0 if held else y[i, j]
+        b[i, 4] = y[i, 3]
     good = solve_again(work.X, work.W, b, contact.z)
     for k in range(count):
         i = contact.nodes[k]
-        b[i, 1], b[i, 2], b[i, 3] = 0.0, 0.0, 0.0
+        b[i, 1], b[i, 2], b[i, 3], b[i, 4] = 0.0, 0.0, 0.0, 0.0
     return good
+
+
+@inner
+def unknowns(contact):
+    """Unknowns of a node in contact: its place, with friction the spin of the cell after it too, as a way."""
+    return 4 if contact.numbers[FRICTION] > 0.0 else 3
+
+
+@inner
+def length_of(contact, j, i):
+    """Factor, m, of unknown j of node i: a spin (rad) counts by the radius."""
+    return 0.5 * contact.width[i] if j == 3 else 1.0
 
 
 @inner
 def next_vector(contact, k):
     """Orthogonalise basis vector k + 1 against those before; its length goes into the column k."""
-    V, H, size = contact.basis, contact.hessenberg, 3 * contact.counts[NODES]
+    V, H, size = contact.basis, contact.hessenberg, unknowns(contact) * contact.counts[NODES]
     for j in range(k + 1):
         s = 0.0
         for i in range(size):
@@ -134,40 +169,50 @@ def rotate_column(H, k):
 
 
 @inner
-def solve_contact(ends, contact, work):
-    """Put contact into the correction work.x of a line without it; False if it is not finite."""
+def take_vector(contact, column):
+    """contact.x = the basis vector of a column."""
+    x, V, per = contact.x, contact.basis, unknowns(contact)
+    for k in range(contact.counts[NODES]):
+        i = contact.nodes[k]
+        for j in range(per):
+            x[i, j] = V[column, per * k + j] / length_of(contact, j, i)
+
+
+@inner
+def find_solution(line, ends, contact, work):
+    """GMRES: contact.x = the correction of the nodes in contact, from that of a line without it; False: not finite."""
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
-    count, rhs, solution = contact.counts[NODES], MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
+    count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
     for k in range(count):
         i = contact.nodes[k]
-        x[i, 0], x[i, 1], x[i, 2] = work.x[i, 1], work.x[i, 2], work.x[i, 3]
-    if not respond(ends, contact, work, True):
+        for j in range(per):
+            x[i, j] = work.x[i, 1 + j]
+    if not respond(line, ends, contact, work, True):
         return False
     s = 0.0
     for k in range(count):
         i = contact.nodes[k]
-        for j in range(3):
-            V[0, 3 * k + j] = z[i, 1 + j]
-            s += z[i, 1 + j] * z[i, 1 + j]
+        for j in range(per):
+            y = z[i, 1 + j] * length_of(contact, j, i)
+            V[0, per * k + j] = y
+            s += y * y
     s = math.sqrt(s)
     for i in range(MOST_PRODUCTS + 1):
         H[i, rhs] = 0.0
     H[0, rhs] = s
     done = 0
     if s > 0.0:
-        for i in range(3 * count):
+        for i in range(per * count):
             V[0, i] /= s
         left = s
-        while done < min(MOST_PRODUCTS, 3 * count) and left > SOLVED * s:
-            for k in range(count):
-                i = contact.nodes[k]
-                x[i, 0], x[i, 1], x[i, 2] = V[done, 3 * k], V[done, 3 * k + 1], V[done, 3 * k + 2]
-            if not respond(ends, contact, work, False):
+        while done < min(MOST_PRODUCTS, per * count) and left > SOLVED * s:
+            take_vector(contact, done)
+            if not respond(line, ends, contact, work, False):
                 return False
             for k in range(count):
                 i = contact.nodes[k]
-                for j in range(3):
-                    V[done + 1, 3 * k + j] = V[done, 3 * k + j] - z[i, 1 + j]
+                for j in range(per):
+                    V[done + 1, per * k + j] = V[done, per * k + j] - z[i, 1 + j] * length_of(contact, j, i)
             next_vector(contact, done)
             left = rotate_column(H, done)
             done += 1
@@ -178,17 +223,74 @@ def solve_contact(ends, contact, work):
         H[j, solution] = s / H[j, j]
     for k in range(count):
         i = contact.nodes[k]
-        for m in range(3):
-            s = work.x[i, 1 + m]
+        for m in range(per):
+            s = 0.0
             for j in range(done):
-                s += H[j, solution] * V[j, 3 * k + m]
-            x[i, m] = s
-    if not respond(ends, contact, work, True):
+                s += H[j, solution] * V[j, per * k + m]
+            x[i, m] = work.x[i, 1 + m] + s / length_of(contact, m, i)
+    return True
+
+
+@inner
+def solve_contact(line, ends, contact, work):
+    """Put contact into the correction work.x of a line without it; False if it is not finite."""
+    if not find_solution(line, ends, contact, work) or not respond(line, ends, contact, work, True):
         return False
+    z = contact.z
     for i in range(work.x.shape[0]):
         for j in range(5):
             work.x[i, j] += z[i, j]
     return True
+
+
+# --- friction -------------------------------------------------------------------------------------
+
+
+@inner
+def keep_last(contact, now):
+    """What the last try has left of friction is kept if that was the step that led to the time now."""
+    numbers, counts = contact.numbers, contact.counts
+    if numbers[SINCE] == now:
+        counts[GRIPS], numbers[STORED] = counts[FRESH], numbers[TRIED]
+        for k in range(counts[FRESH]):
+            for j in range(GRIP):
+                contact.grips[k, j] = contact.fresh[k, j]
+    numbers[SINCE] = math.nan
+    link_grips(contact, counts[GRIPS])
+
+
+@inner
+def find_spins(line, contact, clock, near, old, new, u):
+    """contact.x = shifts of nodes and spins of cells in the step that is tried."""
+    x, dt = contact.x, clock[TRY_END] - clock[NOW]
+    cv = scheme(0.0 if near else clock[RHO], clock[STEP_BEFORE], dt).cv
+    for i in range(u.shape[0]):
+        for k in range(3):
+            x[i, k] = u[i, k]
+        x[i, 3] = 0.0
+        if i < line.h.shape[0] and line.spin[i]:
+            ahead = dt * old.wa[i]
+            x[i, 3] = dt * old.w[i] + 0.5 * dt * ahead + (new.w[i] - old.w[i] - ahead) / cv
+
+
+@inner
+def hold_points(line, contact):
+    """Friction of all points of contact at contact.x."""
+    numbers = contact.numbers
+    numbers[SLIP_WORK], numbers[TRIED] = 0.0, 0.0
+    for k in range(contact.counts[POINTS]):
+        work, energy = hold_point(line, contact, numbers[FRICTION], contact.points[k], contact.holds[k])
+        numbers[SLIP_WORK] += work
+        numbers[TRIED] += energy
+
+
+@inner
+def rest_points(line, contact):
+    """Friction of a state in which no step is tried."""
+    for i in range(contact.x.shape[0]):
+        for k in range(4):
+            contact.x[i, k] = 0.0
+    hold_points(line, contact)
 
 
 # --- entry ----------------------------------------------------------------------------------------
@@ -228,11 +330,14 @@ def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
 
     PREPARE, LIMIT: the part of the prediction, of the correction work.x, that is safe; TOUCH: 1, or 0 where it fails;
-    FINISH: the energy of contact, J.
+    FINISH, and REST, where no step is tried: the energy of contact, J.
     """
     job = read(table)
     line, ends, contact, work, phase = job.line, job.ends, job.contact, job.work, job.call[ASKED]
-    old = job.new if job.counts[PARITY] else job.old
+    old, new = (job.new, job.old) if job.counts[PARITY] else (job.old, job.new)
+    rubs, numbers = contact.numbers[FRICTION] > 0.0, contact.numbers
+    if rubs and phase in (PREPARE, REST):
+        keep_last(contact, job.clock[NOW])
     if phase == PREPARE:
         near = prepare(line, ends, contact, old, work.u, job.clock[TRY_END] - job.clock[NOW])
         job.call[NEAR] = 1 if near else 0
@@ -247,8 +352,17 @@ def contact_task(table):
         return contact.numbers[PART]
     place(contact, old, work.u)
     find_points(line, ends, contact)
+    if rubs and phase == REST:
+        rest_points(line, contact)
+    elif rubs:
+        find_spins(line, contact, job.clock, job.call[NEAR] != 0, old, new, work.u)
+        hold_points(line, contact)
+    if phase == FINISH and rubs:
+        keep_grips(line, contact, contact.counts[POINTS])
+        contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock[TRY_END]
+        work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
     if phase != TOUCH:
-        return contact.numbers[ENERGY]
-    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(ends, contact, work)):
+        return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
+    if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):
         return 0.0
     return 1.0

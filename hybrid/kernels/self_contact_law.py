@@ -23,6 +23,7 @@ from hybrid.kernels.rotations import dot, sub
 
 # Distances, in diameters, at which the force of contact begins and becomes infinite: strands stay 0.94 to 1.02 apart.
 OUTER, INNER = 1.05, 0.85
+STICKS = 100.0  # spring of friction per length, of size/D^2: the force of contact has 50 to 200
 FOOT_STEPS = 30  # of Newton's method with bisection: it needs about 4
 FOOT_TOLERANCE = 1e-14
 
@@ -106,18 +107,20 @@ def barrier(d, width, size):
 
 
 # A point of contact, one row of numbers: its pieces; weights of the nodes of x and of y; n; what the law leaves across
-# n and along it; y'/d; weights of y'; phi'; 1/c, 0 where the foot stays at an end of the cable.
+# n and along it; y'/d; weights of y'; phi'; 1/c, 0 where the foot stays at an end of the cable; u; d, m; spring of its
+# friction, N/m.
 P, Q, WX, WY, NORMAL, ALONG, ACROSS, SLOPE, RATES, FORCE, FOLLOWS = 0, 1, 2, 5, 8, 11, 12, 13, 16, 19, 20
-POINT = 21
+PLACE, DISTANCE, SPRING = 21, 22, 23
+POINT = 24
 
 
 @inner
-def note_point(r, p, w, q, v, stays, width, size, weight, row):
-    """Fill the row of a point of piece p, with weights w, and its foot at v of piece q; returns its energy, J.
+def note_point(r, p, u, q, v, stays, width, size, weight, row):
+    """Fill the row of a point at u of piece p, and its foot at v of piece q; returns its energy, J.
 
     weight: m, length that the point stands for; stays: whether the foot is kept at an end of the cable.
     """
-    wy = spline_weights(v)
+    w, wy = spline_weights(u), spline_weights(v)
     away = sub(spline_point(r, p, w), spline_point(r, q, wy))
     d = math.sqrt(dot(away, away))
     energy, first, second = barrier(d, width, size)
@@ -134,6 +137,7 @@ def note_point(r, p, w, q, v, stays, width, size, weight, row):
     row[FOLLOWS] = 0.0
     if not stays and first != 0.0 and curved > 0.0:
         row[FOLLOWS] = d / (first * curved)
+    row[PLACE], row[DISTANCE], row[SPRING] = u, d, weight * STICKS * size / (width * width)
     return weight * energy
 
 

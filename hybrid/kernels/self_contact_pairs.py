@@ -12,6 +12,7 @@ from hybrid.kernels.compile import inner
 from hybrid.kernels.newton import LIMIT, TOUCH
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import dot, sub
+from hybrid.kernels.self_contact_friction import GRIP, HOLD
 from hybrid.kernels.self_contact_law import INNER, OUTER, POINT, P, Q, foot, note_point, spline_point, spline_weights
 from hybrid.kernels.self_distance import DEPTH, LEAF, NEIGHBOURS, box_distance, fill_parents, runs_on
 from hybrid.kernels.state import Floats
@@ -26,10 +27,15 @@ MOST_PRODUCTS = 60  # of GMRES
     SPEED,  # m/s, with which pieces may meet in the step that is prepared
     WIDEST,  # m, diameter
     REACH,  # m, distance within which pairs are looked at
-) = range(5)
-NUMBERS = 5
-POINTS, NODES, OVERFLOW = range(3)  # of `counts`
-COUNTS = 3
+    FRICTION,  # coefficient of friction; 0: none
+    STORED,  # J, in the travels that are kept
+    TRIED,  # J, in those that the last try has led to
+    SINCE,  # s, time that the try led to
+    SLIP_WORK,  # J, of friction in the step
+) = range(10)
+NUMBERS = 10
+POINTS, NODES, OVERFLOW, GRIPS, FRESH = range(5)  # of `counts`
+COUNTS = 5
 
 
 class Contact(NamedTuple):
@@ -48,26 +54,34 @@ class Contact(NamedTuple):
     points: Floats  # (C, POINT)
     nodes: NDArray[np.int64]  # (N+1,) those in contact
     marks: NDArray[np.int64]  # (N+1,) 1 for those
-    x: Floats  # (N+1, 3) m, displacements in products
-    y: Floats  # (N+1, 3) N
+    x: Floats  # (N+1, 4) m, displacements in products, and spins of cells, rad
+    y: Floats  # (N+1, 4) N, N m
     b: Floats  # (N+1, 5) right-hand side
     z: Floats  # (N+1, 5) its solution
-    basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1))
+    basis: Floats  # (MOST_PRODUCTS + 1, 3 (N+1)); of spins as well with friction: 4 (N+1)
     hessenberg: Floats  # (MOST_PRODUCTS + 1, MOST_PRODUCTS + 4): columns, rotations (2), right-hand side, solution
+    # with friction (kernels.self_contact_friction); else no rows
+    holds: Floats  # (C, HOLD) of the points of contact
+    grips: Floats  # (C, GRIP) what has been kept of the last step
+    fresh: Floats  # (C, GRIP) what is kept if the try is taken
+    heads: NDArray[np.int64]  # (N+1,) the first grip of a piece, -1: none
+    links: NDArray[np.int64]  # (C,) the next of the same piece
 
 
-def blank_contact(cells: int, points: int = 1) -> Contact:
-    """For a line of so many cells, with room for so many points of contact."""
+def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contact:
+    """For a line of so many cells, with room for so many points of contact, with friction or without."""
     z, nodes = np.zeros, cells + 1
-    leaves = 1
+    held, leaves = points if friction else 0, 1
     while leaves * LEAF < nodes:
         leaves *= 2
     return Contact(
         width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
         counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64), at=z((nodes, 3)),
         move=z((nodes, 3)), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
-        x=z((nodes, 3)), y=z((nodes, 3)), b=z((nodes, 5)), z=z((nodes, 5)),
-        basis=z((MOST_PRODUCTS + 1, 3 * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
+        x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
+        basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
+        holds=z((held, HOLD)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
+        links=z(held, np.int64),
     )  # fmt: skip
 
 
@@ -157,8 +171,8 @@ def gather(line, contact, p, q, width):
     fast = IMPACT * numbers[SPEED] * numbers[SPEED]
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
     for g in range(count):
-        w = spline_weights((g + 0.5) / count)
-        x = spline_point(r, p, w)
+        u = (g + 0.5) / count
+        x = spline_point(r, p, spline_weights(u))
         v, side = foot(r, q, x)
         if side != 0 and 0 < q + side < n:
             continue
@@ -169,7 +183,7 @@ def gather(line, contact, p, q, width):
             counts[OVERFLOW] = 1
             return
         row = contact.points[counts[POINTS]]
-        numbers[ENERGY] += note_point(r, p, w, q, v, side != 0, width, size, length, row)
+        numbers[ENERGY] += note_point(r, p, u, q, v, side != 0, width, size, length, row)
         counts[POINTS] += 1
 
 

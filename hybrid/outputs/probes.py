@@ -96,7 +96,7 @@ WORK = {
     "added_mass": "work of the added mass",
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
     "contact": "work of the damping of the seabed",
-    "friction": "work of friction on the seabed",
+    "friction": "work of friction on the seabed, and of the line on itself",
     "zones": "energy that zones put in or take out when they change, and of torque where a catenary bends without it",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }

@@ -146,6 +146,10 @@ class Contact(Table):
         description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs "
         "model: rod and the diameter of every section; absent: they pass through each other, and an event says where",
     )
+    friction: NonNegative = Field(
+        default=0.0,
+        description="coefficient of friction between parts of the cable that touch each other, with `self` [-]",
+    )
 
 
 class Section(Table):

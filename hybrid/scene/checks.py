@@ -205,6 +205,9 @@ def _touches_itself(
 ) -> Iterator[Finding]:
     """Contact of the cable with itself is known between rods, in space."""
     if not contact.self:
+        if contact.friction > 0.0:
+            expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
+            yield Finding(("contact", "friction"), expected, "add `self: true`, or leave friction out")
         return
     here: Place = ("contact", "self")
     for i, section in enumerate(cable.sections):

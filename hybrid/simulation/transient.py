@@ -413,7 +413,10 @@ class Transient:
             marks_on(model.line.s, self._marked), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
-            contact = SelfContact(model.line, diameters(model), model.tension_scale)
+            before, friction = self.run.contact, self.scene.contact.friction
+            contact = SelfContact(model.line, diameters(model), model.tension_scale, friction)
+            if before is not None:
+                contact.restore(before.checkpoint(self.t))
             self.run.touch_itself(contact, model.line, model.ends.values, self.stepper.work)
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.line.s)

@@ -36,7 +36,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
         "push": run.plane_monitor.checkpoint(run.run),
-        "self_contact": run.run.contact and run.run.contact.contact.numbers.copy(),
+        "self_contact": run.run.contact and run.run.contact.checkpoint(run.t),
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
     }  # fmt: skip
 
@@ -94,7 +94,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if saved["push"] is not None:
         monitor.restore(saved["push"], compiled)
     if compiled.contact is not None:
-        compiled.contact.contact.numbers[:] = saved["self_contact"]
+        compiled.contact.restore(saved["self_contact"])
     if run.switching is not None:
         run.switching.restore(saved["zoning"])
     if run.correction is not None:

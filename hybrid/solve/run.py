@@ -183,7 +183,7 @@ class CompiledRun:
         yield from (x for state in self.states for x in state)
         yield from self.pushes
         if self.contact is not None:
-            yield self.contact.contact.numbers
+            yield from self.contact.changing()
         yield from (x for name, x in self.books._asdict().items() if name not in skipped)
 
     # --- what it knows ------------------------------------------------------------------------------

@@ -2,13 +2,28 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from typing import Any
+
 import numpy as np
 
 from hybrid.kernels.binding import Table
-from hybrid.kernels.newton import ADDRESS, ASKED, FINISH
+from hybrid.kernels.newton import ADDRESS, ASKED, REST
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
+from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.self_contact_law import FORCE, NORMAL, WX, WY, P, Q
-from hybrid.kernels.self_contact_pairs import POINTS, WIDEST, blank_contact
+from hybrid.kernels.self_contact_pairs import (
+    FRESH,
+    FRICTION,
+    GRIPS,
+    POINTS,
+    SINCE,
+    SPEED,
+    STORED,
+    TRIED,
+    WIDEST,
+    blank_contact,
+)
 from hybrid.kernels.state import Ends, Floats, Line, State, Work
 
 # Sample points of a piece lie at most this part of a diameter apart.
@@ -22,29 +37,31 @@ STIFFNESS, TENSION = 0.16, 0.02
 class SelfContact:
     """Contact of one line with itself; `table` and `call` are for the job of a run."""
 
-    def __init__(self, line: Line, width: Floats, tension_scale: float) -> None:
-        """width: (N,) m, diameters of cells; tension_scale: N."""
+    def __init__(self, line: Line, width: Floats, tension_scale: float, friction: float = 0.0) -> None:
+        """width: (N,) m, diameters of cells; tension_scale: N; friction: its coefficient."""
         n = line.h.size
         both = np.pad(width, 1, mode="edge")
         widths = 0.5 * (both[1:] + both[:-1])
         length = np.pad(line.h, 1, mode="edge")
         pieces = 0.5 * (length[1:] + length[:-1])
         samples = np.maximum(np.ceil(pieces / (SPACING * widths)), 1)
-        contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)))
+        contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)), friction > 0.0)
         contact.width[:], contact.samples[:] = widths, samples
         bending = line.kb[:, :2].min(axis=1) * line.hn
         contact.stiff[:] = np.maximum(
             STIFFNESS * bending / contact.width**2, TENSION * tension_scale * (bending == 0.0)
         )
         contact.mass[:] = line.mass / pieces
-        contact.numbers[WIDEST] = contact.width.max()
+        contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
+        contact.numbers[SINCE] = np.nan
         self.contact = contact
+        self._middles = 0.5 * (line.s[1:] + line.s[:-1])
         self.call = np.zeros(3, np.int64)
         self._job = Table(blank_contact_job())
 
     def energy(self) -> float:
         """Energy, J, of contact where work.u has led the state of a run; infinite where strands are in each other."""
-        self.call[ASKED] = FINISH
+        self.call[ASKED] = REST
         energy: float = contact_task(self._table)
         return energy
 
@@ -56,16 +73,47 @@ class SelfContact:
         return int(row[P]), int(row[Q])
 
     def force(self, state: State) -> Floats:
-        """Forces (N+1, 3) N of contact on the nodes of the state of a run."""
+        """Forces (N+1, 3) N of contact on the nodes of the state of a run.
+
+        Of friction that on the centre lines; the moments that belong to it come with the next step.
+        """
         self._work.u[:] = 0.0
         self.energy()
-        out = np.zeros_like(state.r)
-        for row in self.contact.points[: self.contact.counts[POINTS]]:
+        out, rubs = np.zeros_like(state.r), bool(self.contact.holds.size)
+        for k, row in enumerate(self.contact.points[: self.contact.counts[POINTS]]):
             f = -row[FORCE] * row[NORMAL : NORMAL + 3]
+            f = f + self.contact.holds[k, HELD : HELD + 3] if rubs else f
             p, q = int(row[P]), int(row[Q])
             out[p - 1 : p + 2] += row[WX : WX + 3, None] * f
             out[q - 1 : q + 2] -= row[WY : WY + 3, None] * f
         return out
+
+    # --- what goes on from step to step ---------------------------------------------------------
+
+    def changing(self) -> tuple[np.ndarray, ...]:
+        """What steps change and later steps depend on."""
+        contact = self.contact
+        return (contact.numbers, contact.counts, contact.grips, contact.fresh)
+
+    def checkpoint(self, t: float) -> dict[str, Any]:
+        """What the steps after the time t, s, depend on."""
+        contact, numbers, counts = self.contact, self.contact.numbers, self.contact.counts
+        latest = numbers[SINCE] == t
+        grips = contact.fresh[: counts[FRESH]] if latest else contact.grips[: counts[GRIPS]]
+        stored = float(numbers[TRIED] if latest else numbers[STORED])
+        return {"speed": float(numbers[SPEED]), "stored": stored, "grips": grips.copy()}
+
+    def restore(self, saved: Mapping[str, Any]) -> None:
+        """Go on from `checkpoint`; of another mesh with what lies on sample points of both.  ValueError: no grips."""
+        grips, numbers, counts = saved["grips"], self.contact.numbers, self.contact.counts
+        if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
+            raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
+        numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
+        counts[GRIPS] = 0
+        if self.contact.grips.size:
+            grips = grips[: len(self.contact.grips)].copy()
+            grips[:, PIECE] = np.clip(np.searchsorted(self._middles, grips[:, AT]), 1, self._middles.size - 1)
+            self.contact.grips[: len(grips)], counts[GRIPS] = grips, len(grips)
 
     def attach(
         self, line: Line, ends: Ends, states: tuple[State, State], work: Work, clock: Floats, count: np.ndarray

@@ -9,7 +9,7 @@ from hybrid.kernels import self_contact as k
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
 from hybrid.kernels.compile import kernel
 from hybrid.kernels.entry import workspace
-from hybrid.kernels.newton import ASKED, FINISH, LIMIT
+from hybrid.kernels.newton import ASKED, LIMIT, REST
 from hybrid.kernels.self_contact_law import INNER, OUTER, add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import POINTS
 from hybrid.kernels.state import blank_line, blank_state, no_ends
@@ -33,7 +33,7 @@ def product(points, count, x, out):
 class Tangle:
     """A line at rest with nodes at r (N+1, 3) m, and its contact."""
 
-    def __init__(self, r: np.ndarray, width: float = WIDTH) -> None:
+    def __init__(self, r: np.ndarray, width: float = WIDTH, friction: float = 0.0) -> None:
         n = len(r) - 1
         self.r, h = r, np.linalg.norm(np.diff(r, axis=0), axis=1)
         line = blank_line(n)._replace(
@@ -42,12 +42,14 @@ class Tangle:
             kb=np.ones((n + 1, 3)),
             hn=np.full(n + 1, h.mean()),
             mass=np.ones(n + 1),
+            spin=np.ones(n, np.int8),
         )
+        self.line = line
         states = (blank_state(n), blank_state(n))
         for state in states:
             state.r[:] = r
         self.work = workspace(n, keep=True)
-        self.contact = SelfContact(line, np.full(n, width), 1.0)
+        self.contact = SelfContact(line, np.full(n, width), 1.0, friction)
         ends = no_ends()
         ends.held[:] = 0
         clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
@@ -56,7 +58,7 @@ class Tangle:
     def energy(self, u: np.ndarray) -> float:
         """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""
         self.work.u[:] = u
-        self.contact.call[ASKED] = FINISH
+        self.contact.call[ASKED] = REST
         return k.contact_task(self.table)
 
     @property

@@ -38,7 +38,7 @@ resolution: {cells_per_layer: 4.0}
 """
 TOUCHING = """\
 cable: {sections: [{length: 10.0, mass: 1.0, diameter: 0.03, bending_stiffness: 2.0}]}
-contact: {self: true}
+contact: {self: true, friction: 0.2}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
 initial: {kind: equilibrium}
 model: {kind: rod}

@@ -1,0 +1,197 @@
+"""Friction where a line touches itself: an elastic travel at every point of contact, forces and moments on both strands.
+
+The strands touch halfway between x and y.  In a step their surfaces shift against each other there by
+
+    g = P (W_x u_p - W_y u_q - (d/2) (phi_p + phi_q) x n),    P = 1 - n n^T
+
+with the displacements u of the nodes and the rotation phi = psi d + d x de/l of each strand, between those of the two
+cells of a piece.  The travel q of a point, kept along and across strand p, becomes q + g, with the force -k q on p and
+k q on q; where that is more than mu N it slides, and q keeps mu N/k.  So nothing creeps, and nothing gives back more
+than it has stored.  Off the centre lines the force is a force f on the centre line and a moment -(d/2) n x f on both
+strands, along the chord into the balance of spin, across it as a couple: no angular momentum is lost.
+"""
+
+from __future__ import annotations
+
+import math
+
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import inner
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.rotations import add, cross, dot, scale, sub
+from hybrid.kernels.self_contact_law import (
+    ALONG,
+    DISTANCE,
+    FORCE,
+    NORMAL,
+    PLACE,
+    RATES,
+    SPRING,
+    WX,
+    WY,
+    P,
+    Q,
+    slope,
+    spline_point,
+)
+
+SAME_PLACE = 1e-6  # diameters between sample points that are the same
+FOLLOWED = 4.0  # diameters that the foot of a point may go in a step without losing its travel
+# Friction of a point of contact: force on strand p (N); direction of sliding; its stiffness (N/m); the coefficient where
+# it slides, else 0; travel along and across strand p (m).
+HELD, SLIDING, GIVES, SLIDES, TRAVEL = 0, 3, 6, 7, 8
+HOLD = 10
+# What is kept of it from step to step: piece; arc lengths of the point and of its foot (m); travel (m); spring (N/m).
+PIECE, AT, FOOT, TRAVELLED, KEPT_SPRING = 0, 1, 2, 3, 5
+GRIP = 6
+
+
+@inner
+def arc_length(line, p, u):
+    """Arc length, m, at u of piece p."""
+    return line.s[p] + 0.5 * (u * line.h[p] - (1.0 - u) * line.h[p - 1])
+
+
+@inner
+def turn_of(at, x, p, u):
+    """Rotation of the strand at u of piece p by x (N+1, 4): shifts of nodes and spins of cells."""
+    total = (0.0, 0.0, 0.0)
+    for j in range(2):
+        c, part = p - 1 + j, u if j == 1 else 1.0 - u
+        d, _, il = chord(sub(get3(at, c + 1), get3(at, c)))
+        bent = scale(il, cross(d, sub(get3(x, c + 1), get3(x, c))))
+        total = add(total, scale(part, add(bent, scale(x[c, 3], d))))
+    return total
+
+
+@inner
+def shift_of(contact, row, x):
+    """How x (N+1, 4) shifts the surfaces of the strands against each other at a point, and their centre lines."""
+    p, q = int(row[P]), int(row[Q])
+    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
+    apart = sub(
+        spline_point(x, p, (row[WX], row[WX + 1], row[WX + 2])), spline_point(x, q, (row[WY], row[WY + 1], row[WY + 2]))
+    )
+    turned = add(turn_of(contact.at, x, p, row[PLACE]), turn_of(contact.at, x, q, row[RATES + 2]))
+    g = sub(apart, scale(0.5 * row[DISTANCE], cross(turned, n)))
+    return sub(g, scale(dot(g, n), n)), dot(apart, n)
+
+
+@inner
+def load_turn(line, at, m, p, u, out):
+    """Add a moment m (N m) on the strand at u of piece p to out (N+1, 4): forces on nodes, moments on cells."""
+    for j in range(2):
+        c, part = p - 1 + j, u if j == 1 else 1.0 - u
+        d, _, il = chord(sub(get3(at, c + 1), get3(at, c)))
+        couple = scale(part * il, cross(m, d))
+        for k in range(3):
+            out[c + 1, k] += couple[k]
+            out[c, k] -= couple[k]
+        if line.spin[c]:
+            out[c, 3] += part * dot(m, d)
+
+
+@inner
+def load(line, contact, row, f, out):
+    """Add what a force f (N) on strand p, and its opposite on strand q, are on nodes and cells to out (N+1, 4)."""
+    p, q = int(row[P]), int(row[Q])
+    for j in range(3):
+        for k in range(3):
+            out[p - 1 + j, k] += row[WX + j] * f[k]
+            out[q - 1 + j, k] -= row[WY + j] * f[k]
+    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
+    m = scale(-0.5 * row[DISTANCE], cross(n, f))
+    load_turn(line, contact.at, m, p, row[PLACE], out)
+    load_turn(line, contact.at, m, q, row[RATES + 2], out)
+
+
+@inner
+def directions(contact, row):
+    """Two directions normal to n, the first as near to strand p as can be."""
+    p = int(row[P])
+    n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
+    at = contact.at
+    t = slope(sub(get3(at, p), get3(at, p - 1)), sub(get3(at, p + 1), get3(at, p)), row[PLACE])
+    size = math.sqrt(dot(t, t))
+    t = sub(t, scale(dot(t, n), n))
+    if not dot(t, t) > 1e-6 * size * size:  # the strand ends on the other: any direction does
+        t = (n[1], -n[0], 0.0) if abs(n[2]) < 0.7 else (0.0, n[2], -n[1])
+    t = scale(1.0 / math.sqrt(dot(t, t)), t)
+    return t, cross(n, t)
+
+
+@inner
+def find_grip(line, contact, row):
+    """The travel kept of a point, along and across strand p, from the nearest that was on the same strand; 0: none."""
+    p, width = int(row[P]), contact.width[int(row[P])]
+    at = arc_length(line, p, row[PLACE])
+    foot = arc_length(line, int(row[Q]), row[RATES + 2])
+    along, across, least = 0.0, 0.0, FOLLOWED * width
+    k = contact.heads[p]
+    while k >= 0:
+        grip = contact.grips[k]
+        if abs(grip[AT] - at) < SAME_PLACE * width and abs(grip[FOOT] - foot) < least:
+            least = abs(grip[FOOT] - foot)
+            along, across = grip[TRAVELLED], grip[TRAVELLED + 1]
+        k = contact.links[k]
+    return along, across
+
+
+@inner
+def hold_point(line, contact, friction, row, hold):
+    """Friction of a point of contact at the shifts and spins contact.x; its work in the step, and its energy (J)."""
+    first, second = directions(contact, row)
+    along, across = find_grip(line, contact, row)
+    g, _ = shift_of(contact, row, contact.x)
+    trial = add(g, add(scale(along, first), scale(across, second)))
+    size, spring, most = math.sqrt(dot(trial, trial)), row[SPRING], -friction * row[FORCE]
+    hold[GIVES], hold[SLIDES], part = spring, 0.0, 1.0
+    if spring * size > most:
+        part = most / (spring * size)
+        hold[GIVES], hold[SLIDES] = part * spring, friction
+    travel = scale(part, trial)
+    for k in range(3):
+        hold[HELD + k] = -spring * travel[k]
+        hold[SLIDING + k] = trial[k] / size if size > 0.0 else 0.0
+    hold[TRAVEL], hold[TRAVEL + 1] = dot(travel, first), dot(travel, second)
+    return -spring * dot(travel, g), 0.5 * spring * dot(travel, travel)
+
+
+@inner
+def add_held(line, contact, k, out):
+    """Add the friction of point k, with the opposite sign, to out (N+1, 4)."""
+    hold = contact.holds[k]
+    load(line, contact, contact.points[k], (-hold[HELD], -hold[HELD + 1], -hold[HELD + 2]), out)
+
+
+@inner
+def add_held_product(line, contact, k, x, out):
+    """Add the change of that by x (N+1, 4), directions and places being kept, to out (N+1, 4)."""
+    row, hold = contact.points[k], contact.holds[k]
+    g, nearer = shift_of(contact, row, x)
+    t = (hold[SLIDING], hold[SLIDING + 1], hold[SLIDING + 2])
+    gives = hold[GIVES]
+    f = scale(gives, g)
+    if hold[SLIDES] > 0.0:
+        f = sub(f, scale(gives * dot(t, g) + hold[SLIDES] * row[ALONG] * nearer, t))
+    load(line, contact, row, f, out)
+
+
+@inner
+def keep_grips(line, contact, count):
+    """Write what is to be kept of the friction of `count` points into contact.fresh."""
+    for k in range(count):
+        row, hold, grip = contact.points[k], contact.holds[k], contact.fresh[k]
+        grip[PIECE], grip[AT] = row[P], arc_length(line, int(row[P]), row[PLACE])
+        grip[FOOT] = arc_length(line, int(row[Q]), row[RATES + 2])
+        grip[TRAVELLED], grip[TRAVELLED + 1], grip[KEPT_SPRING] = hold[TRAVEL], hold[TRAVEL + 1], row[SPRING]
+
+
+@inner
+def link_grips(contact, count):
+    """Chain the grips of every piece, so that they are found."""
+    for p in range(contact.heads.shape[0]):
+        contact.heads[p] = -1
+    for k in range(count):
+        p = int(contact.grips[k, PIECE])
+        contact.links[k], contact.heads[p] = contact.heads[p], k
