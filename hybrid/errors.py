@@ -102,6 +102,7 @@ EVENTS_BY_WEIGHT = (
     "irregular motion",
     "end force between outputs",
     "line meets itself",
+    "loop can form",
     "slack",
     "unstable",
     "out of plane",

@@ -21,6 +21,7 @@ from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.model.build import Model
 from hybrid.simulation.events import EventLog
+from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.stability import is_stable
 from hybrid.solve.statics import Equilibrium
@@ -61,7 +62,8 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_put_in", "_potential", "_alive",
+    "_put_in", "_potential", "_alive", "_loop", "_writhe",
+    "_writhes",
 )  # fmt: skip
 
 Stop = tuple[Outcome, int] | None
@@ -98,6 +100,7 @@ class Diagnostics:
         self._rested = self._left_out = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
+        self._loop, self._writhe, self._writhes = 1.0, np.nan, LOOP
 
     def begin(self) -> None:
         """Note what the contents of the model warn of."""
@@ -276,11 +279,18 @@ class Diagnostics:
         over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
-    def outputs(self, batch: Batch, values: Mapping[str, Floats]) -> Stop:
-        """Look at outputs; values: their fields (nb, ...)."""
+    def outputs(self, batch: Batch, values: Mapping[str, Floats], s: Floats) -> Stop:
+        """Look at outputs; values: their fields (nb, ...), along s (ns,) m."""
         self.mesh(batch)
+        self.loops(batch.t, values, s)
         self.rest(batch, values)
         return self.energy(batch, values)
+
+    def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
+        """A torque that can throw a loop, and a loop, at outputs (nb,) s with fields (nb, ...) along s (ns,) m."""
+        self._loop = note_hockling(self._model, t, values, s, self._loop, self.events.event)
+        known = self._writhe, self._writhes
+        self._writhe, self._writhes = note_loops(t, values, s, known, self.events.event)
 
     def mesh(self, batch: Batch) -> None:
         """Folds that a catenary's cells do not resolve, and a line deep in the seabed."""

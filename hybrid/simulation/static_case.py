@@ -60,11 +60,15 @@ class StaticCase:
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
             stretched = diagnostics.stretch(found.state)
             stop = stretched or diagnostics.still(ends, found.state)
+            values = _values(model, found, observer) if stop is None else {}
+            if stop is None:
+                diagnostics.loops(
+                    np.zeros(1), {name: np.asarray(x)[None] for name, x in values.items()}, observer.grid.s
+                )
             events.write_to(recorder)
             if stop is not None:
                 detail = stretch_text(model, found.state) if stretched else ""
                 raise ComputationError(stop[0], None, float(model.line.s[stop[1]]), detail)
-            values = _values(model, found, observer)
             recorder.save(0.0, values, observer.zone_rows)
             reached = of_equilibrium(envelope, self.scene, model, found, recorder.event)
             recorder.replace(reached)

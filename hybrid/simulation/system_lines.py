@@ -115,7 +115,7 @@ class LineResult:
         if not self._moves:
             self.diagnostics.mesh(batch)
             return
-        stop = self.diagnostics.outputs(batch, values)
+        stop = self.diagnostics.outputs(batch, values, self.observer.grid.s)
         if stop is not None:
             raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
 

@@ -249,7 +249,7 @@ class TimeLoop:
         if self.target is None:
             return
         diagnostics.follow(model)
-        stop = diagnostics.outputs(batch, values)
+        stop = diagnostics.outputs(batch, values, observer.grid.s)
         if switching is not None and not model.line.torsion.size:
             manager = switching.manager
             diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)

@@ -19,6 +19,8 @@ from typing import NamedTuple
 import numpy as np
 
 Floats = np.ndarray
+# Of the largest tension: a torque that asks for less of it is no torque that throws loops; a tension below is none.
+PART_OF_TENSION, NO_TENSION = 1e-4, 1e-6
 
 
 class PopOut(NamedTuple):
@@ -32,6 +34,19 @@ def formation_tension(torque: Floats, stiffness: Floats) -> Floats:
     """Tension, N, below which a loop can form: M^2/(4 EI); 0 without bending stiffness."""
     square = np.square(torque)
     return np.divide(square, 4.0 * stiffness, out=np.zeros_like(square), where=np.asarray(stiffness) > 0.0)
+
+
+def formation_ratio(torque: Floats, tension: Floats, stiffness: Floats) -> Floats:
+    """The tension below which a loop can form over the one there is, of torque (N m), tension (N) and EI (N m2).
+
+    1 over the formation margin; 0 everywhere where no torque asks for a tension worth speaking of.
+    """
+    needed = formation_tension(torque, np.broadcast_to(stiffness, torque.shape))
+    most = float(np.abs(tension).max())
+    if not float(needed.max()) > PART_OF_TENSION * most:
+        return np.zeros(needed.shape)
+    none = NO_TENSION * most
+    return np.where(needed > none, needed / np.maximum(tension, none), 0.0)
 
 
 def strand_distance(m: float) -> float:

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
 from hybrid.store.envelope import NOTHING, has_envelope
-from hybrid.store.hockling import formation_tension
+from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
 from hybrid.view.along import along
@@ -23,8 +23,6 @@ from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix
 from hybrid.view.worst import Worst, limits_of, worst
 
-# Of the largest tension: a torque that asks for less of it is no torque that throws loops.
-PART_OF_TENSION = 1e-4
 HOCKLING = (
     "Criterion: a long rod under tension T and torque M is straight and stable where T > M²/(4 EI) (A. G. Greenhill, "
     "Proc. Inst. Mech. Eng. 34, 1883); friction, plasticity and the structure of the strands are not in it"
@@ -298,13 +296,12 @@ def _hockling(result: Result) -> Fact:
     if stiffness is None:
         return none("Not judged: the file has no bending stiffness to hold the torque against.")
     needed = formation_tension(torque, np.broadcast_to(stiffness, torque.shape))
-    scale = NOTHING * float(np.abs(tension).max())
-    if float(needed.max()) <= PART_OF_TENSION * float(np.abs(tension).max()):
+    ratio = formation_ratio(torque, np.asarray(tension), stiffness)
+    if not ratio.any():
         i, k = _at(torque, int(np.abs(torque).argmax()))
         text = f"The torque, at most {amount(abs(float(torque[i, k])), 'N m', 3)}, is far too small for loops."
         values = {"torque": abs(float(torque[i, k])), "needed": float(needed.max()), "ratio": 0.0}
         return Fact("hockling", title, f"{text} {HOCKLING}.", "plain", values)
-    ratio = np.where(needed > scale, needed / np.maximum(tension, scale), 0.0)
     i, k = _at(ratio, int(ratio.argmax()))
     t, s = float(result.times[i]), float(found.s[k])
     values = {

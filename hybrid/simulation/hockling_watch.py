@@ -1,0 +1,97 @@
+"""Events where the torque of a line is enough, for its tension, to throw a loop, and where it has thrown one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+from hybrid.model.build import Model
+from hybrid.store.hockling import formation_ratio, formation_tension, pop_out
+
+# Change of writhe, turns, that is a loop: a small one has nearly 1.
+LOOP = 0.75
+# An event follows another when the margin is this part of what it was.
+WORSE = 1.0 / 3.0
+
+
+def note_hockling(
+    model: Model, t: Floats, values: Mapping[str, Floats], s: Floats, ratio: float, event: Callable[..., None]
+) -> float:
+    """Write events where 1 over the formation margin is beyond `ratio`; that of the next event.
+
+    t: (nb,) s; values: fields (nb, ...) of the outputs, along s (ns,) m; event: as EventLog.event.
+    """
+    torque = values.get("torque")
+    if torque is None or not torque.any():
+        return ratio
+    piece = model.cable.piece(s)
+    stiffness = model.cable.B[piece, :2].min(axis=1)
+    found = formation_ratio(torque, values["tension"], stiffness)
+    for k in np.flatnonzero(found.max(axis=1) > ratio):
+        here = np.where(_long_enough(torque[k], values["tension"][k], stiffness, s), found[k], 0.0)
+        i = int(here.argmax())
+        if here[i] <= ratio:
+            continue
+        M, T, EI = float(torque[k, i]), float(values["tension"][k, i]), float(stiffness[i])
+        text = _text(float(s[i]), M, T, EI, float(model.cable.outer_diameter[piece[i]]))
+        event(float(t[k]), float(s[i]), float(s[i]), "loop can form", text, value=1.0 / float(here[i]), threshold=1.0)
+        ratio = float(here[i]) / WORSE
+    return ratio
+
+
+def _long_enough(torque: Floats, tension: Floats, stiffness: Floats, s: Floats) -> np.ndarray:
+    """Which points (ns,) lie in a stretch that is long enough to leave the straight line by its torque.
+
+    A stretch of length l between pins stays straight up to M^2/(4 EI) = T + pi^2 EI/l^2 (Greenhill); compression does
+    not count as torque.
+    """
+    needed = formation_tension(torque, stiffness)
+    over = np.minimum(needed - tension, needed)
+    out = over > 0.0
+    for a, b in np.flatnonzero(np.diff(np.concatenate([[0], out, [0]]))).reshape(-1, 2):
+        length = s[min(b, s.size - 1)] - s[max(a - 1, 0)]
+        out[a:b] = over[a:b].mean() * length**2 > np.pi**2 * stiffness[a:b].max()
+    return out
+
+
+def note_loops(
+    t: Floats, values: Mapping[str, Floats], s: Floats, known: tuple[float, float], event: Callable[..., None]
+) -> tuple[float, float]:
+    """Write events where the writhe is that of a loop more than at the first output.
+
+    known: writhe of the first output, NaN before it, and by how much that of the next event differs; the rest as of
+    `note_hockling`.
+    """
+    writhe = values.get("turns/writhe")
+    if writhe is None:
+        return known
+    first, most = known
+    if not np.isfinite(first):
+        first = float(writhe[0])
+    for k in np.flatnonzero(np.abs(writhe - first) > most):
+        change = float(writhe[k]) - first
+        if abs(change) <= most:
+            continue
+        where = float(s[int(values["curvature"][k].argmax())])
+        hand = "right" if change > 0.0 else "left"
+        text = (
+            f"the writhe has changed by {change:.3g} turns since the first output, about a {hand}-handed loop for "
+            f"each: the line is bent most at s = {where:.6g} m; turns that it takes up no longer twist the line"
+        )
+        event(float(t[k]), where, where, "loop formed", text, value=change, threshold=most)
+        most = 2.0 * max(most, abs(change))
+    return first, most
+
+
+def _text(s: float, torque: float, tension: float, stiffness: float, diameter: float) -> str:
+    needed = torque * torque / (4.0 * stiffness)
+    text = (
+        f"the torque of {torque:.3g} N m at s = {s:.6g} m needs a tension of M^2/(4 EI) = {needed:.3g} N to keep the "
+        f"cable straight, there is {tension:.3g} N: it can throw a loop"
+    )
+    loop = pop_out(torque, stiffness, diameter) if diameter > 0.0 else None
+    if loop is not None:
+        text += f", which a pull of {loop.tension:.3g} N opens, bent to {loop.radius:.3g} m then"
+    return f"{text}; friction, plasticity and weight on the loop are not in it"
