@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from hybrid.adapt.user_criterion import NodeState
+    from hybrid.couple.fmu_export import export_fmu
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
     from hybrid.interop.moordyn import import_moordyn
@@ -44,6 +45,7 @@ _HOME = {
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
     "System": ("hybrid.scene.system", "System"),
+    "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
     "export": ("hybrid.exports.api", "export"),
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
@@ -74,6 +76,7 @@ __all__ = [
     "Simulation",
     "System",
     "export",
+    "export_fmu",
     "import_moordyn",
     "load_scene",
     "load_system",

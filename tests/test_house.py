@@ -33,8 +33,9 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
     "studies": (*COMPUTING, "simulation", "view"),
-    "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "__init__"),
-    "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies"),
+    "couple": (*COMPUTING, "simulation"),
+    "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "__init__"),
+    "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple"),
 }
 
 # Packages from outside that only these rooms may import.
@@ -49,6 +50,7 @@ ONLY = {
     "yaml": ("scene",),
     "typer": ("cli",),
     "rich": ("cli",),
+    "pythonfmu3": ("couple",),
     "filelock": ("kernels", "store"),
 }  # fmt: skip
 

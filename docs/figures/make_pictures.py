@@ -47,7 +47,7 @@ def main(names: list[str]) -> None:
         figure = hybrid.plot(hybrid.run(scene))
         figure.savefig(page, dpi=150)
         shrink(page.getvalue(), PICTURES / f"{name}.png")
-    for script in sorted(EXAMPLES.glob("0*.py")):
+    for script in sorted(EXAMPLES.glob("[0-9]*.py")):
         if names and script.stem not in names:
             continue
         picture = PICTURES / f"{script.stem}.png"

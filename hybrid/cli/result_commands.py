@@ -1,4 +1,4 @@
-"""Commands that read a result: plot, report, export."""
+"""Commands that read a result: plot, report, export; export makes FMUs of scenes as well."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ from hybrid.cli.app import (
     LineName,
     Picture,
     Quiet,
+    Settings,
+    UsageError,
     app,
     flag,
+    load,
     numbers,
     opened_line,
     output_option,
@@ -84,19 +87,32 @@ def report(
 
 @app.command()
 def export(
-    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to export.", show_default=False)],
-    output: Annotated[Path | None, output_option("FILE.nc, .csv or .vtkhdf; else RUN.nc ..")] = None,
+    result: Annotated[
+        Path, typer.Argument(metavar="RUN.h5", help="The result to export, or the scene of an FMU.", show_default=False)
+    ],
+    output: Annotated[Path | None, output_option("FILE.nc, .csv, .vtkhdf, .fmu; else RUN.nc ..")] = None,
     format: Annotated[
-        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf or fatigue; else by the name of FILE.")
+        str | None, typer.Option(metavar="FORMAT", help="nc, csv, vtkhdf, fatigue or fmu; else by the name of FILE.")
     ] = None,
     at: Annotated[Any, typer.Option(metavar="S,S,..", parser=numbers, help="Only at these arc lengths (m).")] = None,
     names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,
     times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
     line: LineName = None,
+    settings: Settings = None,
     keep: Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue."""
+    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue; or a scene as an FMU (FMI 3.0)."""
+    if "fmu" in (format, (output or Path()).suffix.removeprefix(".").lower()):
+        given = {"--at": at, "--names": names, "--times": times, "--line": line}
+        if unfit := [name for name, value in given.items() if value is not None]:
+            raise UsageError(f"{', '.join(unfit)}: of a result, not of an FMU")
+        with session(as_json, quiet) as console:
+            scene, unit = load(console, result, settings), output or result.with_suffix(".fmu")
+            console.done("co-simulation unit, FMI 3.0", hybrid.export_fmu(scene, unit, overwrite=not keep))
+        return
+    if settings:
+        raise UsageError("--set: changes a scene, and a result has been computed; for an FMU give -o NAME.fmu")
     from hybrid.exports.api import beside
 
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):

@@ -251,6 +251,28 @@ class Simulation:
             self._driven.pop(k)
             self._next.pop(k, None)
 
+    def settable(self, end: str) -> frozenset[str]:
+        """What may be set of an end: "position" and "frame" by `set_end`, "force" and "moment" by `set_force`.
+
+        An end that moves by a motion of the scene has neither.
+        """
+        k, conditions = self._end(end), self._loop.run.model.ends
+        if k in conditions.motions and k not in self._driven:
+            return frozenset()
+        names = {"position" if conditions.values.held[k] else "force"}
+        if self._turns(k):
+            names.add("frame")
+        elif "force" in names and self._loop.run.model.line.spin[-k]:
+            names.add("moment")
+        return frozenset(names)
+
+    def frames(self) -> Floats:
+        """Frames (2, 3, 3) of the ends, inertial: columns a1, a2 and the tangent along increasing s; NaN where an end
+        holds no direction."""
+        frames = self._loop.run.model.ends.values.frame.reshape(2, 3, 3).copy()
+        frames[[k for k in (0, 1) if not self._turns(k)]] = np.nan
+        return frames
+
     def forces(self) -> EndForces:
         """Forces and moments of the cable on what holds its ends, now."""
         report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held

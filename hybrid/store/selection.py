@@ -7,6 +7,7 @@ start from one, so that `--names`, `--times` and `--at` mean the same in each.
 from __future__ import annotations
 
 import os
+import zipfile
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -280,6 +281,8 @@ def is_export(path: Path) -> bool:
     with path.open("rb") as file:
         if file.read(2 + len(MARK)) == f"# {MARK}".encode():
             return True
+    with suppress(OSError, zipfile.BadZipFile), zipfile.ZipFile(path) as unit:  # an FMU
+        return "resources/interface.json" in unit.namelist()
     with suppress(OSError), h5py.File(path, "r", locking="best-effort") as file:
         mark = file.attrs.get("format", "")
         return (mark.decode() if isinstance(mark, bytes) else str(mark)) == MARK

@@ -1,0 +1,120 @@
+"""Write a scene as a co-simulation unit (FMU, FMI 3.0): `export_fmu("scene.yaml", "line.fmu")`.
+
+The unit holds the scene and the files that it names, and asks the interpreter that runs it for hybrid
+(`needsExecutionTool`); `hybrid.couple.fmu_unit` is what runs in it.  pythonfmu3 makes the container.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.scene.read import SceneLike, as_scene, scene_text
+from hybrid.scene.schema import Scene
+from hybrid.simulation.stepping import ENDS, Simulation
+from hybrid.store.selection import check_target, write_atomically
+
+# In the folder `resources` of the unit.
+SCENE, INTERFACE = "scene.yaml", "interface.json"
+# What a unit can do, beside what pythonfmu3 says of it.
+ABILITIES = {
+    "canGetAndSetFMUState": True, "canSerializeFMUState": False, "canHandleVariableCommunicationStepSize": True,
+    "needsExecutionTool": True,
+}  # fmt: skip
+
+
+def export_fmu(scene: SceneLike, path: str | Path, *, name: str | None = None, overwrite: bool = True) -> Path:
+    """Write a scene as a co-simulation unit (FMI 3.0) and return its path.
+
+    scene: as of `hybrid.Simulation`; it is built once, so that a unit that cannot start is not written.  path: the
+    file, ending in .fmu.  name: of the model, else that of the file.  SceneError and ComputationError as of
+    `hybrid.Simulation`; ResultError when pythonfmu3 is missing or the file cannot be written.
+    """
+    target = Path(path).expanduser().resolve()
+    if target.suffix.lower() != ".fmu":
+        raise ResultError(f"{target}: expected a name that ends in .fmu\n    try:      {target.with_suffix('.fmu')}")
+    check_target(target, overwrite)
+    try:
+        from pythonfmu3.builder import FmuBuilder
+    except ImportError:
+        advice = 'pip install "hybrid-cable[fmu]"'
+        raise ResultError(f"an FMU is made by pythonfmu3, which is not installed\n    try:      {advice}") from None
+    scene = as_scene(scene)
+    model = re.sub(r"\W", "_", name or target.stem)
+    if not model[:1].isalpha():
+        model = f"cable_{model}"
+    with tempfile.TemporaryDirectory(prefix="hybrid-fmu-") as room:
+        folder = Path(room)
+        files = _write_scene(scene, folder)
+        interface = _interface(scene) | {"name": model}
+        text = json.dumps(interface, indent=1)
+        (folder / INTERFACE).write_text(text, encoding="utf-8")
+        # a module of its own for each unit: several may run in one interpreter
+        token = hashlib.sha256((text + (folder / SCENE).read_text(encoding="utf-8")).encode()).hexdigest()[:16]
+        script = folder / f"hybrid_{model}_{token}.py"
+        script.write_text(_SCRIPT.format(model=model), encoding="utf-8")
+        made = FmuBuilder.build_FMU(
+            script, folder / "made", [folder / SCENE, folder / INTERFACE, *files], **ABILITIES
+        )  # fmt: skip
+        write_atomically({target: made.read_bytes()}, overwrite)
+    return target
+
+
+_SCRIPT = '''"""A cable of hybrid as a co-simulation unit; made by `hybrid export`."""
+
+from pythonfmu3 import Fmi3Slave
+
+from hybrid.couple.fmu_unit import CableUnit
+
+
+class {model}(CableUnit, Fmi3Slave):
+    pass
+'''
+
+
+def _write_scene(scene: Scene, folder: Path) -> list[Path]:
+    """The scene in `folder`, and copies there of the files that it names."""
+    data, copies = scene.model_dump(mode="json", exclude_none=True), dict[str, Path]()
+
+    def walk(node: Any) -> None:
+        pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
+        for key, value in pairs:
+            if key == "file" and isinstance(value, str):
+                if value not in copies:
+                    copies[value] = folder / f"file{len(copies) + 1}{Path(value).suffix}"
+                    copies[value].write_bytes(Path(value).read_bytes())
+                node[key] = copies[value].name
+            else:
+                walk(value)
+
+    walk(data)
+    (folder / SCENE).write_text(scene_text(scene) if not copies else _yaml(data), encoding="utf-8")
+    return list(copies.values())
+
+
+def _yaml(data: Any) -> str:
+    import json
+
+    return json.dumps(data, indent=1)  # JSON is YAML 1.2
+
+
+def _interface(scene: Scene) -> dict[str, Any]:
+    """What may be set of the ends, and where they begin."""
+    with Simulation(scene) as cable:
+        positions = cable.state.position[[0, -1]]
+        time = scene.require_time()
+        return {
+            "ends": {
+                end: {"settable": sorted(cable.settable(end)), "position": np.round(positions[k], 12).tolist()}
+                for k, end in enumerate(ENDS)
+            },
+            "step": time.step,
+            "duration": time.duration,
+        }

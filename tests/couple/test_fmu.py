@@ -1,0 +1,224 @@
+"""A scene as a co-simulation unit: what it holds, that it steps as `hybrid.Simulation`, and what is refused."""
+
+from __future__ import annotations
+
+import runpy
+import zipfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi3 import FMU3Slave
+from typer.testing import CliRunner
+
+import hybrid
+from hybrid.cli.commands import app
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+SCENE = """
+cable: {sections: [{length: 12.0, mass: 2.0, axial_stiffness: 1e5, diameter: 0.02}]}
+ends: {start: {kind: pinned, position: [0, 0, 0]}, end: {kind: pinned, position: [10, 0, 0]}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 10}
+time: {duration: 2, step: 0.05}
+"""
+ROD = SCENE.replace("diameter: 0.02", "diameter: 0.02, bending_stiffness: 20, torsional_stiffness: 15").replace(
+    "model: catenary", "model: rod").replace("start: {kind: pinned", "start: {kind: clamped, tangent: [1, 0, -1]")  # fmt: skip
+
+
+@contextmanager
+def running(unit: Path, folder: Path, **parameters: str) -> Iterator[tuple[FMU3Slave, dict[str, int]]]:
+    """An FMU that has been started, and the numbers of its variables."""
+    fmpy.extract(unit, folder)
+    description = fmpy.read_model_description(folder)
+    number = {x.name: x.valueReference for x in description.modelVariables}
+    name = description.coSimulation.modelIdentifier
+    cable = FMU3Slave(guid=description.guid, unzipDirectory=str(folder), modelIdentifier=name, instanceName="line")
+    cable.instantiate()
+    for key, value in parameters.items():
+        cable.setString([number[key]], [value])
+    cable.enterInitializationMode()
+    cable.exitInitializationMode()
+    try:
+        yield cable, number
+    finally:
+        cable.terminate()
+        cable.freeInstance()
+
+
+def step(cable: FMU3Slave, k: int, dt: float = 0.05) -> None:
+    cable.doStep(currentCommunicationPoint=k * dt, communicationStepSize=dt)
+
+
+@pytest.fixture
+def unit(tmp_path: Path) -> Path:
+    return hybrid.export_fmu(hybrid.parse_scene(SCENE), tmp_path / "line.fmu")
+
+
+def test_a_master_in_ten_lines_gets_the_forces_of_a_simulation() -> None:
+    assert runpy.run_path(str(EXAMPLES / "10_fmu_master.py"))["main"]() < 1e-7 * 3e4
+
+
+def test_steps_are_taken_again_from_a_saved_state(unit: Path, tmp_path: Path) -> None:
+    with running(unit, tmp_path / "open") as (cable, number):
+        place, force = (
+            [number["end.position.z"], number["end.velocity.z"]],
+            [number["end.force.x"], number["end.force.z"]],
+        )
+        for k in range(5):
+            cable.setFloat64(place, [0.001 * k**2, 0.04 * k])
+            step(cable, k)
+        saved = cable.getFMUState()
+        found = []
+        for height in (0.03, 0.02, 0.03):
+            cable.setFMUState(saved)
+            cable.setFloat64(place, [height, 0.2])
+            step(cable, 5)
+            found.append(cable.getFloat64(force))
+        assert found[0] == found[2] != found[1]
+        cable.freeFMUState(saved)
+
+
+def test_a_frame_turns_by_a_rotation_vector(tmp_path: Path) -> None:
+    scene = hybrid.parse_scene(ROD)
+    unit = hybrid.export_fmu(scene, tmp_path / "rod.fmu")
+    turns = np.linspace(0.0, 0.5, 11)[1:]
+    with running(unit, tmp_path / "open") as (cable, number):
+        for k, turn in enumerate(turns):
+            cable.setFloat64([number["start.rotation.y"]], [turn])
+            step(cable, k)
+        moment = cable.getFloat64([number[f"start.moment.{x}"] for x in "xyz"])
+    with hybrid.Simulation(scene) as same:
+        frame = same.frames()[0]
+        for turn in turns:
+            c, s = np.cos(turn), np.sin(turn)
+            same.set_end("start", [0, 0, 0], frame=np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ frame)
+            same.set_end("end", [10, 0, 0])
+            same.step()
+        assert moment == pytest.approx(same.forces().moment_start, abs=1e-7 * np.abs(same.forces().moment_start).max())
+
+
+def test_what_may_be_set_of_each_end() -> None:
+    with hybrid.Simulation(hybrid.parse_scene(ROD)) as cable:
+        assert cable.settable("start") == {"position", "frame"}
+        assert cable.settable("end") == {"position"}
+        assert np.isnan(cable.frames()[1]).all()
+    free = SCENE.replace("end: {kind: pinned, position: [10, 0, 0]}", "end: free")
+    with hybrid.Simulation(hybrid.parse_scene(free)) as cable:
+        assert cable.settable("end") == {"force"}
+    heave = SCENE.replace("[10, 0, 0]}", "[10, 0, 0], motion: {heave: {amplitude: 0.1, period: 3}, ramp: 1}}")
+    with hybrid.Simulation(hybrid.parse_scene(heave)) as cable:
+        assert not cable.settable("end")
+
+
+def test_places_at_the_begin_of_a_step_go_on_with_their_velocity(unit: Path, tmp_path: Path) -> None:
+    with running(unit, tmp_path / "open") as (cable, number):
+        cable.setFloat64([number["end.position.z"], number["end.velocity.z"]], [0.0, 0.4])
+        step(cable, 0)
+        assert cable.getFloat64([number["end.node_position.z"]]) == [0.0]
+    fmpy.extract(unit, tmp_path / "again")
+    description = fmpy.read_model_description(tmp_path / "again")
+    number = {x.name: x.valueReference for x in description.modelVariables}
+    name = description.coSimulation.modelIdentifier
+    cable = FMU3Slave(
+        guid=description.guid, unzipDirectory=str(tmp_path / "again"), modelIdentifier=name, instanceName="x"
+    )
+    cable.instantiate()
+    cable.setBoolean([number["inputs_at_begin"]], [True])
+    cable.enterInitializationMode()
+    cable.exitInitializationMode()
+    cable.setFloat64([number["end.velocity.z"]], [0.4])
+    step(cable, 0)
+    assert cable.getFloat64([number["end.node_position.z"]]) == pytest.approx([0.02])
+    cable.terminate()
+    cable.freeInstance()
+
+
+def test_the_result_is_written_where_a_parameter_says(unit: Path, tmp_path: Path) -> None:
+    file = tmp_path / "run.h5"
+    with running(unit, tmp_path / "open", output_file=str(file)) as (cable, _):
+        for k in range(40):
+            step(cable, k)
+    with hybrid.open(file) as result:
+        assert result.status == "complete"
+        assert result.times[-1] == pytest.approx(2.0)
+
+
+def test_files_that_a_scene_names_come_along(tmp_path: Path) -> None:
+    motion = tmp_path / "heave.csv"
+    motion.write_text(
+        "t,x,y,z\n" + "\n".join(f"{t:.2f},10,0,{0.1 * t**3 * (t - 3) ** 2:.9f}" for t in np.arange(0, 3.01, 0.1))
+    )
+    moved = SCENE.replace("[10, 0, 0]}", f"[10, 0, 0], motion: {{file: {motion}}}}}")
+    unit = hybrid.export_fmu(hybrid.parse_scene(moved), tmp_path / "line.fmu")
+    motion.unlink()
+    with running(unit, tmp_path / "open") as (cable, number):
+        assert "end.position.x" not in number
+        step(cable, 0)
+        assert cable.getFloat64([number["end.node_position.z"]])[0] != 0.0
+
+
+@pytest.mark.parametrize(
+    ("at", "size", "why"),
+    [(0.5, 0.05, "the cable is at"), (0.0, -0.05, "expected a time after"), (0.0, 5.0, "up to time.duration")],
+)
+def test_a_wrong_step_is_an_error_in_words_and_the_next_one_works(
+    unit: Path, tmp_path: Path, at: float, size: float, why: str
+) -> None:
+    said: list[str] = []
+    fmpy.extract(unit, tmp_path / "open")
+    description = fmpy.read_model_description(tmp_path / "open")
+    name = description.coSimulation.modelIdentifier
+    cable = FMU3Slave(
+        guid=description.guid, unzipDirectory=str(tmp_path / "open"), modelIdentifier=name, instanceName="x"
+    )
+
+    def log(_: Any, status: int, category: bytes, message: bytes) -> None:
+        said.append(message.decode())
+
+    cable.instantiate(loggingOn=True, logMessage=log)
+    cable.enterInitializationMode()
+    cable.exitInitializationMode()
+    with pytest.raises(Exception, match="fmi3DoStep"):
+        cable.doStep(currentCommunicationPoint=at, communicationStepSize=size)
+    assert any(why in text for text in said), said
+    step(cable, 0)
+    cable.terminate()
+    cable.freeInstance()
+
+
+def test_two_units_run_in_one_process(unit: Path, tmp_path: Path) -> None:
+    other = hybrid.export_fmu(hybrid.parse_scene(SCENE.replace("mass: 2.0", "mass: 4.0")), tmp_path / "heavy.fmu")
+    with running(unit, tmp_path / "a") as (a, one), running(other, tmp_path / "b") as (b, two):
+        step(a, 0)
+        step(b, 0)
+        light, heavy = (x.getFloat64([n["end.force.z"]])[0] for x, n in ((a, one), (b, two)))
+    assert heavy == pytest.approx(2.0 * light, rel=1e-3)
+
+
+def test_the_command_writes_one(tmp_path: Path) -> None:
+    scene, unit = tmp_path / "line.yaml", tmp_path / "line.fmu"
+    scene.write_text(SCENE)
+    done = CliRunner().invoke(app, ["export", str(scene), "-o", str(unit), "--set", "time.duration=1"])
+    assert done.exit_code == 0, done.output
+    assert fmpy.read_model_description(unit).defaultExperiment.stopTime == "1.0"
+    assert CliRunner().invoke(app, ["export", str(scene), "-o", str(unit)]).exit_code == 0  # replaces its own
+    assert "--names" in CliRunner().invoke(app, ["export", str(scene), "-o", str(unit), "--names", "tension"]).output
+
+
+def test_what_is_no_unit_is_not_replaced(tmp_path: Path) -> None:
+    taken = tmp_path / "mine.fmu"
+    with zipfile.ZipFile(taken, "w") as archive:
+        archive.writestr("modelDescription.xml", "<fmiModelDescription/>")
+    with pytest.raises(hybrid.ResultError, match="was not exported by hybrid"):
+        hybrid.export_fmu(hybrid.parse_scene(SCENE), taken)
+    with pytest.raises(hybrid.ResultError, match=r"ends in \.fmu"):
+        hybrid.export_fmu(hybrid.parse_scene(SCENE), tmp_path / "line.zip")
+    with pytest.raises(hybrid.SceneError):
+        hybrid.export_fmu(hybrid.parse_scene(SCENE.replace("time: {duration: 2, step: 0.05}", "")), tmp_path / "a.fmu")
+    assert not (tmp_path / "a.fmu").exists()
