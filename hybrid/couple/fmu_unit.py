@@ -154,6 +154,8 @@ class CableUnit:
             return self._failed(error, Fmi3Status.discard)
         except (ValueError, HybridError) as error:
             return self._failed(error, Fmi3Status.error)
+        except Exception as error:  # a defect: an exception that leaves this function ends the master's process
+            return self._failed(RuntimeError(f"{type(error).__name__}: {error}"), Fmi3Status.error)
         return Fmi3StepResult(status=Fmi3Status.ok)
 
     def _failed(self, error: Exception, status: Fmi3Status) -> Fmi3StepResult:

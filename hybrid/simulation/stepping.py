@@ -6,11 +6,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+import threading
+from collections.abc import Sequence
 from contextlib import ExitStack
 from pathlib import Path
 from types import TracebackType
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,14 +21,14 @@ from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.driven_end import DrivenEnd, rotation_vector
-from hybrid.model.mesh import Zone
 from hybrid.model.resolution import first_resolution
 from hybrid.scene.motion_checks import check_motions
 from hybrid.scene.read import SceneLike, as_scene
-from hybrid.scene.schema import Scene, missing_time
+from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.stepped import CableState, EndForces, Saved, in_space, numbers, one_thread, vector
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
@@ -42,26 +43,6 @@ IN_PLANE = 1e-9
 STILL: Floats = np.zeros(3)
 
 
-class CableState(NamedTuple):
-    """Where the cable is; arrays of one's own."""
-
-    t: float  # s
-    s: Floats  # (N+1,) m, unstretched arc length of the nodes
-    position: Floats  # (N+1, 3) m, inertial
-    velocity: Floats  # (N+1, 3) m/s
-    tension: Floats  # (N,) N, of the cells between
-    zones: tuple[Zone, ...]
-
-
-class EndForces(NamedTuple):
-    """Forces (3,) N and moments (3,) N m of the cable on what holds its ends, inertial; zero where nothing holds it."""
-
-    start: Floats
-    end: Floats
-    moment_start: Floats
-    moment_end: Floats
-
-
 class Simulation:
     """A cable in motion that is stepped from outside; a context manager.
 
@@ -69,7 +50,7 @@ class Simulation:
     beyond which nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  criterion: as
     of `hybrid.run`.  Constructing it finds the start that the scene asks for, a static equilibrium perhaps, and nothing
     else: no run to estimate an error is made.  A scene that says no `dimension` is computed in space, since an end may
-    be set anywhere.
+    be set anywhere.  One thread at a time: a method called while another thread is in one raises ValueError.
 
     Raises SceneError, ResultError and ComputationError as `hybrid.run` does.
     """
@@ -78,7 +59,7 @@ class Simulation:
         self, scene: SceneLike, output: str | Path | None = None, *, overwrite: bool = True,
         criterion: UserCriterion | None = None,
     ) -> None:  # fmt: skip
-        self.scene = _in_space(as_scene(scene))
+        self.scene = in_space(as_scene(scene))
         if self.scene.time is None:
             raise SceneError([missing_time(self.scene)])
         check_motions(self.scene)
@@ -90,6 +71,7 @@ class Simulation:
         if output is not None:
             self._target = Path(output).expanduser().resolve()
             check_target(self._target, overwrite)
+        self.lock = threading.RLock()
         self._closed, self._failed, self._stack, self._owner = False, "", ExitStack(), object()
         self._saves = 0  # how often `save` was called
         if isinstance(self._target, Path):
@@ -131,6 +113,7 @@ class Simulation:
             until = (taken + 1) * time.step  # a multiple of the step, without round-off that adds up
         return self.advance(until if time.duration - until > SLIVER * time.step else time.duration)
 
+    @one_thread
     def advance(self, until: float) -> float:
         """Steps to a time `until` (s), where one ends; returns it.  Ends that are set reach their place there.
 
@@ -173,6 +156,7 @@ class Simulation:
 
     # --- what is set and felt --------------------------------------------------------------------
 
+    @one_thread
     def set_end(
         self, end: str, position: Sequence[float] | Floats | None, velocity: Sequence[float] | Floats | None = None,
         frame: Floats | None = None,
@@ -196,19 +180,20 @@ class Simulation:
                 raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
             self._driven[k] = conditions.drive(k)
             self._loop.run.run.move(conditions.moves())
-        there = self._driven[k].at(self.t)[0] if position is None else _vector(position, "position")
-        speed, turn = _vector(STILL if velocity is None else velocity, "velocity"), None
+        there = self._driven[k].at(self.t)[0] if position is None else vector(position, "position")
+        speed, turn = vector(STILL if velocity is None else velocity, "velocity"), None
         if self.scene.dimension == 2:
             self._check_plane(end, "position", there - self._driven[k].at(self.t)[0])
         if frame is not None:
             now = self._driven[k].at(self.t)[2]
-            wanted = _numbers(frame, "frame")
+            wanted = numbers(frame, "frame")
             proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
             if not (proper and np.linalg.det(wanted) > 0.0):
                 raise ValueError("frame: expected a rotation matrix (3, 3), right-handed")
             turn = rotation_vector(now.T @ wanted)
         self._next[k] = there, speed, turn
 
+    @one_thread
     def set_force(
         self, end: str, force: Sequence[float] | Floats, moment: Sequence[float] | Floats | None = None
     ) -> None:
@@ -219,13 +204,14 @@ class Simulation:
             raise ValueError(f"ends.{end} is held: set_end moves it")
         if moment is not None and not self._loop.run.model.line.spin[-k]:
             raise ValueError(f"moment: the cable is a catenary at ends.{end}, which takes no moment")
-        wanted, turning = _vector(force, "force"), _vector(STILL if moment is None else moment, "moment")
+        wanted, turning = vector(force, "force"), vector(STILL if moment is None else moment, "moment")
         self._check_plane(end, "force", wanted)
         conditions.load("force", k, wanted, self.t)
         if moment is not None:
             conditions.load("moment", k, turning, self.t)
         self._loop.run.run.move(conditions.moves())
 
+    @one_thread
     def release(self, end: str) -> None:
         """Let a held end go now: it is free from here on, and `set_force` acts on it.
 
@@ -273,6 +259,7 @@ class Simulation:
         frames[[k for k in (0, 1) if not self._turns(k)]] = np.nan
         return frames
 
+    @one_thread
     def forces(self) -> EndForces:
         """Forces and moments of the cable on what holds its ends, now."""
         report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
@@ -293,6 +280,7 @@ class Simulation:
                 raise ValueError(f"{what} of ends.{end}: {across:.3g} {out}; leave dimension out of the scene")
 
     @property
+    @one_thread
     def state(self) -> CableState:
         """Where the cable is now."""
         run = self._loop.run
@@ -301,6 +289,7 @@ class Simulation:
 
     # --- back and forth ---------------------------------------------------------------------------
 
+    @one_thread
     def save(self) -> Any:
         """The state as it is, in memory, to come back to: for the iterations of an implicit coupling.
 
@@ -315,15 +304,16 @@ class Simulation:
         paths = {k: end.path.copy() for k, end in self._driven.items()}
         loads = run.model.ends.keep_loads()
         self._saves += 1
-        return _Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner, self._saves)
+        return Saved(self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner, self._saves)
 
+    @one_thread
     def restore(self, saved: Any) -> None:
         """Back to what `save` returned.
 
         ValueError: a later `save` has made final what came after it, or another Simulation has returned it.
         """
         self._check_open()
-        if not isinstance(saved, _Saved) or saved.owner is not self._owner:
+        if not isinstance(saved, Saved) or saved.owner is not self._owner:
             raise ValueError("restore: expected what save() of this Simulation has returned")
         if saved.number < self._saves:
             raise ValueError("a later save() has made final what came after this one")
@@ -348,7 +338,7 @@ class Simulation:
         self._next.clear()
         self._failed = ""
 
-    def _drive_again(self, model: Model, saved: _Saved) -> None:
+    def _drive_again(self, model: Model, saved: Saved) -> None:
         self._driven = {k: model.ends.drive(k) for k in saved.paths}
         for k, path in saved.paths.items():
             self._driven[k].path[:] = path
@@ -366,6 +356,7 @@ class Simulation:
         self.close()
         return open_result(self._target)
 
+    @one_thread
     def close(self) -> None:
         """Write what is left and close the file; a second call does nothing."""
         if self._closed:
@@ -396,35 +387,3 @@ class Simulation:
         if end not in ENDS:
             raise ValueError(f"end: expected 'start' or 'end', found {end!r}")
         return ENDS.index(end)
-
-
-class _Saved(NamedTuple):
-    """What `save` keeps."""
-
-    mark: int
-    t: float  # s
-    state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
-    watch: Mapping[str, Any]
-    paths: Mapping[int, Floats]
-    loads: Any
-    model: Model
-    owner: object  # what tells one Simulation from another
-    number: int  # of the save, from 1
-
-
-def _vector(x: Sequence[float] | Floats, name: str) -> Floats:
-    value = _numbers(x, name)
-    if value.shape != (3,) or not np.isfinite(value).all():
-        raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
-    return value
-
-
-def _numbers(x: Any, name: str) -> Floats:
-    try:
-        return np.array(x, float)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name}: expected numbers, found {x!r:.60}") from None
-
-
-def _in_space(scene: Scene) -> Scene:
-    return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})

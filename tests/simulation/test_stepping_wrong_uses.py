@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Callable, Iterator
 from math import inf, nan
 from typing import Any
@@ -75,3 +76,22 @@ def test_a_closed_simulation_says_so() -> None:
         with pytest.raises(ValueError, match="the simulation is over"):
             use()
     closed.close()
+
+
+def test_two_threads_in_one_simulation_are_told_apart() -> None:
+    with simulation(400) as cable:
+        before, refused = cable.t, []
+        busy = threading.Thread(target=lambda: cable.advance(2.0))
+        busy.start()
+        while busy.is_alive():
+            for use in (cable.save, lambda: cable.state, cable.forces, lambda: cable.advance(2.0)):
+                try:
+                    use()
+                except ValueError as error:
+                    refused.append(str(error))
+        busy.join()
+        assert before == 0.0 and cable.t == pytest.approx(2.0)
+        assert any("another thread" in text for text in refused)
+    with simulation(400) as alone:
+        alone.advance(2.0)
+        assert np.array_equal(alone.state.position, cable._loop.run.state.r)

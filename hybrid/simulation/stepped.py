@@ -1,0 +1,92 @@
+"""What `hybrid.Simulation` gives out and takes in: states, forces, what `save` keeps, vectors that are checked."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from functools import wraps
+from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+from hybrid.model.build import Model
+from hybrid.model.mesh import Zone
+from hybrid.scene.schema import Scene
+
+
+class CableState(NamedTuple):
+    """Where the cable is; arrays of one's own."""
+
+    t: float  # s
+    s: Floats  # (N+1,) m, unstretched arc length of the nodes
+    position: Floats  # (N+1, 3) m, inertial
+    velocity: Floats  # (N+1, 3) m/s
+    tension: Floats  # (N,) N, of the cells between
+    zones: tuple[Zone, ...]
+
+
+class EndForces(NamedTuple):
+    """Forces (3,) N and moments (3,) N m of the cable on what holds its ends, inertial; zero where nothing holds it."""
+
+    start: Floats
+    end: Floats
+    moment_start: Floats
+    moment_end: Floats
+
+
+class Locked(Protocol):
+    """What has a lock of its own."""
+
+    lock: Any
+
+
+P = ParamSpec("P")
+R = TypeVar("R")
+L = TypeVar("L", bound=Locked)
+
+
+def one_thread(method: Callable[Concatenate[L, P], R]) -> Callable[Concatenate[L, P], R]:
+    """A method that refuses with ValueError while another thread is in one of its object's methods."""
+
+    @wraps(method)
+    def alone(self: L, *args: P.args, **options: P.kwargs) -> R:
+        if not self.lock.acquire(blocking=False):
+            raise ValueError("another thread is using this Simulation: one at a time, or a Simulation for each")
+        try:
+            return method(self, *args, **options)
+        finally:
+            self.lock.release()
+
+    return alone
+
+
+class Saved(NamedTuple):
+    """What `save` keeps."""
+
+    mark: int
+    t: float  # s
+    state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
+    watch: Mapping[str, Any]
+    paths: Mapping[int, Floats]
+    loads: Any
+    model: Model
+    owner: object  # what tells one Simulation from another
+    number: int  # of the save, from 1
+
+
+def vector(x: Sequence[float] | Floats, name: str) -> Floats:
+    value = numbers(x, name)
+    if value.shape != (3,) or not np.isfinite(value).all():
+        raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
+    return value
+
+
+def numbers(x: Any, name: str) -> Floats:
+    try:
+        return np.array(x, float)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name}: expected numbers, found {x!r:.60}") from None
+
+
+def in_space(scene: Scene) -> Scene:
+    return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})
