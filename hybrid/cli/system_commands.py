@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from hybrid.store.reader import Result
 
 # Kernels beside those of a line, by the last.
-KERNELS = ("system.solve_system", "run.in_space", "energies.observe")
+KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outputs")
 
 
 def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from struct import pack, unpack
 from typing import Any
 
@@ -66,6 +66,31 @@ class Table:
             if each is not same:
                 self.numbers[at : at + size] = _numbers(each, of, name)
             at += size
+
+
+class Series:
+    """Tables of one NamedTuple for many outputs: the same numbers, but for arrays that go on from row to row."""
+
+    def __init__(self, example: Any) -> None:
+        """example: with the types that all values have."""
+        self._pattern, self._at = _pattern(example), dict[str, int]()
+        at = 0
+        for name, value, kind in zip(example._fields, example, self._pattern, strict=True):
+            self._at[name], inner = at, at
+            if isinstance(kind, tuple):
+                for part, each in zip(value._fields, kind, strict=True):
+                    self._at[f"{name}.{part}"], inner = inner, inner + _size(each)
+            at += _size(kind)
+
+    def __call__(self, first: Any, count: int, along: Mapping[str, NDArray[Any]]) -> NDArray[np.int64]:
+        """Tables (count, size); first: values of the first, kept by the caller until the kernel is done.
+
+        along: (count, ...) of which the first has the first row, by name, or `name.part` of a tuple in it.
+        """
+        tables = np.tile(np.array(_numbers(first, self._pattern, "output"), np.int64), (count, 1))
+        for name, values in along.items():
+            tables[:, self._at[name]] += np.arange(count) * values.strides[0]
+        return tables
 
 
 # Numbers of the tuples that were bound last: a line is bound in several tables, and two states take turns.

@@ -33,6 +33,9 @@ def transported(first: Floats, tangents: Floats) -> Floats:
     t = tangents / np.linalg.norm(tangents, axis=1)[:, None]
     out = np.empty_like(t)
     out[0] = first
+    if len(t) > 2 and not (t @ first).any() and np.array_equal(first / sqrt(first.dot(first)), first):
+        out[:] = first  # normal to the plane that the tangents lie in
+        return out
     both = t[:-1] + t[1:]
     for i in range(1, len(t)):
         a, d = out[i - 1], t[i]

@@ -15,13 +15,13 @@ from functools import cached_property
 
 import numpy as np
 
-from hybrid.kernels.energies import observe
 from hybrid.kernels.link import link_of
+from hybrid.kernels.observed_outputs import observed
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, sum_down, touchdown
+from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, touchdown
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -115,19 +115,22 @@ class Observation:
         return np.asarray(self.e / self.length[:, None])
 
     @cached_property
-    def _observed(self) -> tuple[Floats, Floats, Floats]:
-        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad and energies (4, nb) J of what was computed."""
+    def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
+        """Moments (N+1, 3, nb) N m, strains (N+1, 3, nb) rad, energies (5, nb) J and bends (N+1, nb) 1/m of what was
+
+        computed.
+        """
         if self._corrects is not None:
             return self._corrects._observed
-        b, line = self.batch, self.line
-        nb, n = b.T.shape
-        M, strain, energy = np.zeros((nb, n + 1, 3)), np.zeros((nb, n + 1, 3)), np.zeros((nb, 4))
-        ends = map(Ends, b.held, b.position, b.frame, b.spin, b.force, b.moment)
-        for k, row in enumerate(zip(ends, b.e, b.v, b.a1, b.w, M, strain, energy, strict=True)):
-            observe(b.line(k, line), *row)
-        if not (line.element.any() or line.spin.any()):  # a catenary has neither
-            M = strain = np.broadcast_to(np.zeros(1), M.shape)
-        return last(M), last(strain), last(energy)
+        M, strain, energy, bend = observed(self.line, self.batch)
+        if len(M) < self.batch.t.size:  # a catenary has neither
+            M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
+        return last(M), last(strain), last(energy), bend.T
+
+    @property
+    def bends(self) -> Floats:
+        """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.observed_outputs."""
+        return self._observed[3]
 
     # ---- along the line -----------------------------------------------------------------------
 
@@ -244,16 +247,13 @@ class Observation:
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
         line = self.line
-        cosine, sine = dot(self.d[:-1], self.d[1:]), size(cross(self.d[:-1], self.d[1:]))
-        sharp = np.zeros((line.s.size, self.batch.t.size))
-        sharp[1:-1] = 2.0 * sine / (np.maximum(1.0 + cosine, 1e-12) * line.hn[1:-1, None])
         out = np.zeros((len(self.grid.side_nodes), 2, self.batch.t.size))
         for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
             side = out[o : o + b - a + 1]
             if zone.kind == "rod":
                 self._strains_of_rod(side, a, b)
                 continue
-            side[:, 0] = sharp[a : b + 1]
+            side[:, 0] = self.bends[a : b + 1]
             for row, one, two, x, x1, x2 in (
                 (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
                 (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
@@ -376,11 +376,9 @@ class Observation:
 
         contact of the line with itself.
         """
-        kinetic, bending, torsion, stretch = self._observed[2]
+        kinetic, bending, torsion, stretch, potential = self._observed[2]
         if self.batch.turn.size:
             torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN])
-        r = self._plain.r
-        potential = -sum_down(self.line.force.reshape(-1, 1) * r.reshape(-1, r.shape[-1]))
         return {
             "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
             "contact": self.batch.report[:, SEABED_ENERGY],

@@ -239,13 +239,20 @@ class Observer:
         """Whether criteria are among the fields."""
         return bool(self._criteria)
 
-    def values_of(self, batch: Batch, ratios: Floats | None = None, shift: Shift | None = None) -> dict[str, Floats]:
+    def look(self, batch: Batch) -> Observation:
+        """Outputs as computed, for `values_of`."""
+        return Observation(self.line, self.sea, self.grid, batch)
+
+    def values_of(
+        self, plain: Observation, ratios: Floats | None = None, shift: Shift | None = None
+    ) -> dict[str, Floats]:
         """All fields of nb outputs, (nb, ...) in the units of the fields, as new arrays.
 
-        ratios: (nb, criteria, ns), if they are written: the largest since the output before; shift: of these outputs,
-        what bending that is left out would change, if results are corrected for it or its error is written.
+        plain: as of `look`; ratios: (nb, criteria, ns), if they are written: the largest since the output before;
+        shift: of these outputs, what bending that is left out would change, if results are corrected for it or its
+        error is written.
         """
-        plain = Observation(self.line, self.sea, self.grid, batch)
+        batch = plain.batch
         corrected = plain.corrected(shift) if shift is not None else plain
         view = corrected if self._corrected else plain
         found = {name: p.value(view) for name, p in self._probes.items()}

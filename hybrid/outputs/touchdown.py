@@ -37,7 +37,12 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
 
     p: (N+1, nb) m, as of `penetration`; r: (N+1, 3, nb) m, of the nodes.
     """
-    a, b = p[:-1], p[1:]
+    below = np.flatnonzero(p.max(axis=1) > 0.0)  # nodes that touch in any output
+    if not below.size:
+        nb = p.shape[1]
+        return Touchdown(np.full((2, nb), np.nan), np.full((2, 3, nb), np.nan), np.zeros(nb))
+    low, high = max(int(below[0]) - 1, 0), min(int(below[-1]) + 1, line.h.size)
+    a, b, s, r = p[low:high], p[low + 1 : high + 1], line.s[low : high + 1], r[low : high + 1]
     touching = np.maximum(a, b) > 0.0
     # the part x0 .. x1 of every touching cell that is in contact
     change = np.where(b == a, 1.0, b - a)
@@ -45,10 +50,10 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
     x0 = np.where(a <= 0.0, zero, 0.0)
     x1 = np.where(b <= 0.0, zero, 1.0)
     outputs = np.arange(p.shape[1])
-    cells = np.stack([touching.argmax(axis=0), line.h.size - 1 - touching[::-1].argmax(axis=0)])
+    cells = np.stack([touching.argmax(axis=0), len(a) - 1 - touching[::-1].argmax(axis=0)])
     x = np.stack([x0[cells[0], outputs], x1[cells[1], outputs]])
-    h = np.diff(line.s)
-    edges = line.s[cells] + x * h[cells]
+    h = np.diff(s)
+    edges = s[cells] + x * h[cells]
     # (2, nb, 3), because numpy puts what is indexed by arrays first
     near, far = r[cells, :, outputs], r[cells + 1, :, outputs]
     places = np.moveaxis(near + x[:, :, None] * (far - near), -1, 1)

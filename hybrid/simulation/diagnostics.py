@@ -20,6 +20,7 @@ from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.model.build import Model
+from hybrid.outputs.observation import Observation
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.solve.run import CompiledRun
@@ -279,12 +280,12 @@ class Diagnostics:
         over = np.einsum("ij,ij->i", state.e, state.e) > (self._longest * self._model.line.h) ** 2
         return (Outcome.OVERSTRETCHED, most_stretched(self._model, state)) if over.any() else None
 
-    def outputs(self, batch: Batch, values: Mapping[str, Floats], s: Floats) -> Stop:
-        """Look at outputs; values: their fields (nb, ...), along s (ns,) m."""
-        self.mesh(batch)
-        self.loops(batch.t, values, s)
-        self.rest(batch, values)
-        return self.energy(batch, values)
+    def outputs(self, seen: Observation, values: Mapping[str, Floats]) -> Stop:
+        """Look at outputs as computed; values: their fields (nb, ...)."""
+        self.mesh(seen)
+        self.loops(seen.batch.t, values, seen.grid.s)
+        self.rest(seen.batch, values)
+        return self.energy(seen.batch, values)
 
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
         """A torque that can throw a loop, and a loop, at outputs (nb,) s with fields (nb, ...) along s (ns,) m."""
@@ -292,19 +293,20 @@ class Diagnostics:
         known = self._writhe, self._writhes
         self._writhe, self._writhes = note_loops(t, values, s, known, self.events.event)
 
-    def mesh(self, batch: Batch) -> None:
+    def mesh(self, seen: Observation) -> None:
         """Folds that a catenary's cells do not resolve, and a line deep in the seabed."""
-        line, d = self._model.line, batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
+        line, batch = self._model.line, seen.batch
         flexible = (line.spin[:-1] == 0) & (line.spin[1:] == 0) & ~np.isin(line.s[1:-1], self._model.attached)
         if flexible.any():
-            cosine = np.einsum("tij,tij->ti", d[:, :-1], d[:, 1:])
-            turn = np.where(flexible, np.arccos(np.clip(cosine, -1.0, 1.0)), 0.0)
-            for k in np.flatnonzero(turn.max(axis=1) > self._fold):
-                self._note_fold(float(batch.t[k]), turn[k])
-            sag = turn * line.hn[1:-1] / 8.0
-            for k in np.flatnonzero(sag.max(axis=1) > self._off):
-                self._note_sag(float(batch.t[k]), sag[k])
-        self._layers(batch, d)
+            length = line.hn[1:-1]
+            half = np.where(flexible, 0.5 * seen.bends.T[:, 1:-1] * length, 0.0)  # tan(x/2) of a turn by x
+            for k in np.flatnonzero(half.max(axis=1) > np.tan(0.5 * min(self._fold, np.pi))):
+                self._note_fold(float(batch.t[k]), 2.0 * np.arctan(half[k]))
+            for k in np.flatnonzero((half * length).max(axis=1) > 4.0 * self._off):  # the sag is no larger than this
+                sag = 2.0 * np.arctan(half[k]) * length / 8.0
+                if sag.max() > self._off:
+                    self._note_sag(float(batch.t[k]), sag)
+        self._layers(batch)
         if line.bits & SEABED:
             sea = self._model.sea.values
             depth = sea.offset - batch.r @ sea.normal
@@ -331,11 +333,12 @@ class Diagnostics:
             self.note(t, node, "unresolved bend", f"{text}: so far off is its shape; add cells")
             self._off = 3.0 * float(sag[node - 1])
 
-    def _layers(self, batch: Batch, d: Floats) -> None:
+    def _layers(self, batch: Batch) -> None:
         """Clamps and point loads that bend a rod within less than a cell, however little: their moment is too small."""
         line, last = self._model.line, self._model.line.h.size
         if self._bend > UNRESOLVED or not line.element.any():
             return
+        d = batch.e / np.linalg.norm(batch.e, axis=2)[..., None]
         tangents = batch.frame[:, :, 2::3]
         ends = [(0, tangents[:, 0], d[:, 0]), (last, d[:, -1], tangents[:, 1])]
         inner = [int(np.argmin(np.abs(line.s - at))) for at in self._model.attached]

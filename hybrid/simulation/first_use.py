@@ -21,7 +21,8 @@ from hybrid.scene.schema import Scene
 
 # What is compiled together, by the kernel that stands for it: the last.
 SOLVER = ("run.in_plane", "run.in_space")
-OUTPUTS, ZONES, MODEL_ERROR = "energies.observe", "zone_step.follow_zones", "bending_error.advance_error"
+OUTPUTS, ZONES = "observed_outputs.observe_outputs", "zone_step.follow_zones"
+MODEL_ERROR = "bending_error.advance_error"
 STEPS = "run.run"  # around the solver of either kind
 STABILITY = "out_of_plane.wrong_pivots_at_rest"
 
@@ -114,12 +115,11 @@ def compile_all(names: Sequence[str]) -> None:
 
 
 def _compile_outputs(model: Model) -> None:
-    from hybrid.kernels.energies import observe
+    from hybrid.kernels.observed_outputs import observe_outputs
     from hybrid.kernels.seabed import stored
 
-    n, x = model.cells, model.start
-    observe(model.line, model.ends.values, x.e, x.v, x.a1, x.w, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4))
-    stored(model.line, model.sea.values, x.r)
+    observe_outputs(np.zeros((0, 0), np.int64))
+    stored(model.line, model.sea.values, model.start.r)
 
 
 def _compile_zones(scene: Scene, model: Model) -> None:

@@ -54,7 +54,7 @@ class StaticCase:
             diagnostics.begin()
             diagnostics.equilibrium(found)
             report, work = np.zeros(REPORT_SIZE), np.zeros(len(POWERS))
-            diagnostics.mesh(batch_of_one(0.0, ends, found.state, report, work, model.sea.values))
+            diagnostics.mesh(observer.look(batch_of_one(0.0, ends, found.state, report, work, model.sea.values)))
             if switching is not None and not model.line.torsion.size:
                 manager = switching.manager
                 diagnostics.torque(0.0, manager.torque * manager.compliance, manager.torque)
@@ -131,7 +131,7 @@ def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, o
         report[SEABED_ENERGY] = stored(model.line, sea, found.state.r)
     batch = batch_of_one(0.0, ends, found.state, report, np.zeros(len(POWERS)), sea)
     shift = correction.corrector.shift(correction.corrector.sampled[:1], batch) if correction is not None else None
-    return {name: x[0] for name, x in observer.values_of(batch, shift=shift).items()}
+    return {name: x[0] for name, x in observer.values_of(observer.look(batch), shift=shift).items()}
 
 
 def _sample(resolution: Resolution, model: Model, values: Mapping[str, object], cpu: float) -> RunSample:

@@ -110,12 +110,13 @@ class LineResult:
             return
         waiting, self._waiting = self._waiting, []
         batch = Batch(*(np.concatenate(x) for x in zip(*waiting, strict=True)))
-        values = self.observer.values_of(batch)
+        seen = self.observer.look(batch)
+        values = self.observer.values_of(seen)
         self.recorder.save_batch(batch.t.copy(), values, self.observer.zone_rows)
         if not self._moves:
-            self.diagnostics.mesh(batch)
+            self.diagnostics.mesh(seen)
             return
-        stop = self.diagnostics.outputs(batch, values, self.observer.grid.s)
+        stop = self.diagnostics.outputs(seen, values)
         if stop is not None:
             raise LineFailed(self.number, stop[0], float(batch.t[-1]), float(self.model.line.s[stop[1]]))
 

@@ -244,12 +244,13 @@ class TimeLoop:
             self._keep_ratios(count)
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
         shift = run.correction.corrector.shift(errors, batch) if run.correction is not None else None
-        values = observer.values_of(batch, ratios, shift)
+        seen = observer.look(batch)
+        values = observer.values_of(seen, ratios, shift)
         self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
         if self.target is None:
             return
         diagnostics.follow(model)
-        stop = diagnostics.outputs(batch, values, observer.grid.s)
+        stop = diagnostics.outputs(seen, values)
         if switching is not None and not model.line.torsion.size:
             manager = switching.manager
             diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)

@@ -26,7 +26,7 @@ from hybrid.solve.bending_corrector import Corrector
 from hybrid.solve.self_contact import SelfContact
 
 # Steps and samples that a call may take before Python writes them down.
-ROWS = 256
+ROWS = 512
 # Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
 CELL_STEPS = 200_000
 # Numbers that the buffer of samples may hold, 16 MB.

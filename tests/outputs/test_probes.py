@@ -12,6 +12,7 @@ from plain_probes import plain_values
 import hybrid
 from hybrid.kernels.state import Batch, Floats
 from hybrid.model.bending_reference import LEFT
+from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.solve.bending_corrector import Shift
 
@@ -115,9 +116,9 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
     past: dict[Observer, list[tuple[Batch, Any, Any, dict[str, Floats]]]] = {}
 
     def watched(
-        self: Observer, batch: Batch, ratios: Floats | None = None, shift: Shift | None = None
+        self: Observer, seen: Observation, ratios: Floats | None = None, shift: Shift | None = None
     ) -> dict[str, Floats]:
-        found = values_of(self, batch, ratios, shift)
+        found, batch = values_of(self, seen, ratios, shift), seen.batch
         corrected = self.zone_rows[0][0] == "corrected" or self.zone_rows[-1][0] == "corrected"
         expected: dict[str, Floats] = {}
         for prefix, grid in (("", self.grid), ("right/", self._after)) if self.jumps.size else (("", self.grid),):
@@ -146,7 +147,7 @@ def test_a_batch_is_what_its_states_are_one_by_one(name: str, monkeypatch: pytes
             x: np.concatenate(part, axis=-1) for x, part in zip(Shift._fields, parts, strict=True) if x in OF_OUTPUTS
         }
         many = shifts[0]._replace(**joined)
-    again = values_of(observer, wide, None if ratios[0] is None else np.concatenate(ratios), many)
+    again = values_of(observer, observer.look(wide), None if ratios[0] is None else np.concatenate(ratios), many)
     compare(again, {field: np.concatenate([part[field] for part in found]) for field in again})
     computed = [x for field, x in again.items() if not field.startswith("criteria/")]
     assert all(x.flags.c_contiguous and not np.shares_memory(x, wide.work) for x in computed)

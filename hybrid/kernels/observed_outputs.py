@@ -1,0 +1,96 @@
+"""What the states of a batch of outputs mean, in one call: moments, strains, energies, bends of catenaries."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.binding import Series
+from hybrid.kernels.cell import chord
+from hybrid.kernels.compile import kernel
+from hybrid.kernels.energies import observe
+from hybrid.kernels.node_forces import get3
+from hybrid.kernels.references import reader
+from hybrid.kernels.rotations import cross, dot
+from hybrid.kernels.state import Batch, Ends, Floats, Line, blank_line, no_ends
+
+FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
+
+
+class Output(NamedTuple):
+    """One output, and what is found of it."""
+
+    line: Line
+    ends: Ends
+    r: Floats  # (N+1, 3) m
+    e: Floats  # (N, 3) m
+    v: Floats  # (N+1, 3) m/s
+    a1: Floats  # (N, 3)
+    w: Floats  # (N,) 1/s
+    moment: Floats  # (N+1, 3) N m, as of kernels.energies
+    strain: Floats  # (N+1, 3) rad
+    energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
+    bend: Floats  # (N+1,) 1/m, from cell to cell, inside the line; empty: not asked for
+
+
+def _blank() -> Output:
+    nodes, cells = np.zeros((2, 3)), np.zeros((1, 3))
+    return Output(
+        blank_line(1), no_ends(), nodes, cells, nodes, cells, np.zeros(1), nodes, nodes, np.zeros(5), np.zeros(2)
+    )
+
+
+_read, _series = reader(_blank()), Series(_blank())
+
+
+@kernel
+def observe_outputs(tables):
+    """Find moment, strain, energy and bend of all outputs, (nb, size) tables of `Output`."""
+    for k in range(tables.shape[0]):
+        x = _read(tables[k])
+        observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.moment, x.strain, x.energy)
+        high = 0.0
+        for i in range(x.r.shape[0]):
+            for j in range(3):
+                high += x.line.force[i, j] * x.r[i, j]
+        x.energy[4] = -high
+        if x.bend.shape[0] > 0:
+            before, _, _ = chord(get3(x.e, 0))
+            for i in range(1, x.e.shape[0]):
+                d, _, _ = chord(get3(x.e, i))
+                c = cross(before, d)
+                cosine = 1.0 + dot(before, d)
+                half = math.sqrt(dot(c, c)) / cosine if cosine > FOLDED else math.sqrt(2.0 / FOLDED)  # tan(x/2)
+                x.bend[i] = 2.0 * half / x.line.hn[i]
+                before = d
+
+
+def observed(line: Line, batch: Batch) -> tuple[Floats, Floats, Floats, Floats]:
+    """Moments and strains (nb, N+1, 3) as of kernels.energies, energies (nb, 5) J and bends (nb, N+1) 1/m of outputs.
+
+    A line of catenary alone has no moment and no strain, (1, N+1, 3) of zeros; one of rod alone no bends, (nb, 0).
+    A bend is 2 tan(x/2) over the length of line around the node, x the angle from cell to cell; zero at the ends.
+    """
+    nb, n = batch.T.shape
+    rods, catenary = bool(line.element.any() or line.spin.any()), not line.spin.all()
+    moment, strain = (np.zeros((nb if rods else 1, n + 1, 3)) for _ in range(2))
+    energy, bend = np.zeros((nb, 5)), np.zeros((nb, n + 1 if catenary else 0))
+    own = {"moment": moment, "strain": strain} if rods else {}
+    state = {"r": batch.r, "e": batch.e, "v": batch.v, "a1": batch.a1, "w": batch.w}
+    held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
+    of_line = {"line.h": batch.h, "line.kb": batch.kb} if batch.h.size else {}
+    first = Output(
+        batch.line(0, line), Ends(*(x[0] for x in held)),
+        **{name: x[0] for name, x in state.items()}, moment=moment[0], strain=strain[0], energy=energy[0], bend=bend[0],
+    )  # fmt: skip
+    along = (
+        state
+        | own
+        | of_line
+        | {"energy": energy, "bend": bend}
+        | {f"ends.{name}": x for name, x in held._asdict().items()}
+    )
+    observe_outputs(_series(first, nb, along))
+    return moment, strain, energy, bend
