@@ -77,7 +77,7 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
                 if result.status != "complete":  # else it was killed while its errors were estimated, or after
                     with opened(path) as file:
                         steps = int((file["steps/t"][:] > read_checkpoint(file).t).sum())
-                    lost = steps * max(len(x[0]) - 1 for x in result.mesh)
+                    lost = steps * max(len(x.kinds) for x in result.mesh)
                     went["steps times cells recomputed"] = max(went["steps times cells recomputed"], lost)
             process = start(RESUME, str(path))
         if path.exists():
