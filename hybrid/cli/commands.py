@@ -220,13 +220,14 @@ def import_(
         Path | None, typer.Option("--output", "-o", metavar="SCENE.yaml|FOLDER", help="Else this folder.")
     ] = None,
     line: Annotated[int | None, typer.Option(metavar="ID", help="Only the cable with this line.")] = None,
+    separate: Annotated[bool, flag("--separate", help="Each cable as a scene of its own.")] = False,
     overwrite: Annotated[bool, flag("--overwrite", help="Replace scenes that are there.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Make scenes of a MoorDyn deck, one for each cable, and say what could not be carried over."""
+    """Make a scene of a MoorDyn deck, or one for each cable, and say what could not be carried over."""
     with session(as_json, quiet) as console:
         console.source = str(deck)
-        made = hybrid.import_moordyn(deck, line)
+        made = hybrid.import_moordyn(deck, line, separate)
         files = made.write(output or Path(), overwrite)
         notes = [("", note) for note in made.notes]
         notes += [(name, note) for name, scene in made.scenes.items() for note in scene.notes]

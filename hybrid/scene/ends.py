@@ -371,13 +371,23 @@ class Body(EndTable):
         validation_alias=AliasChoices("initial_guess", "near"),
         description="where the search of the equilibrium puts the body first, inertial frame; absent: chosen [m]",
     )
-    mass: Positive = Field(description="mass in air, its weight over gravity [kg]")
+    mass: NonNegative = Field(
+        description="mass in air, its weight over gravity; 0 only of what has a volume or a drag area [kg]"
+    )
     volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
     height: Positive | None = Field(default=None, description=HEIGHT)
     shape: Shape = Field(default="sphere", description=SHAPE)
     drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
     added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
     thrust: Loading | None = Field(default=None, description="force of its propellers, inertial frame [N]")
+
+    @model_validator(mode="after")
+    def _is_something(self) -> Body:
+        if not (self.mass or self.volume or self.drag_area):
+            refuse(
+                [Finding(("mass",), "a number > 0, in kg", "give its mass, or `kind: free` for an end without a body")]
+            )
+        return self
 
     def volume_in(self, density: float, gravity: float) -> float:
         """Displaced volume [m^3], whatever the fluid."""

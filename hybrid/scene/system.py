@@ -72,16 +72,22 @@ class FreePoint(Table):
     force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
 
     @model_validator(mode="after")
-    def _a_body_has_mass(self) -> FreePoint:
-        has = [key for key in ("volume", "drag_area", "added_mass") if getattr(self, key)]
-        if has and not self.mass:
-            refuse([Finding(("mass",), f"a number > 0, in kg, because the point has {has[0]}", "add `mass: ...` (kg)")])
+    def _added_mass_has_a_body(self) -> FreePoint:
+        if self.added_mass and not self.is_body:
+            refuse(
+                [Finding(("added_mass",), "0, because the point has no mass, volume or drag area", "add `volume: ...`")]
+            )
         return self
+
+    @property
+    def is_body(self) -> bool:
+        """Whether the point is more than a knot."""
+        return bool(self.mass or self.volume or self.drag_area)
 
     @property
     def end(self) -> Body | Free:
         """The end of a line that carries the point."""
-        if not self.mass:
+        if not self.is_body:
             return Free(force=self.force)
         given = {k: getattr(self, k) for k in ("mass", "volume", "height", "shape", "drag_area", "added_mass")}
         return Body(**given, thrust=self.force, initial_guess=self.initial_guess)
@@ -203,7 +209,7 @@ class System(Table):
             if isinstance(point, FixedPoint):
                 ends[key] = Pinned(position=point.position, motion=point.motion)
             elif key in carrying:
-                ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.mass else {})
+                ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             else:
                 ends[key] = Pinned(position=first[key] if places is None else places[getattr(line, key)])
         if places is not None:

@@ -55,13 +55,22 @@ def test_one_cable_is_one_scene_in_this_folder(call: Call) -> None:
 
 
 def test_several_cables_go_into_a_folder(call: Call) -> None:
-    said = call("three_lines.txt", "-o", "scenes/new")
+    said = call("three_lines.txt", "-o", "scenes/new", "--separate")
     assert said.code == 0
     assert scenes() == {f"scenes/new/three_lines.line{k}.yaml" for k in (1, 2, 3)}
-    said = call("three_lines.txt", "-o", "all.yaml")
+    said = call("three_lines.txt", "-o", "all.yaml", "--separate")
     assert said.code == 1 and "all.yaml for 3 cables" in said.err and "--line 1" in said.err
     assert call("three_lines.txt", "-o", "second.yaml", "--line", "2").code == 0
     assert hybrid.load_scene("second.yaml").title == "line2 of three_lines.txt"
+
+
+def test_several_cables_are_one_scene(call: Call) -> None:
+    said = call("three_lines.txt")
+    assert said.code == 0 and said.out == "1 scene, 0 left out -> three_lines.yaml\n"
+    assert "give points.point4.motion" in said.err
+    assert list(hybrid.load_system("three_lines.yaml").lines) == ["line1", "line2", "line3"]
+    said = call("rods_and_bodies.txt")
+    assert said.code == 1 and "rods_and_bodies.txt:43: left out" in said.err and "--separate" in said.err
 
 
 def test_what_is_there_is_not_replaced_unless_asked(call: Call) -> None:
@@ -76,7 +85,7 @@ def test_what_is_there_is_not_replaced_unless_asked(call: Call) -> None:
 
 def test_nothing_is_written_if_one_of_several_is_there(call: Call) -> None:
     Path("three_lines.line2.yaml").write_text("mine")
-    assert call("three_lines.txt").code == 1
+    assert call("three_lines.txt", "--separate").code == 1
     assert scenes() == {"three_lines.line2.yaml"}
 
 
@@ -87,14 +96,14 @@ def test_a_place_that_cannot_be_written_to(call: Call) -> None:
 
 
 def test_json_has_every_note_and_quiet_has_none(call: Call) -> None:
-    said = call("rods_and_bodies.txt", "--json")
+    said = call("rods_and_bodies.txt", "--json", "--separate")
     events = [json.loads(line) for line in said.out.splitlines()]
     assert said.code == 0 and said.err == ""
     notes = [event for event in events if event["event"] == "note"]
     assert {"kind", "line", "text", "why", "instead", "scene"} <= notes[0].keys()
     assert events[-1]["event"] == "done" and len(events[-1]["files"]) == 5
     assert events[-1]["left_out"] == sum(note["kind"] == "left out" for note in notes) == 16
-    assert call("rods_and_bodies.txt", "--quiet", "--overwrite") == (0, "", "")
+    assert call("rods_and_bodies.txt", "--quiet", "--overwrite", "--separate") == (0, "", "")
 
 
 def test_a_refused_deck_leaves_with_1_and_says_where(call: Call) -> None:

@@ -221,14 +221,12 @@ def test_what_is_said_of_a_row(deck: str, old: str, new: str, line: int, kind: s
     assert found[0].line == line or words == "FAST.Farm", "of a turbine the line that ends there is named"
 
 
-def test_a_point_with_buoyancy_and_no_mass_ends_no_cable(tmp_path: Path) -> None:
-    with pytest.raises(hybrid.SceneError, match="needs a mass"):
-        from_text(
-            text_of("chain").replace(
-                "2    Coupled      205   0    -2     0      0 ", "2    Free  205   0    -2     0      1 "
-            ),
-            tmp_path,
-        )
+def test_a_point_with_buoyancy_and_no_mass_is_a_buoy(tmp_path: Path) -> None:
+    row = "2    Coupled      205   0    -2     0      0 "
+    (made,) = from_text(
+        text_of("chain").replace(row, "2    Free  205   0    -2     0      1 "), tmp_path
+    ).scenes.values()
+    assert (made.scene.ends.end.mass, made.scene.ends.end.volume) == (0.0, 1.0)
 
 
 def test_bending_makes_the_model_only_where_all_sections_have_it(tmp_path: Path) -> None:

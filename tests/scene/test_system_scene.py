@@ -49,7 +49,7 @@ def test_a_system_is_read_changed_and_written() -> None:
         ("end: east,", "end: eats,", 9, "lines.east.end", "did you mean east?"),
         ("kind: free,", "kind: fre,", 6, "points.buoy.kind", "did you mean free?"),
         ("mass: 1000", "mas: 1000", 6, "points.buoy.mas", "did you mean mass?"),
-        ("mass: 1000, ", "", 6, "points.buoy.mass", "because the point has volume"),
+        ("mass: 1000, volume: 20", "added_mass: 2", 6, "points.buoy.added_mass", "no mass, volume or drag area"),
         ("[150, 0, -100]", "[150, 0]", 5, "points.east.position", "three numbers"),
         ("step: 0.05", "tolerance: 0.1", 10, "time.step", "a fixed step"),
         ("start: buoy, end: east", "start: east, end: east", 9, "lines.east.end", "a point other than east"),

@@ -1,11 +1,13 @@
-"""Input files of MoorDyn ("decks"), versions 1 and 2, as scenes: one for each cable.
+"""Input files of MoorDyn ("decks"), versions 1 and 2, as scenes: one of all lines, or one for each cable.
 
     rows     text: sections, rows, cells, each with its line
     types    line types, of both versions
     deck     the tables of the deck: points, bodies, rods, lines, and do they hold together
     options  its options, and those that hybrid has no use for
     cables   which lines are one cable, and what is at its ends
+    tables   what all scenes have in common
     scenes   the scene of a cable
+    systems  the scene of all lines of a deck
     notes    what could not be carried over as it stands
 
 docs/import.md lists what becomes of each part.
@@ -22,6 +24,7 @@ from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Source, read_source
 from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
+from hybrid.interop.moordyn.systems import system_of
 
 __all__ = ["ImportedDeck", "ImportedScene", "Note", "import_moordyn"]
 
@@ -53,7 +56,8 @@ class ImportedDeck:
         if target.suffix.lower() in (".yaml", ".yml") and not target.is_dir():
             if not one:
                 given = f"{target} for {len(self.scenes)} cables: {', '.join(self.scenes)}"
-                fix = "name a folder, or choose a line: --line " + str(next(iter(self.scenes.values())).lines[0])
+                first = next(iter(self.scenes.values())).lines[0]
+                fix = f"name a folder, or leave --separate out, or choose a line: --line {first}"
                 raise SceneError(
                     [Complaint("output", given, "a folder: each cable is a scene of its own", fix)], self.file
                 )
@@ -78,14 +82,19 @@ class ImportedDeck:
         return list(files)
 
 
-def import_moordyn(path: str | Path, line: int | None = None) -> ImportedDeck:
-    """Read a MoorDyn input file; of all its cables, or of the one that line `line` is part of.
+def import_moordyn(path: str | Path, line: int | None = None, separate: bool = False) -> ImportedDeck:
+    """Read a MoorDyn input file: all its lines as one scene.
 
+    line: only the cable that this line is part of.  separate: each cable as a scene of its own, without those of which
+    none can be made.
     SceneError with every complaint, in lines of the deck, if it is refused.
     """
     source = read_source(path)
     deck = read_deck(source)
     found, lost = cables(deck)
+    if line is None and not separate and len(found) + len(lost) > 1:
+        made = system_of(deck)
+        return ImportedDeck(deck.file, {made.name: made}, in_order([*deck.notes, *_no_place(source, deck)]))
     if line is not None:
         found = _chosen(deck, found, lost, line)
     if not found:

@@ -7,6 +7,7 @@ cable of several sections; every other line is a cable of its own.  What a scene
 from __future__ import annotations
 
 import math
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point, Rod, Triple
@@ -17,6 +18,7 @@ _TURBINE = (
     "write Coupled, at its place in the sea",
 )
 _MOTION = "give ends.{end}.motion: harmonics, or a file with t,x,y,z"
+JOINTS = ("point", "rod")  # what two lines that are one cable may meet at
 
 
 @dataclass(frozen=True)
@@ -60,7 +62,7 @@ def cables(deck: Deck) -> tuple[list[Cable], list[Note]]:
     done: set[int] = set()
     for id in sorted(deck.lines):
         if id not in done:
-            chain = _chain(deck, id)
+            chain = chain_of(deck, id)
             done |= {line.id for line, _ in chain}
             cable, why = _cable(deck, chain)
             notes += why
@@ -71,44 +73,48 @@ def cables(deck: Deck) -> tuple[list[Cable], list[Note]]:
 
 def between(deck: Deck, line: Line) -> float:
     """Distance of the ends of a line as the deck places them, m."""
-    return math.dist(_end(deck, line.ends[0]).place, _end(deck, line.ends[1]).place)
+    return math.dist(end_of(deck, line.ends[0]).place, end_of(deck, line.ends[1]).place)
 
 
 # --- chains ------------------------------------------------------------------------------------
 
 
-def _attached(deck: Deck, point: int) -> list[tuple[Line, int]]:
-    """Lines at a point, each with which of its ends (0 or 1) it is."""
-    here = ("point", point, "")
-    return [(line, k) for _, line in sorted(deck.lines.items()) for k in (0, 1) if line.ends[k] == here]
+def _attached(deck: Deck, kind: str, id: int) -> list[tuple[Line, int]]:
+    """Lines at a point, or at either end of a rod, each with which of its ends (0 or 1) it is."""
+    return [(line, k) for _, line in sorted(deck.lines.items()) for k in (0, 1) if line.ends[k][:2] == (kind, id)]
 
 
-def _next(deck: Deck, line: Line, k: int) -> tuple[Line, int] | None:
+def next_line(deck: Deck, line: Line, k: int, joints: Collection[str]) -> tuple[Line, int] | None:
     """The line that goes on from end k of another, and by which end; None if none does."""
     kind, id, _ = line.ends[k]
-    if kind != "point" or deck.points[id].kind != "free":
+    if kind not in joints or (deck.points if kind == "point" else deck.rods)[id].kind != "free":
         return None
-    here = _attached(deck, id)
+    here = _attached(deck, kind, id)
     if len(here) != 2:
+        return None
+    if kind == "rod" and (deck.rods[id].segments or len({line.ends[k][2] for line, k in here}) != 2):
         return None
     return here[1] if here[0] == (line, k) else here[0]
 
 
-def _chain(deck: Deck, id: int) -> list[tuple[Line, bool]]:
-    """The lines that are one cable with line `id`, in order; in the direction of the lowest of them."""
+def chain_of(deck: Deck, id: int, joints: Collection[str] = JOINTS) -> list[tuple[Line, bool]]:
+    """The lines that are one cable with line `id`, in order; in the direction of the lowest of them.
+
+    joints: they are one through free points where two meet ("point"), through free rods without length ("rod").
+    """
     line = deck.lines[id]
-    before = _walk(deck, line, 0)
+    before = _walk(deck, line, 0, joints)
     if before and before[-1][0] is line:  # a ring: it has been around
         return [(line, False), *before[:-1]]
     # What lies before is walked from the end A of this line away; in the chain it runs towards it.
-    return [*((other, not back) for other, back in reversed(before)), (line, False), *_walk(deck, line, 1)]
+    return [*((other, not back) for other, back in reversed(before)), (line, False), *_walk(deck, line, 1, joints)]
 
 
-def _walk(deck: Deck, line: Line, k: int) -> list[tuple[Line, bool]]:
+def _walk(deck: Deck, line: Line, k: int, joints: Collection[str]) -> list[tuple[Line, bool]]:
     """Lines from end k of a line on, each with whether it is walked from B to A; back at the first, it stops."""
     found: list[tuple[Line, bool]] = []
     at, out = line, k
-    while (step := _next(deck, at, out)) is not None:
+    while (step := next_line(deck, at, out, joints)) is not None:
         at, into = step
         found.append((at, into == 1))
         if at is line:
@@ -121,10 +127,10 @@ def _cable(deck: Deck, chain: list[tuple[Line, bool]]) -> tuple[Cable | None, li
     """The cable of a chain, or why it is none."""
     (first, back), (last, last_back) = chain[0], chain[-1]
     nowhere: list[Note] = []
-    if _next(deck, first, 1 if back else 0) is not None:
+    if next_line(deck, first, 1 if back else 0, JOINTS) is not None:
         why = "it closes a ring of free points; a cable of hybrid has two ends"
         return None, [note(LEFT_OUT, line.row, why, "make one of its points Fixed or Coupled") for line, _ in chain]
-    start, end = _end(deck, first.ends[1 if back else 0]), _end(deck, last.ends[0 if last_back else 1])
+    start, end = end_of(deck, first.ends[1 if back else 0]), end_of(deck, last.ends[0 if last_back else 1])
     for one in (start, end):
         if one.lost is not None:
             why = f"it ends at what no scene has: {one.lost.text}: {one.lost.why}"
@@ -148,7 +154,7 @@ def _turned(end: End, into: bool) -> End:
 # --- what is at an end -------------------------------------------------------------------------
 
 
-def _end(deck: Deck, end: tuple[str, int, str]) -> End:
+def end_of(deck: Deck, end: tuple[str, int, str]) -> End:
     kind, id, letter = end
     return _at_point(deck, deck.points[id]) if kind == "point" else _at_rod(deck, deck.rods[id], letter)
 
@@ -163,14 +169,11 @@ def _at_point(deck: Deck, point: Point) -> End:
         return _on_body(deck.bodies[point.on], point.place, None, point.row.line)
     if point.kind == "turbine":
         return End(point.place, point.row.line, lost=note(LEFT_OUT, point.row, *_TURBINE))
-    joined = [line.id for line, _ in _attached(deck, point.id)]
+    joined = [line.id for line, _ in _attached(deck, "point", point.id)]
     if len(joined) > 2:
-        why = f"{len(joined)} lines meet there ({', '.join(map(str, joined))}); hybrid computes one cable"
-        instead = "make the point Fixed where MoorDyn finds it at rest; each line is then a cable"
+        why = f"{len(joined)} lines meet there ({', '.join(map(str, joined))}), which makes no scene of one cable"
+        instead = "import the deck as one scene, without --separate and --line"
         return End(point.place, point.row.line, lost=note(LEFT_OUT, point.row, why, instead))
-    if point.mass == 0.0 and (point.volume or point.drag_area):
-        why = "a body at the end of a cable needs a mass, and this one has none"
-        return End(point.place, point.row.line, lost=note(LEFT_OUT, point.row, why, "give the point a mass, in kg"))
     return End(point.place, point.row.line, point=point)
 
 

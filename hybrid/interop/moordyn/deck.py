@@ -11,7 +11,7 @@ import re
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
-from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
+from hybrid.interop.moordyn.notes import NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.options import Options, read_options
 from hybrid.interop.moordyn.rows import TITLES, Row, Section, Source, check_names, simple
 from hybrid.interop.moordyn.types import LineType, line_type
@@ -55,17 +55,22 @@ class Point:
     volume: float
     drag_area: float
     added: float
+    force: Triple = (0.0, 0.0, 0.0)  # steady, N; of MoorDyn 1
 
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body; angles in degrees, as MoorDyn takes them whatever the row of units."""
+    """A rigid body; angles in degrees, as MoorDyn takes them whatever the row of units.
+
+    rest: Mass, CG, I, Volume, CdA, Ca as they are written, each a number or several with | between them.
+    """
 
     id: int
     row: Row
     kind: str
     place: Triple
     angles: Triple
+    rest: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -179,15 +184,13 @@ def _point(source: Source, row: Row, notes: list[Note]) -> Point | None:
     kind, on = _attachment(source, row, cells[1], ("fixed", "coupled", "free", "body", "turbine"))
     mass = source.number(row, cells[5], "mass (kg)", least=0.0)
     volume = source.number(row, cells[6], "volume (m^3)", least=0.0)
-    if old and any(_triple(source, row, cells[7:10], "FX FY FZ")):
-        why = "a steady force on a point; hybrid has none in the middle of a cable"
-        notes.append(note(LEFT_OUT, row, why, "give an end `kind: free` with a force, or make it weight or buoyancy"))
+    force = _triple(source, row, cells[7:10], "FX FY FZ") if old else (0.0, 0.0, 0.0)
     if old and kind == "coupled":
         why = "MoorDyn 1 counts the place of a vessel's point from the platform, which is taken to be at 0 0 0"
         notes.append(note(TAKEN, row, why, "shift ends.end.position, if the platform is elsewhere"))
     area, added = (source.number(row, c, n, least=0.0) for c, n in zip(cells[-2:], ("CdA (m^2)", "Ca"), strict=True))
     place = _triple(source, row, cells[2:5], "X Y Z")
-    return Point(source.whole(row, cells[0], "ID", 1), row, kind, on, place, mass, volume, area, added)
+    return Point(source.whole(row, cells[0], "ID", 1), row, kind, on, place, mass, volume, area, added, force)
 
 
 def _body(source: Source, row: Row, notes: list[Note]) -> Body | None:
@@ -198,7 +201,7 @@ def _body(source: Source, row: Row, notes: list[Note]) -> Body | None:
         source, row, row.cells[1], ("fixed", "coupled", "free", "pinned", "coupled pinned", "turbine")
     )
     place, angles = (_triple(source, row, row.cells[i : i + 3], n) for i, n in ((2, "X0 Y0 Z0"), (5, "r0 p0 y0")))
-    return Body(source.whole(row, row.cells[0], "ID", 1), row, kind, place, angles)
+    return Body(source.whole(row, row.cells[0], "ID", 1), row, kind, place, angles, row.cells[8:14])
 
 
 def _rod(source: Source, row: Row, notes: list[Note]) -> Rod | None:

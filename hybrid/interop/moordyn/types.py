@@ -19,6 +19,7 @@ _TYPE_V2 = (
     ("BA/-zeta", "bazeta", "ba", "zeta"), ("EI", "ei"), ("Cd", "cd", "cdn"), ("Ca", "ca", "can"),
     ("CdAx", "cdax", "cdt"), ("CaAx", "caax", "cat"), ("Cl", "cl"), ("dF", "df"), ("cF", "cf"),
 )  # fmt: skip
+_ADDED_FIRST = ("can", "cat", "cdn", "cdt")  # after EI, in decks between MoorDyn 1 and 2
 _TYPE_V1 = (*_TYPE_V2[:5], ("Can", "can", "ca"), ("Cat", "cat", "caax"), ("Cdn", "cdn", "cd"), ("Cdt", "cdt", "cdax"))
 
 
@@ -45,10 +46,17 @@ def _types_are_old(section: Section) -> bool:
     return "ei" not in names and bool(names & {"ca", "can"})
 
 
+def _added_mass_first(section: Section) -> bool:
+    """Whether added mass stands before drag after EI: the names decide."""
+    names = section.names.cells[6:10] if section.names is not None else ()
+    return tuple(simple(cell) for cell in names) == _ADDED_FIRST
+
+
 def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
     old = len(row.cells) == len(_TYPE_V1) and _types_are_old(source.sections["line types"])
-    names = _TYPE_V1 if old else _TYPE_V2
-    if not (old or source.columns(row, 10, len(_TYPE_V2), names)):
+    between = not old and _added_mass_first(source.sections["line types"])
+    names = _TYPE_V1 if old else (*_TYPE_V2[:6], *_TYPE_V1[5:]) if between else _TYPE_V2
+    if not (old or source.columns(row, 10, len(names), names)):
         return None
     check_names(source, "line types", names, least=len(_TYPE_V1) if old else 10)
     name = row.cells[0]
@@ -71,9 +79,13 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
         else:
             ei = source.number(row, rest[0], "EI (N m^2)", least=0.0)
         rest = rest[1:]
-    words = ("Can", "Cat", "Cdn", "Cdt") if old else ("Cd", "Ca", "CdAx", "CaAx")
+    added_first = old or between
+    words = ("Can", "Cat", "Cdn", "Cdt") if added_first else ("Cd", "Ca", "CdAx", "CaAx")
     c = [source.number(row, cell, word, least=0.0) for word, cell in zip(words, rest, strict=False)]
-    drag, added = ((c[2], c[3]), (c[0], c[1])) if old else ((c[0], c[2]), (c[1], c[3]))
+    drag, added = ((c[2], c[3]), (c[0], c[1])) if added_first else ((c[0], c[2]), (c[1], c[3]))
+    if between:
+        why = "added mass before drag, as the columns are named; MoorDyn 2 reads them as Cd Ca CdAx CaAx all the same"
+        notes.append(note(TAKEN, row, why, "for what MoorDyn 2 computes, name and order them Cd Ca CdAx CaAx"))
     if len(rest) > 4 and source.number(row, rest[4], "Cl", least=0.0) > 0.0:
         why = "Cl makes lines vibrate in their own eddies; hybrid has no such force"
         notes.append(note(LEFT_OUT, row, why, "raise drag.normal of the sections by what the vibration adds"))

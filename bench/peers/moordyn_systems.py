@@ -1,0 +1,89 @@
+"""Decks of several lines from the tests of MoorDyn, as numbers.
+
+From the folder tests/Mooring of MoorDyn, Copyright Matt Hall and contributors, BSD 3-clause licence
+(https://github.com/FloatingArrayDesign/MoorDyn): lines.txt, lines_body.txt, tripod.txt, local_euler/duplicated.txt and
+local_euler/complex_system.txt.  Line types and points that no line uses are left out.
+"""
+
+from __future__ import annotations
+
+_TYPES = "--- LINE TYPES ---\nTypeName Diam Mass/m EA BA EI Cd Ca CdAx CaAx\n(-) (m) (kg/m) (N) (N-s) (N-m^2) (-) (-) (-) (-)\n"
+_BODIES = (
+    "--- BODIES ---\nID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG I Volume CdA Ca\n"
+    "(#) (-) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)\n"
+)
+_RODS = (
+    "--- ROD TYPES ---\nTypeName Diam Mass/m Cd Ca CdEnd CaEnd\n(-) (m) (kg/m) (-) (-) (-) (-)\n"
+    "conn 0.116 25 1.1 1.0 1.1 1.0\n"
+    "--- RODS ---\nID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs Outputs\n(#) (-) (-) (m) (m) (m) (m) (m) (m) (-) (-)\n"
+)
+_POINTS = "--- POINTS ---\nID Attachment X Y Z M V CdA Ca\n(#) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)\n"
+_LINES = "--- LINES ---\nID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (-) (-) (-) (m) (-) (-)\n"
+
+
+def _points(*places: str) -> str:
+    return _POINTS + "".join(f"{i} {place} 0 0 0 0\n" for i, place in enumerate(places, 1))
+
+
+def _lines(*lines: str) -> str:
+    return _LINES + "".join(f"{i} {line} -\n" for i, line in enumerate(lines, 1))
+
+
+def _deck(*parts: str, **options: float) -> str:
+    rows = "".join(f"{value} {name}\n" for name, value in options.items())
+    return "a deck\n" + "".join(parts) + "--- OPTIONS ---\n" + rows + "--- need this line ---\n"
+
+
+_ANCHORS = ("Fixed 853.87 0 -320", "Fixed -426.94 739.47 -320", "Fixed -426.94 -739.47 -320")
+_HYWIND = _TYPES + "main 0.09 77.7066 384.243e6 -0.8 0 1.6 1.0 0.1 0.0\n"
+_THREE = _lines("main 1 4 902.2 20", "main 2 5 902.2 20", "main 3 6 902.2 20")
+_CHAIN = _TYPES + "chain 0.252 390 1.674e9 -1.0 0 1.37 1.0 0.64 0.0\n"
+
+DECKS = {
+    "lines": _deck(
+        _HYWIND, _points(*_ANCHORS, "Vessel 5.2 0 -70", "Vessel -2.6 4.5 -70", "Vessel -2.6 -4.5 -70"), _THREE,
+        kBot=3e6, cBot=3e5, WtrDnsty=1025, WtrDpth=320,
+    ),
+    "lines_body": _deck(
+        _HYWIND, _BODIES, "1 Coupled 0 0 -35 0 0 0 0 -35 0 0 0 0\n",
+        _points(*_ANCHORS, "Body1 5.2 0 -70", "Body1 -2.6 4.5 -70", "Body1 -2.6 -4.5 -70"), _THREE,
+        kBot=3e6, cBot=3e5, WtrDnsty=1025, WtrDpth=320,
+    ),
+    "duplicated": _deck(
+        _CHAIN, _points("Fixed 700 0 -200", "Vessel 0 0 0"), _lines("chain 1 2 760 76", "chain 1 2 760 152"),
+        kBot=1e5, cBot=1e4, WtrDnsty=1025, WtrDpth=200,
+    ),
+    # Its columns are named Can Cat Cdn Cdt; MoorDyn 2 reads them as they are named here.
+    "complex_system": _deck(
+        _TYPES, "cable 0.116 25 362e6 -1.0 1e2 1.0 0.0 1.1 0.008\n", "bouyancy 0.361 59 362e6 -1.0 1e2 1.0 0.469 2.617 0.345\n",
+        "stiffner 0.19 25 362e6 -1.0 38e3 1.0 0.0 1.1 0.008\n", "nylon 0.116 25 5e5 -1.0 0.0 1.0 0.0 2.0 0.1\n",
+        _BODIES, "1 Free 452 0 -313 0 0 0 29.5 0 0.098 0.014 0.5|0.5 1.0\n", _RODS,
+        "1 conn Free 455.5 0 -313 455.5 0 -313 0 -\n", "2 conn Free 448.5 0 -313 448.5 0 -313 0 -\n",
+        "3 conn Free 375 0 -250 375 0 -250 0 -\n", "4 conn Free 290 0 -215 290 0 -215 0 -\n",
+        _points("Fixed 600 0 -320", "Fixed 452 0 -320", "Body1 0 0 0", "Coupled 0 0 -63.6"),
+        _lines(
+            "nylon 2 3 7 7", "cable 1 R1A 147 15", "stiffner R1B 3 3.12 2", "stiffner 3 R2A 3.12 2",
+            "cable R2B R3A 107 11", "bouyancy R3B R4A 80 8", "cable R4B 4 340 34",
+        ),
+        kb=3e6, cb=3e5, WtrDpth=320,
+    ),
+    "tripod": _deck(
+        _TYPES, "Anchor-Chain 0.029256013 5.2972 35870379.7 -0.5 1918.873134 1.2 1.0 0.08 1.0\n",
+        "Anchor-Line 0.01 0.195 5002986.301 -0.5 31.26866438 1.2 1.0 0.08 1.0\n",
+        "Anchor-Bridle 0.019371902 0.336 389814.3373 -0.5 9.142866329 1.2 1.0 0.08 1.0\n",
+        "nodeFloat 0.82 133.3333333 2218027245.0 -0.5 93212594.98 1.2 1.0 0.455555556 1.0\n",
+        "nodeTether 0.024778998 3.8 25789847.71 -0.5 989.6834156 1.2 1.0 0.08 1.0\n",
+        _points(
+            "free -0.82284 1.47731 -0.17035", "free -0.41298 1.50121 0.30750", "free -0.82037 1.48247 -1.28410",
+            "free -4.14696 -0.56003 -5.84491", "free -10.84865 -4.66315 -14.58361", "fixed -14.24 -6.74 -15.8012",
+            "free 2.95977 2.79944 -5.75889", "free 10.52435 5.44562 -14.35501", "fixed 14.24 6.74 -15.9860",
+            "free -3.90598 2.64018 -6.29939", "free -10.43752 5.09097 -15.75171", "fixed -14.24 6.74 -15.8911",
+        ),
+        _lines(
+            "nodeFloat 1 2 0.63 3", "nodeTether 3 1 1.11374 5", "Anchor-Bridle 3 4 6 7", "Anchor-Line 4 5 11.7524 14",
+            "Anchor-Chain 5 6 4.42 5", "Anchor-Bridle 3 7 6 7", "Anchor-Line 7 8 11.7524 14", "Anchor-Chain 8 9 4.42 5",
+            "Anchor-Bridle 3 10 6 7", "Anchor-Line 10 11 11.7524 14", "Anchor-Chain 11 12 4.42 5",
+        ),
+        kb=3e6, cb=3e5, WtrDpth=16,
+    ),
+}  # fmt: skip

@@ -1,0 +1,124 @@
+"""hybrid on the scene of a deck of several lines, and MoorDyn on the deck: the pull of fairleads, at rest and heaved.
+
+    pip install -e ".[dev,bench]"
+    pytest bench/test_bench_moordyn_systems.py -m bench -s
+
+Decks of MoorDyn's own tests come in as one scene, as `hybrid import` makes it; all coupled points and bodies heave alike
+by 1 m at 8 s (ramp 16 s); of tripod, where nothing is coupled, the rest is compared.  Both programs have the same
+segments.  MoorDyn's rest is what it comes to when it
+is marched with its fairleads still.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from peers.moordyn_deck import march, options, segments
+from peers.moordyn_systems import DECKS
+
+import hybrid
+from hybrid.interop.moordyn.deck import Deck, read_deck
+from hybrid.interop.moordyn.rows import read_source
+from hybrid.scene.ends import Motion
+from hybrid.scene.motion import EndMotion
+
+pytestmark = pytest.mark.bench
+Vector = NDArray[np.float64]
+MOTION: dict[str, Any] = {"heave": {"amplitude": 1.0, "period": 8.0}, "ramp": 16.0}
+PERIOD, DURATION, EVERY = 8.0, 48.0, 0.1
+LAST = round(2 * PERIOD / EVERY)
+# Points whose force is compared, segments in those of the deck (ours and MoorDyn's), MoorDyn's step (s), and the time it
+# takes to come to rest (s).
+CASES: dict[str, tuple[tuple[int, ...], int, float, float]] = {
+    "lines": ((4, 5, 6), 2, 2e-3, 100.0),
+    "lines_body": ((4, 5, 6), 2, 2e-3, 100.0),
+    "duplicated": ((2,), 2, 4e-4, 60.0),
+    "complex_system": ((4,), 1, 1e-4, 40.0),
+    "tripod": ((6, 9, 12), 1, 5e-5, 8.0),
+}
+MEAN, PEAK = 0.5, 2.0  # per cent: figures that are asked for
+
+
+def moved(deck: Deck, name: str) -> bool:
+    """Whether a point of the scene is one that the program that calls MoorDyn moves."""
+    point = deck.points[int(name.removeprefix("point"))] if name.startswith("point") else None
+    if point is None:
+        return False
+    return point.kind == "coupled" or (point.kind == "body" and deck.bodies[point.on].kind == "coupled")
+
+
+def ours(path: Path, deck: Deck, points: tuple[int, ...], factor: int) -> tuple[Vector, Vector]:
+    """Rest (n,), and pull (n, nt) of points, N."""
+    (made,) = hybrid.import_moordyn(path).scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True)
+    for line in data["lines"].values():
+        if "cells" in line["mesh"]:
+            line["mesh"] = {"cells": factor * line["mesh"]["cells"]}
+        else:
+            s = np.array(line["mesh"]["nodes"])
+            line["mesh"] = {
+                "nodes": np.interp(np.arange(factor * (s.size - 1) + 1) / factor, np.arange(s.size), s).tolist()
+            }
+    still = hybrid.static(dict(data))
+    rest = np.array([np.linalg.norm(still[f"points/point{k}/force"][-1]) for k in points])
+    for name, point in data["points"].items():
+        if moved(deck, name):
+            point["motion"] = MOTION
+    if not any("motion" in point for point in data["points"].values()):
+        return rest, np.repeat(rest[:, None], LAST, axis=1)
+    data |= {"time": {"duration": DURATION, "step": 0.05}, "output": {"every": EVERY}}
+    result = hybrid.run(data)
+    return rest, np.array([np.linalg.norm(result[f"points/point{k}/force"], axis=1) for k in points])
+
+
+def theirs(
+    path: Path, deck: Deck, points: tuple[int, ...], factor: int, step: float, settle: float
+) -> tuple[Vector, Vector]:
+    heave = EndMotion(Motion.model_validate(MOTION), (0.0, 0.0, 0.0))
+    bodies = [body for body in deck.bodies.values() if body.kind == "coupled"]
+    coupled = [point for point in deck.points.values() if point.kind == "coupled"]
+
+    def motion(still: bool) -> Any:
+        def at(t: float) -> Vector:
+            up = heave.at(0.0 if still else t)[0]
+            here = [np.concatenate([np.array(body.place) + up, np.radians(body.angles)]) for body in bodies]
+            return np.concatenate([*here, *(np.array(point.place) + up for point in coupled), np.zeros(0)])
+
+        return at
+
+    quiet = {"disableOutput": 1, "disableOutTime": 1, "writeLog": 0}
+    text = options(segments(path.read_text(), factor), dtM=step, tScheme="RK4", TmaxIC=30, **quiet)
+    rest = march(text, motion(True), settle, EVERY, 10 * step)
+    here = np.array([np.linalg.norm(rest.forces[k][-50:].mean(axis=0)) for k in points])
+    if not (bodies or coupled):
+        return here, np.repeat(here[:, None], LAST, axis=1)
+    seen = march(text, motion(False), DURATION, EVERY, 2 * step)
+    pull = np.array([np.linalg.norm(seen.forces[k], axis=1) for k in points])
+    return here, pull
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_deck_of_several_lines_and_its_scene_pull_alike(name: str, tmp_path: Path) -> None:
+    pytest.importorskip("moordyn")
+    points, factor, step, settle = CASES[name]
+    path = tmp_path / f"{name}.txt"
+    path.write_text(DECKS[name])
+    deck = read_deck(read_source(path))
+    rest, pull = ours(path, deck, points, factor)
+    their_rest, their_pull = theirs(path, deck, points, factor, step, settle)
+    for i, k in enumerate(points):
+        here, there = pull[i, -LAST:], their_pull[i, -LAST:]
+        figures = [
+            (rest[i], their_rest[i]),
+            (here.mean(), there.mean()),
+            (here.max(), there.max()),
+            (here.min(), there.min()),
+        ]
+        words = " | ".join(f"{a:.0f} {100 * (b / a - 1):+.2f} %" for a, b in figures)
+        print(f"| {name} point {k} | {words} |", flush=True)
+        mean, peak = (abs(b / a - 1) for a, b in figures[1:3])
+        assert 100 * mean <= MEAN and 100 * peak <= PEAK

@@ -1,0 +1,200 @@
+"""The scene of all lines of a deck, as YAML with the lines of the deck in its comments: points, and lines between them.
+
+MoorDyn                              hybrid                because
+Fixed, Coupled points                fixed points          held; a deck does not say how a vessel moves
+Free points; M, V, CdA, Ca rho V     free points           as they are; initial_guess is their place in the deck
+points and rods on bodies            fixed points          where the deck puts the body, which is not free
+points on a Free body, all at its    one free point        the body's moments of inertia then do nothing
+reference point, its centre there
+free rods without length             sections of one line  the rod hands on the moment of one line to the other
+other ends of rods                   fixed points          lines turn freely at points
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.cables import chain_of, end_of, next_line
+from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
+from hybrid.interop.moordyn.notes import TAKEN, Note, in_order, note
+from hybrid.interop.moordyn.rows import Row, number, show
+from hybrid.interop.moordyn.scenes import ImportedScene
+from hybrid.interop.moordyn.tables import Tables, flow, lines_of
+from hybrid.interop.moordyn.types import LineType
+from hybrid.scene.read import parse_either
+
+# Two lines are one only where a rod without length joins them: points are points.
+_JOINTS = ("rod",)
+_NEAR = 0.05  # part of the depth: an end that is as near to the bed has a line that may lie there
+_APART = "; or --separate, for each cable that can be as a scene of its own"
+
+
+def system_of(deck: Deck) -> ImportedScene:
+    """All lines of a deck as one scene; SceneError, in lines of the deck, if it makes none."""
+    made = _SystemMaker(deck)
+    text = made.text()
+    if made.complaints:
+        raise SceneError(sorted(dict.fromkeys(made.complaints), key=lambda c: c.line or 0), deck.file)
+    try:
+        scene, _ = parse_either(text)
+    except SceneError as error:
+        raise SceneError([made.of_deck(c) for c in error.complaints], deck.file) from None
+    return ImportedScene("system", tuple(sorted(deck.lines)), scene, text, in_order(made.notes))
+
+
+class _SystemMaker(Tables):
+    """Text, notes and complaints of all lines of a deck."""
+
+    def __init__(self, deck: Deck) -> None:
+        super().__init__(deck, [deck.types[line.type] for line in deck.lines.values()])
+        self.points: dict[str, tuple[dict[str, Any], Row]] = {}  # by name, with its row
+        self.chains: dict[str, list[tuple[Line, bool]]] = {}
+        self.complaints: list[Complaint] = []
+
+    def text(self) -> str:
+        name = show(Path(self.deck.file).name) or "deck"
+        lines = self._lines()
+        points = [f"  {key}: {flow(data)}{lines_of([row.line])}" for key, (data, row) in self.points.items()]
+        bends = [kind.ei > 0.0 for kind in self.types]
+        parts = [
+            f"# From the MoorDyn deck {name}, by `hybrid import`.",
+            "# Numbers after # are lines of the deck.  SI units, z up, the still water at z = 0.",
+            f"title: {json.dumps(name)}",
+            *self._environment(),
+            "points:",
+            *points,
+            "lines:",
+            *lines,
+            "# A deck gives neither the motion of the points nor the duration: add points.*.motion and, for motion,",
+            "# time: {duration: 60, step: 0.05}",
+        ]
+        self._differences(bends)
+        return "\n".join(parts) + "\n"
+
+    def of_deck(self, complaint: Complaint) -> Complaint:
+        """A complaint about the scene, as one about the row of the deck that it is of."""
+        line = min(x.row.line for x in self.deck.lines.values())
+        for kind, name in re.findall(r"(points|lines)\.([\w+]+)", complaint.where):
+            if kind == "points" and name in self.points:
+                line = self.points[name][1].line
+            elif kind == "lines" and name in self.chains:
+                line = self.chains[name][0][0].row.line
+        return replace(complaint, where=f"as a scene: {complaint.where}", line=line, column=None)
+
+    def _at_the_bed(self) -> Sequence[LineType]:
+        depth = self.options.depth or 0.0
+        found = []
+        for line in self.deck.lines.values():
+            low = min(end_of(self.deck, end).place[2] for end in line.ends)
+            found += [self.deck.types[line.type]] if low < -(1.0 - _NEAR) * depth else []
+        return found or self.types
+
+    # --- lines ---------------------------------------------------------------------------------
+
+    def _lines(self) -> list[str]:
+        parts: list[str] = []
+        done: set[int] = set()
+        for id in sorted(self.deck.lines):
+            if id in done:
+                continue
+            chain = chain_of(self.deck, id, _JOINTS)
+            done |= {line.id for line, _ in chain}
+            name = "line" + "+".join(str(line.id) for line, _ in chain)
+            self.chains[name] = chain
+            parts += self._line(name, chain)
+        return parts
+
+    def _line(self, name: str, chain: Sequence[tuple[Line, bool]]) -> list[str]:
+        lines = [line for line, _ in chain]
+        types = [self.deck.types[line.type] for line in lines]
+        for line, kind in zip(lines, types, strict=True):
+            if kind.trouble:
+                self._refuse(line.row, f"line type {kind.name}: {kind.trouble}", kind.instead)
+        (first, back), (last, last_back) = chain[0], chain[-1]
+        if next_line(self.deck, first, 1 if back else 0, _JOINTS) is not None:
+            for line in lines:
+                self._refuse(line.row, "it closes a ring of free rods; a line has two ends", "make one of them Fixed")
+        start = self._point(first.ends[1 if back else 0], types[0].ei > 0.0)
+        end = self._point(last.ends[0 if last_back else 1], types[-1].ei > 0.0)
+        lengths = [self._length(line) for line in lines]
+        for line, turned in chain[:-1]:
+            self._rod_joint(self.deck.rods[line.ends[0 if turned else 1][1]])
+        each = zip(lines, types, lengths, strict=True)
+        parts = [f"  {name}:", f"    start: {start}", f"    end: {end}", "    sections:"]
+        parts += [f"      {self._section(line, kind, length)}" for line, kind, length in each]
+        bends = [kind.ei > 0.0 for kind in types]
+        if any(bends) and not all(bends):
+            why = f"{name}: a section without EI is part of it, so all of it is computed without bending"
+            self.notes.append(Note(TAKEN, None, "", why, "give bending_stiffness to every section"))
+        return parts + [f"    {row}" for row in self._mesh(lines, lengths)]
+
+    def _refuse(self, row: Row, why: str, instead: str) -> None:
+        fix = (instead or "leave it out of a copy of the deck") + _APART
+        expected = f"a line that can be carried over; {why}"
+        self.complaints.append(Complaint("left out", row.shown, expected, fix, row.line))
+
+    # --- points --------------------------------------------------------------------------------
+
+    def _point(self, end: tuple[str, int, str], bends: bool) -> str:
+        """Name of the point at the end of a line; it is made at the first."""
+        kind, id, letter = end
+        row = self.deck.points[id].row if kind == "point" else self.deck.rods[id].row
+        body = self._free_body(kind, id)
+        name = f"body{body.id}" if body is not None else f"{kind}{id}{letter}"
+        if name not in self.points:
+            self.points[name] = ({}, row)  # in the order of the lines
+            self.points[name] = (self._body_point(body) if body is not None else self._at(end, name, row), row)
+        if bends and kind == "rod":
+            why = "a rod holds the direction of a line that bends; at a point of several lines each turns freely"
+            self.notes.append(note(TAKEN, row, why, "with --separate the line is clamped"))
+        return name
+
+    def _at(self, end: tuple[str, int, str], name: str, row: Row) -> dict[str, Any]:
+        kind, id, _ = end
+        thing = self.deck.points[id] if kind == "point" else self.deck.rods[id]
+        if isinstance(thing, Point) and thing.kind == "free":
+            return self._free(thing)
+        held = end_of(self.deck, end)
+        body = self.deck.bodies.get(thing.on) if thing.kind.startswith("body") else None
+        if held.lost is not None:
+            self._refuse(row, f"{held.lost.text}: {held.lost.why}", held.lost.instead)
+        elif body is not None and (body.kind == "free" or "pinned" in body.kind):
+            self._refuse(body.row, "a rigid body that lines move", "write Fixed or Coupled and its place at rest")
+        else:
+            self.notes += [replace(n, instead=n.instead.replace("ends.{end}", f"points.{name}")) for n in held.notes]
+        return {"position": held.place}
+
+    def _free(self, point: Point) -> dict[str, Any]:
+        found: dict[str, Any] = {"initial_guess": point.place}
+        if point.mass:
+            found["mass"] = point.mass
+        found |= self._water(point)
+        return found | ({"force": point.force} if any(point.force) else {})
+
+    def _free_body(self, kind: str, id: int) -> Body | None:
+        """The free body that is no more than a point: all that is on it is at its centre."""
+        point = self.deck.points[id] if kind == "point" else None
+        body = self.deck.bodies.get(point.on) if point is not None and point.kind == "body" else None
+        if body is None or body.kind != "free" or any(number(x) != 0.0 for x in body.rest[1].split("|")):
+            return None
+        there = [p.place for p in self.deck.points.values() if p.kind == "body" and p.on == body.id]
+        if any(any(place) for place in there) or any(rod.on == body.id for rod in self.deck.rods.values()):
+            return None
+        return body if all(number(self._first(body, i)) is not None for i in (0, 3, 4, 5)) else None
+
+    def _first(self, body: Body, i: int) -> str:
+        return body.rest[i].split("|")[0]
+
+    def _body_point(self, body: Body) -> dict[str, Any]:
+        mass, volume, area, added = (float(number(self._first(body, i)) or 0.0) for i in (0, 3, 4, 5))
+        why = "everything on this body is at its centre: it is a point of its mass, volume, drag and added mass"
+        if any("|" in body.rest[i] for i in (4, 5)):
+            why += "; of several coefficients the first is taken, for all directions"
+        self.notes.append(note(TAKEN, body.row, why))
+        return self._free(Point(body.id, body.row, "free", 0, body.place, mass, volume, area, added))

@@ -1,0 +1,157 @@
+"""MoorDyn decks of several lines as one scene: what becomes of points, rods and bodies, and what is refused."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from moordyn_decks import DECKS, FOLDER, one_scene, text_of
+
+import hybrid
+from hybrid.interop.moordyn import import_moordyn
+from hybrid.scene.read import parse_either
+from hybrid.scene.system import FixedPoint, FreePoint, System
+
+# A riser over a buoyant section, held by a tether: rods without length join its sections, a body the tether.
+RISER = """\
+--- LINE TYPES ---
+TypeName Diam Mass/m EA BA EI Can Cat Cdn Cdt
+- m kg/m N N-s N-m^2 - - - -
+riser 0.12 25 3.6e8 0 100 1.0 0.0 1.1 0.008
+float 0.36 59 3.6e8 0 100 1.0 0.4 2.6 0.3
+rope 0.12 25 5.0e5 0 0 1.0 0.0 2.0 0.1
+--- BODIES ---
+ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG I Volume CdA Ca
+- - m m m deg deg deg kg m kg-m^2 m^3 m^2 -
+1 Free 450 0 -313 0 0 30 29.5 0 0.1 0.014 0.5|0.6 1.0
+--- RODS ---
+ID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs Outputs
+- - - m m m m m m - -
+1 conn Free 375 0 -250 375 0 -250 0 -
+2 conn Free 290 0 -215 290 0 -215 0 -
+--- POINTS ---
+ID Attachment X Y Z M V CdA Ca
+- - m m m kg m^3 m^2 -
+1 Fixed 600 0 -320 0 0 0 0
+2 Fixed 452 0 -320 0 0 0 0
+3 Body1 0 0 0 0 0 0 0
+4 Coupled 0 0 -60 0 0 0 0
+--- LINES ---
+ID LineType AttachA AttachB UnstrLen NumSegs Outputs
+- - - - m - -
+1 rope 2 3 7 7 -
+2 riser 1 3 150 15 -
+3 riser R1A 3 110 11 -
+4 float R1B R2A 80 8 -
+5 riser R2B 4 340 34 -
+--- OPTIONS ---
+320 WtrDpth
+--- need this line ---
+"""
+
+
+@pytest.mark.parametrize("name", [name for name in DECKS if name != "rods_and_bodies"])
+def test_every_deck_is_one_scene_that_is_planned(name: str) -> None:
+    deck = import_moordyn(FOLDER / f"{name}.txt")
+    (made,) = deck.scenes.values()
+    assert parse_either(made.text)[0] == made.scene and hybrid.plan(made.scene).cells
+    assert made.lines == tuple(range(1, 1 + len(made.lines)))
+    assert isinstance(made.scene, System) == (name in ("three_lines", "free_fall", "generator_spread"))
+
+
+def test_lines_that_meet_nowhere_are_one_scene_as_well() -> None:
+    (made,) = import_moordyn(FOLDER / "three_lines.txt").scenes.values()
+    scene = made.scene
+    assert list(scene.points) == [f"point{k}" for k in (1, 4, 2, 5, 3, 6)]
+    assert scene.points["point4"] == FixedPoint(position=(40.0, 0.0, -14.0))
+    tail = scene.lines["line3"]
+    assert (tail.start, tail.end) == ("point3", "point6") and tail.mesh.cells == 10
+    reach = math.dist(scene.points["point3"].position, scene.points["point6"].position)
+    assert tail.cable.length == pytest.approx(0.98 * reach)
+    assert {n.line for n in made.notes if "calling program" in n.why} == {13, 14, 15}
+
+
+def test_free_points_with_one_line_hang_there(tmp_path: Path) -> None:
+    made = one_scene(text_of("free_fall"), tmp_path)
+    weight, loose = made.scene.points["point2"], made.scene.points["point4"]
+    assert (weight.mass, weight.volume, weight.drag_area) == (500.0, 0.06, 0.2)
+    assert weight.added_mass == pytest.approx(0.5 * 1025.0 * 0.06)
+    assert loose == FreePoint(initial_guess=(20.0, 0.0, -55.0))
+
+
+def test_rods_without_length_join_lines_and_a_body_at_its_centre_is_a_point(tmp_path: Path) -> None:
+    made = one_scene(RISER, tmp_path)
+    lines, points = made.scene.lines, made.scene.points
+    assert list(lines) == ["line1", "line2", "line5+4+3"]
+    riser = lines["line5+4+3"]  # in the direction of line 3, which is written from the rod to the body
+    assert (riser.start, riser.end) == ("point4", "body1")
+    assert [x.length for x in riser.sections] == [340.0, 80.0, 110.0]
+    assert riser.mesh.cells == 53
+    body = points["body1"]
+    assert (body.initial_guess, body.mass, body.volume, body.drag_area) == ((450.0, 0.0, -313.0), 29.5, 0.014, 0.5)
+    assert body.added_mass == pytest.approx(1025.0 * 0.014)
+    assert lines["line1"].chosen_model.kind == "catenary" and riser.chosen_model.kind == "rod"
+
+
+def test_columns_of_added_mass_before_drag_are_read_as_they_are_named(tmp_path: Path) -> None:
+    made = one_scene(RISER, tmp_path)
+    section = made.scene.lines["line2"].sections[0]
+    assert (section.drag.normal, section.drag.tangential, section.added_mass.normal) == (1.1, 0.008, 1.0)
+    deck = import_moordyn(tmp_path / "deck.txt")
+    assert {n.line for n in deck.notes if "as the columns are named" in n.why} == {4, 5, 6}
+    now = one_scene(RISER.replace("Can Cat Cdn Cdt", "Cd Ca CdAx CaAx"), tmp_path).scene.lines["line2"].sections[0]
+    assert (now.drag.normal, now.drag.tangential, now.added_mass.tangential) == (1.0, 1.1, 0.008)
+
+
+def test_a_force_on_a_point_of_version_1(tmp_path: Path) -> None:
+    text = text_of("version1")
+    # The force acts on a cable of two sections, which has no place for it; with a third line there the point is one.
+    assert text.count("3.0e-4   0     0     0 ") == 1
+    row = next(row for row in text.splitlines() if row.split()[:1] == ["1"] and "2.9" in row)
+    third = row.replace("1", "3", 1)
+    text = text.replace("3.0e-4   0     0     0 ", "3.0e-4   0     0     2 ")
+    last = [row for row in text.splitlines() if row.split()[:1] == ["2"]][-1]
+    scene = one_scene(text.replace(last, last + "\n" + third), tmp_path).scene
+    (free,) = [p for p in scene.points.values() if isinstance(p, FreePoint)]
+    assert free.force == (0.0, 0.0, 2.0)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "says"),
+    [
+        ("3 Body1 0 0 0 0", "3 Body1 1 0 0 0", 10, "a rigid body that lines move"),
+        ("29.5 0 0.1", "29.5 0|0|1 0.1", 10, "a rigid body that lines move"),
+        ("290 0 -215 0 -", "291 0 -215 3 -", 15, "a rigid rod that moves"),
+        ("4 Coupled", "4 Turbine1", 22, "FAST.Farm"),
+        ("rope 0.12 25 5.0e5", "rope 0.12 25 stretch.dat", 26, "EA is not one number"),
+        ("3 riser R1A 3 110 11 -\n", "3 riser R1A R2B 110 11 -\n", 28, "ring of free rods"),
+        ("4 Coupled 0 0 -60", "4 Coupled 0 0 -900", 22, "on the seabed or above"),
+    ],
+)
+def test_what_has_no_place_refuses_the_deck(old: str, new: str, line: int, says: str, tmp_path: Path) -> None:
+    assert RISER.count(old) == 1
+    with pytest.raises(hybrid.SceneError) as refused:
+        one_scene(
+            RISER.replace(old, new).replace(
+                "5 riser R2B 4 340 34 -\n", "" if "R2B 110" in new else "5 riser R2B 4 340 34 -\n"
+            ),
+            tmp_path,
+        )
+    assert line in {c.line for c in refused.value.complaints if says in c.text()}, str(refused.value)
+
+
+def test_a_point_that_has_a_volume_and_no_mass_lifts_its_line(tmp_path: Path) -> None:
+    """The anchor bears what the point lifts less the weight of the line in water."""
+    text = text_of("free_fall")
+    assert text.count("500    0.06    0.2    0.5") == text.count("2    Free         0    0    -60 ") == 1
+    text = text.replace("500    0.06    0.2    0.5", "0 0.5 0.2 0.5").replace("0    0    -60 ", "0 0 -10 ")
+    text = text.replace("1    Coupled      0    0    5 ", "1 Fixed 0 0 -79 ")
+    scene = one_scene(text, tmp_path).scene
+    assert scene.points["point2"].mass == 0.0 and scene.points["point2"].volume == 0.5
+    found = hybrid.static(scene.model_copy(update={"lines": {"line1": scene.lines["line1"]}, "points": {
+        name: scene.points[name] for name in ("point1", "point2")}}))  # fmt: skip
+    rho, g, line = 1025.0, scene.environment.gravity, scene.lines["line1"].sections[0]
+    wet = (line.mass - rho * math.pi / 4 * line.diameter**2) * g * line.length
+    lift = found["points/point1/force"][-1]
+    assert lift[2] == pytest.approx(rho * g * 0.5 - wet, rel=1e-9)
