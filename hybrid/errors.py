@@ -98,6 +98,7 @@ EVENTS_BY_WEIGHT = (
     "accuracy missed",
     "no error figure",
     "error uncertain",
+    "not converged",
     "largest force uncertain",
     "irregular motion",
     "end force between outputs",

@@ -46,6 +46,14 @@ class RequestedAccuracy:
     of_tension: float | None = None  # the same of the tension along the line
     instant: bool = False  # at every output, also where a motion is irregular
 
+    def asks(self, name: str) -> bool:
+        """Whether an output is asked for: position, tension (of the line), curvature, bending_moment, an end force."""
+        asked = {
+            "position": self.position, "curvature": self.of_curvature, "bending_moment": self.of_moment,
+            "tension": self.of_tension,
+        }  # fmt: skip
+        return asked.get(name, self.tension or self.of_end_force) is not None
+
     @property
     def text(self) -> str:
         """In words."""

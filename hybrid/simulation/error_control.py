@@ -22,9 +22,17 @@ from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.scene.schema import Scene
-from hybrid.simulation.error_estimate import COARSER, Errors, Estimate
-from hybrid.simulation.error_statistics import LARGEST, STATISTICS, estimates, snaps, statistics_of
-from hybrid.simulation.refinement import MOST_OF_MODEL, Free, Verdict, judge, refined
+from hybrid.simulation.error_estimate import Errors, Estimate
+from hybrid.simulation.error_order import COARSER
+from hybrid.simulation.error_statistics import (
+    LARGEST,
+    STATISTICS,
+    StatisticEstimate,
+    estimates,
+    snaps,
+    statistics_of,
+)
+from hybrid.simulation.refinement import MOST_OF_MODEL, Free, Verdict, judge, not_converged, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
 from hybrid.store.named_arrays import Tree, matched
@@ -88,7 +96,7 @@ class ErrorController:
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
     estimate: Estimate | None = None  # of the result as it is
-    statistics: dict[str, Estimate] = field(default_factory=dict)  # of its extremes and deviations; none: nothing moves
+    statistics: dict[str, StatisticEstimate] = field(default_factory=dict)  # of extremes and deviations, if it moves
     scattered: list[str] = field(default_factory=list)  # end forces whose largest values are by chance: not judged
     _ratio: float = np.inf  # of the error of the result to what is asked
     _judged: int = 0  # results
@@ -100,7 +108,9 @@ class ErrorController:
     def notes(self) -> tuple[tuple[str, str], ...]:
         """Events of the result, kind and text: of the control, of the result itself, and of its model error."""
         found = self.estimate
+        regular = found is not None and not self.irregular  # the other is judged otherwise
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
+        own += not_converged(found.not_converged, self.asked) if found is not None and regular else []
         return (*own, *((*found.run.notes, *found.notes) if found is not None else ()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
@@ -376,7 +386,7 @@ class ErrorController:
             self.estimate = Estimate.restored(saved["estimate"], scene, shape)
         if saved["statistics"]:
             trees = matched(saved["statistics"], dict.fromkeys(STATISTICS), "statistics")
-            self.statistics = {name: Estimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
+            self.statistics = {name: StatisticEstimate.restored(x, scene, (1, *shape[1:])) for name, x in trees.items()}
         self.choice = ModelChoice(*matched(saved["choice"], ["", ""], "choice"))
         if self.choice.kind not in ("", *WORDS):
             raise ValueError(f"model chosen: got {self.choice.kind!r}, expected one of {', '.join(WORDS)}")

@@ -8,11 +8,23 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Self
 
 import numpy as np
 
 from hybrid.scene.schema import Scene
+from hybrid.simulation.error_order import (
+    COARSER,
+    MOST,
+    MOST_ORDER,
+    ORDERS,
+    around,
+    at_all_outputs,
+    falls,
+    magnitude,
+    order,
+    squares,
+)
 from hybrid.simulation.run_sample import (
     END_FORCES,
     NOT_ESTIMATED,
@@ -27,22 +39,20 @@ from hybrid.simulation.run_sample import (
 )
 from hybrid.store.named_arrays import Tree, matched
 
-# The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
-# 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.25 it
-# is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
-ORDER, ORDERS, MOST_ORDER = 1.5, (1.25, 2.0), 3.0
+# Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
+# this much larger, and this part of it is that of their sizes.  docs/accuracy.md has what it has been worth.
+SAFETY, OF_SIZES = 1.2, 0.2
+# A quantity that finer runs change by more than this part of what coarser ones did does not converge; unless it is by
+# less than a part of its largest value that nobody asks for.
+NOT_CONVERGED, NOTHING = 0.9, 0.005
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
-# Cells and steps of a coarser run are so many times as long.
-COARSER = 2.0
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
 BELIEVED = 30.0
 # Part of the length of catenaries, or of rods, by which two runs may differ whose model errors count as the same.
 OTHER_ZONES = 0.1
 # What a checkpoint calls the cells, the outputs and the catenaries of the run that model errors are of.
 MODEL_OF = "cells", "every", "catenary"
-# Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
-MOST = 500_000
 
 
 class Block(NamedTuple):
@@ -93,22 +103,27 @@ class Estimate:
     An error of order p is k^p times as large on cells k times as long.
     """
 
+    orders = ORDERS  # bounds of the order of convergence
+    cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
+
     def __init__(
         self,
         result: RunSample,
         coarse: RunSample,
         rough: RunSample | None,
         coarsest: RunSample | None,
-        orders: tuple[float, float] = ORDERS,
     ) -> None:
         """coarse: longer cells, and steps if there are any; rough: its cells, steps longer still; coarsest: both.
 
-        None: it failed, or nothing moves.  orders: bounds of the order of convergence.
+        None: it failed, or nothing moves.
         """
         self.run, both = result, [name for name in result.values if name in coarse.values]
         # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
-        self.falls = {name: _falls(name, result, coarse, coarsest) for name in both}
-        self.order = {name: _order(falls, orders) for name, falls in self.falls.items()}
+        fall = {name: falls(name, result, coarse, coarsest) for name in both}
+        self.falls = {name: found.mean for name, found in fall.items()}
+        self.order = {name: order(max(found.mean, found.largest), self.orders) for name, found in fall.items()}
+        # Root mean square of the last change of each output, and of that before.
+        self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.set_model_errors(coarse)
         slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
         self._coarse, self._rough = coarse, rough if slower else None
@@ -127,16 +142,16 @@ class Estimate:
         result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
         count, by_step = len(result.values[name]), None
         if rough is not None and name in rough.values:
-            known, own = _around(every_of(count, rough.every), a, b)
+            known, own = around(every_of(count, rough.every), a, b)
             later = coarse.some(name, every_of(len(coarse.values[name]), rough.every // coarse.every)[own])
             late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
             late = late / (result.steps / coarse.steps) ** p
-            by_step = _at_all_outputs(late, known, a, b)
+            by_step = at_all_outputs(late, known, a, b)
         if not self.has_mesh:
             return by_step, None
-        known, own = _around(every_of(count, coarse.every), a, b)
+        known, own = around(every_of(count, coarse.every), a, b)
         change = result.some(name, known) - coarse.values[name][own]
-        return by_step, self._mesh_error(name, _at_all_outputs(change, known, a, b), by_step, coarse)
+        return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse)
 
     def _mesh_error(self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample) -> np.ndarray:
         """Error by the mesh, from a change since a run with other cells: less what its steps have changed."""
@@ -189,12 +204,14 @@ class Estimate:
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         other_zones = result.resolution.zones != before.resolution.zones
         for name, p in self.order.items():
+            self.changes[name] = np.nan, self.changes[name][0]
             if other_zones:  # what has changed is not by cells and steps alone
                 for found, ratio in ((by_step, shorter), (by_mesh, finer)):
                     if name in found:
                         found[name] = found[name] / ratio**p
                 continue
             change = np.asarray(result.values[name]) - np.asarray(before.values[name])
+            self.changes[name] = float(np.sqrt(squares(change) / max(1, change.size))), self.changes[name][1]
             if finer > LEAST_RATIO and name in by_mesh:
                 if name in by_step:
                     by_step[name] = by_step[name] / shorter**p
@@ -202,14 +219,25 @@ class Estimate:
             elif shorter > LEAST_RATIO:
                 by_step[name] = change / (shorter**p - 1.0)
 
+    @property
+    def not_converged(self) -> dict[str, float]:
+        """Outputs whose last change was no smaller than that before, and how many times as large it was."""
+        found = {}
+        for name, (last, before) in self.changes.items():
+            if name not in RIGHT and last > NOT_CONVERGED * before:
+                most = float(np.abs(np.asarray(self.run.values[name])).max(initial=0.0))
+                if last > NOTHING * most:
+                    found[END_FORCES.get(name, name)] = last / before
+        return found
+
     def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
         """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
         if quantity in self.run.model_error:
             return np.asarray(self.run.model_error[quantity][a:b])
         if quantity not in self._model:
             return None
-        known, own = _around(every_of(self._count, self._model_every), a, b)
-        return _at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
+        known, own = around(every_of(self._count, self._model_every), a, b)
+        return at_all_outputs(np.asarray(self._model[quantity][own]), known, a, b)
 
     @property
     def _count(self) -> int:
@@ -218,12 +246,12 @@ class Estimate:
 
     @property
     def errors(self) -> Errors:
-        """Magnitudes by cause.  Causes add up in magnitude: that they cancel is seldom true at all times."""
+        """Magnitudes by cause.  That of the model adds to the others: how they cancel is not known."""
         shapes: dict[str, dict[str, tuple[int, ...]]] = {}
         for block in self._blocks(1):
             shapes.setdefault(block.cause, {})[block.name] = (self._count, *block.values.shape[1:])
-        order = ("mesh", "time", "model", "total")
-        return Errors({cause: shapes[cause] for cause in order if cause in shapes}, self._blocks)
+        causes = ("mesh", "time", "model", "total")
+        return Errors({cause: shapes[cause] for cause in causes if cause in shapes}, self._blocks)
 
     def _blocks(self, most: int | None = None) -> Iterator[Block]:
         """All errors, in blocks of so many outputs; most: of the first output alone."""
@@ -247,29 +275,43 @@ class Estimate:
         if model is not None:
             out["model"] = model
         if by_mesh is not None:
-            out["mesh"] = total = _magnitude(by_mesh, name)
+            out["mesh"] = total = magnitude(by_mesh, name)
             if by_step is not None:
-                out["time"] = _magnitude(by_step, name)
+                out["time"] = magnitude(by_step, name)
                 total = total + out["time"]
+                if self.cancels:
+                    both = magnitude(by_mesh + by_step, name)
+                    total = SAFETY * ((1.0 - OF_SIZES) * both + OF_SIZES * total)
             out["total"] = total + (model if model is not None else 0.0)
         return out
 
     def checkpoint(self) -> Tree:
         """All of it, as named arrays and plain values."""
         by_step, by_mesh = self._keep()
-        model = {name: _at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
+        model = {name: at_all_outputs(np.asarray(x), every_of(self._count, self._model_every), 0, self._count)
                  for name, x in self._model.items()}  # fmt: skip
-        found: Tree = {"order": self.order, "falls": self.falls, "late": by_step, "cells": by_mesh, "model": model}
+        changes = {name: np.array(x) for name, x in self.changes.items()}
+        found: Tree = {
+            "order": self.order,
+            "falls": self.falls,
+            "changes": changes,
+            "late": by_step,
+            "cells": by_mesh,
+            "model": model,
+        }
         of = dict(zip(MODEL_OF, self._model_of, strict=True))
         return found | {"notes": self.notes, "run": self.run.checkpoint(), "model_of": of}
 
     @classmethod
-    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Estimate:
+    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
         """An estimate from a checkpoint; shape, errors: as of `restored_sample`."""
         self = cls.__new__(cls)
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
+        unknown = dict.fromkeys(tree["order"], np.full(2, np.nan))  # of checkpoints that do not have them
+        changes = matched(tree.get("changes", unknown), unknown, "changes")
+        self.changes = {name: (float(x[0]), float(x[1])) for name, x in changes.items()}
         late, cells, model = (restored_outputs(tree[name], shape) for name in ("late", "cells", "model"))
         self.by_step, self.by_mesh, self._model, self._model_every = late, cells, model, 1
         older = dict(zip(MODEL_OF, (1, 1, np.zeros(0)), strict=True))  # checkpoints of 0.6 do not say
@@ -280,7 +322,7 @@ class Estimate:
         self.has_step, self.has_mesh = bool(late), bool(cells)
         if not (set(late) | set(cells) <= set(self.order) <= set(self.run.values) and self.run.every == 1):
             raise ValueError("errors of outputs that are not there")
-        if not all(ORDERS[0] <= p <= MOST_ORDER for p in self.order.values()):
+        if not all(1.0 <= p <= MOST_ORDER for p in self.order.values()):
             raise ValueError("orders that no errors have")
         return self
 
@@ -294,33 +336,6 @@ def summary(errors: Errors) -> dict[str, float]:
     return out
 
 
-# --- parts of the estimate ----------------------------------------------------------------------
-
-
-def _falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample | None) -> float:
-    """Difference of the last two of three runs over that of the first two, over all times; NaN: they do not show it."""
-    if coarsest is None or name not in coarsest.values:
-        return np.nan
-    values, every = coarsest.values[name], coarsest.every
-    final, middle = (every_of(len(x.values[name]), every // x.every) for x in (result, coarse))
-    rows, later, earlier = max(1, MOST // int(np.prod(values.shape[1:]))), 0.0, 0.0
-    for a in range(0, len(values), rows):  # of all times: peaks jump about
-        between = coarse.some(name, middle[a : a + rows])
-        later += _squares(result.some(name, final[a : a + rows]) - between)
-        earlier += _squares(between - values[a : a + rows])
-    return float(np.sqrt(later) / np.sqrt(earlier)) if later > 0.0 and earlier > 0.0 else np.nan
-
-
-def _order(falls: float, bounds: tuple[float, float]) -> float:
-    """The order with which an output converges; bounded, because a ratio of noise is one as well."""
-    return ORDER if np.isnan(falls) else float(np.clip(-np.log(falls) / np.log(COARSER), *bounds))
-
-
-def _squares(x: np.ndarray) -> float:
-    """Sum of all squares; numpy's norm wakes the threads of BLAS, which takes a hundred times as long."""
-    return float((x * x).sum())
-
-
 def _implausible(coarse: RunSample) -> str:
     """What to say where the model error of a line whose zones move is too large to be true; else empty."""
     found = coarse.model_error.get("position")
@@ -331,29 +346,3 @@ def _implausible(coarse: RunSample) -> str:
         f"the error of leaving bending out comes to {float(np.max(error)):.3g} m, beyond what its criteria let pass "
         f"({coarse.bound:.3g} m): it is not believed, and not part of the error; compare with model: rod"
     )
-
-
-def _around(known: np.ndarray, a: int, b: int) -> tuple[np.ndarray, slice]:
-    """Of the outputs whose errors are known, the numbers of those that errors from a to b follow from; and which."""
-    first = max(0, int(np.searchsorted(known, a, side="right")) - 1)
-    own = slice(first, int(np.searchsorted(known, b - 1)) + 1)
-    return known[own], own
-
-
-def _at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.ndarray:
-    """Errors at the outputs `known` at all of them from a to b; in between the larger of the two beside it: peaks are
-    not averaged out."""
-    if known.size == b - a and known[0] == a and known[-1] == b - 1:
-        return error
-    at = np.arange(a, b)
-    right = np.clip(np.searchsorted(known, at), 1, known.size - 1)
-    before, after = error[right - 1], error[right]
-    between = np.where(np.abs(before) > np.abs(after), before, after)
-    exact = np.isin(at, known)
-    between[exact] = error[np.isin(known, at)]
-    return np.asarray(between)
-
-
-def _magnitude(error: np.ndarray, name: str) -> np.ndarray:
-    """Of vectors their length, of numbers their size."""
-    return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Mapping
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from typing import NamedTuple
@@ -78,10 +78,23 @@ def judge(asked: RequestedAccuracy, errors: Errors, run: RunSample, skip: Collec
         if total / bound >= worst.ratio:
             model = _largest(errors, "model", name)
             mesh, time = (_largest(errors, cause, name) / bound for cause in ("mesh", "time"))
+            share = (total - model) / bound / (mesh + time) if mesh + time > 0.0 else 0.0
+            mesh, time = mesh * share, time * share  # of what they make together, where they cancel
             quantity = name.replace("end_force_", "force at the ").replace("_", " ")
             text = f"{quantity}: error {total:.3g} {unit}, asked {bound:.3g} {unit}"
             worst = Verdict(total / bound, mesh, time, model / bound, text, name=name)
     return replace(worst, reached=", ".join(text for _, text in reached.values()))
+
+
+def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -> list[tuple[str, str]]:
+    """Events of quantities that finer runs change as much as coarser ones did; found: by how many times as much."""
+    texts: dict[str, list[str]] = {}
+    for name, times in found.items():
+        kind = "error uncertain" if asked is None or asked.asks(name) else "not converged"
+        texts.setdefault(kind, []).append(f"{name.replace('_', ' ')} ({times:.2g} times)")
+    why = "finer cells and steps change as much as coarser ones did"
+    end = "the error may be larger than its figure"
+    return [(kind, f"{why}: {', '.join(names)}; {end}") for kind, names in texts.items()]
 
 
 def _largest(errors: Errors, cause: str, name: str) -> float:

@@ -1,0 +1,81 @@
+"""How errors follow from what runs differ by: the order with which they fall, their sizes, outputs between outputs."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.simulation.run_sample import END_FORCES, RunSample, every_of
+
+# The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
+# 2, contact and impact have 1; a figure by 1.5 is 1.6 times too large for the first, half of the second.  Below 1.5 it
+# is most often the coarsest run that is too coarse to say: errors are bounded, however coarse a run.
+ORDER, ORDERS, MOST_ORDER = 1.5, (1.5, 2.0), 3.0
+# Cells and steps of a coarser run are so many times as long.
+COARSER = 2.0
+# Numbers of a quantity that are compared at a time, so that the memory of a long run stays flat.
+MOST = 500_000
+
+
+class Falls(NamedTuple):
+    """Of three runs: difference of the last two over that of the first two, root mean square and largest; and both."""
+
+    mean: float
+    largest: float
+    change: float  # root mean square of the difference of the last two
+    before: float  # the same of the first two
+
+
+def falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample | None) -> Falls:
+    """Over all times; NaN: the runs do not show it."""
+    if coarsest is None or name not in coarsest.values:
+        return Falls(np.nan, np.nan, np.nan, np.nan)
+    values, every = coarsest.values[name], coarsest.every
+    final, middle = (every_of(len(x.values[name]), every // x.every) for x in (result, coarse))
+    rows, sums, largest = max(1, MOST // int(np.prod(values.shape[1:]))), np.zeros(2), np.zeros(2)
+    for a in range(0, len(values), rows):  # of all times: peaks jump about
+        between = coarse.some(name, middle[a : a + rows])
+        for k, change in enumerate((result.some(name, final[a : a + rows]) - between, between - values[a : a + rows])):
+            sums[k] += squares(change)
+            largest[k] = np.max(magnitude(change, name), initial=largest[k])
+    if not (sums > 0.0).all():
+        return Falls(np.nan, np.nan, np.nan, np.nan)
+    mean = np.sqrt(sums / max(1, int(np.prod(values.shape))))
+    return Falls(float(mean[0] / mean[1]), float(largest[0] / largest[1]), float(mean[0]), float(mean[1]))
+
+
+def order(found: float, bounds: tuple[float, float]) -> float:
+    """The order with which an output converges; bounded, because a ratio of noise is one as well."""
+    return ORDER if np.isnan(found) else float(np.clip(-np.log(found) / np.log(COARSER), *bounds))
+
+
+def squares(x: np.ndarray) -> float:
+    """Sum of all squares; numpy's norm wakes the threads of BLAS, which takes a hundred times as long."""
+    return float((x * x).sum())
+
+
+def around(known: np.ndarray, a: int, b: int) -> tuple[np.ndarray, slice]:
+    """Of the outputs whose errors are known, the numbers of those that errors from a to b follow from; and which."""
+    first = max(0, int(np.searchsorted(known, a, side="right")) - 1)
+    own = slice(first, int(np.searchsorted(known, b - 1)) + 1)
+    return known[own], own
+
+
+def at_all_outputs(error: np.ndarray, known: np.ndarray, a: int, b: int) -> np.ndarray:
+    """Errors at the outputs `known` at all of them from a to b; in between the larger of the two beside it: peaks are
+    not averaged out."""
+    if known.size == b - a and known[0] == a and known[-1] == b - 1:
+        return error
+    at = np.arange(a, b)
+    right = np.clip(np.searchsorted(known, at), 1, known.size - 1)
+    before, after = error[right - 1], error[right]
+    between = np.where(np.abs(before) > np.abs(after), before, after)
+    exact = np.isin(at, known)
+    between[exact] = error[np.isin(known, at)]
+    return np.asarray(between)
+
+
+def magnitude(error: np.ndarray, name: str) -> np.ndarray:
+    """Of vectors their length, of numbers their size."""
+    return np.asarray(np.linalg.norm(error, axis=-1) if name == "position" or name in END_FORCES else np.abs(error))
