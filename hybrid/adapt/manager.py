@@ -130,6 +130,7 @@ class DomainManager:
         self.zones.clock[z.PACE] = self.pace
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
+        self.near: Floats = np.zeros(0)  # (N+1,) of a line that touches itself: how near it is to itself
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
@@ -253,7 +254,8 @@ class DomainManager:
         dt = 0: there was none, or it was on other nodes.
         """
         self.zones.clock[z.DT] = dt
-        self._table.bind(line=line, sea=sea, ends=ends, new=state, zones=self.zones)
+        near = self.near if self.near.size == line.s.size else np.zeros(0)
+        self._table.bind(line=line, sea=sea, ends=ends, new=state, zones=self.zones, near=near)
         evaluate_criteria(self._table.numbers)
         if self.user is not None:
             self.ask_user(line, state, t)

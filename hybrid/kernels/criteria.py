@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN = range(7)
+BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN, CONTACT = range(8)
 
 
 @dataclass(frozen=True)
@@ -29,4 +29,5 @@ CRITERIA: tuple[Criterion, ...] = (
     Criterion("edge", "EI w/T^2 where contact with the seabed begins, over the tolerance", 0.25),
     Criterion("torsion", "torque^2/(4 EI T) over a half, or torque x turn of the line/(2 T) over the tolerance", 0.25),
     Criterion("given", "what the scene or a function of the user asks for", 0.5),
+    Criterion("contact", "two diameters over the distance of the line to itself, now or as it will be", 0.5),
 )

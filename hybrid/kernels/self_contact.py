@@ -38,11 +38,13 @@ from hybrid.kernels.self_contact_pairs import (
     FRESH,
     FRICTION,
     GRIPS,
+    HORIZON,
     MOST_PRODUCTS,
     NODES,
     OVERFLOW,
     PART,
     POINTS,
+    ROLLS,
     SINCE,
     SLIP_WORK,
     SPEED,
@@ -53,6 +55,7 @@ from hybrid.kernels.self_contact_pairs import (
     fill_tree,
     find_points,
     limit,
+    look_ahead,
 )
 from hybrid.kernels.state import Ends, Floats, Line, State, Work, blank_line, blank_state, no_ends, no_work
 
@@ -111,7 +114,7 @@ def respond(line, ends, contact, work, with_gradient):
         held = (i == 0 and ends.held[0] != 0) or (i == last and ends.held[1] != 0)
         for j in range(3):
             b[i, 1 + j] = 0.0 if held else y[i, j]
-        b[i, 4] = y[i, 3]
+        b[i, 4] = y[i, 3] * contact.numbers[ROLLS]
     good = solve_again(work.X, work.W, b, contact.z)
     for k in range(count):
         i = contact.nodes[k]
@@ -122,7 +125,7 @@ def respond(line, ends, contact, work, with_gradient):
 @inner
 def unknowns(contact):
     """Unknowns of a node in contact: its place, with friction the spin of the cell after it too, as a way."""
-    return 4 if contact.numbers[FRICTION] > 0.0 else 3
+    return 4 if contact.numbers[FRICTION] > 0.0 and contact.numbers[ROLLS] > 0.0 else 3
 
 
 @inner
@@ -268,7 +271,7 @@ def find_spins(line, contact, clock, near, old, new, u):
         for k in range(3):
             x[i, k] = u[i, k]
         x[i, 3] = 0.0
-        if i < line.h.shape[0] and line.spin[i]:
+        if i < line.h.shape[0] and line.spin[i] and contact.numbers[ROLLS] > 0.0:
             ahead = dt * old.wa[i]
             x[i, 3] = dt * old.w[i] + 0.5 * dt * ahead + (new.w[i] - old.w[i] - ahead) / cv
 
@@ -361,6 +364,8 @@ def contact_task(table):
         keep_grips(line, contact, contact.counts[POINTS])
         contact.counts[FRESH], numbers[SINCE] = contact.counts[POINTS], job.clock[TRY_END]
         work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
+    if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
+        look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
     if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):

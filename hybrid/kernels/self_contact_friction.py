@@ -49,7 +49,7 @@ GRIP = 6
 @inner
 def arc_length(line, p, u):
     """Arc length, m, at u of piece p."""
-    return line.s[p] + 0.5 * (u * line.h[p] - (1.0 - u) * line.h[p - 1])
+    return line.s[p] + 0.5 * (u * (line.s[p + 1] - line.s[p]) - (1.0 - u) * (line.s[p] - line.s[p - 1]))
 
 
 @inner

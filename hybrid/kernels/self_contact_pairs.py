@@ -11,16 +11,18 @@ from numpy.typing import NDArray
 from hybrid.kernels.compile import inner
 from hybrid.kernels.newton import LIMIT, TOUCH
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.rotations import dot, sub
+from hybrid.kernels.rotations import add, dot, scale, sub
 from hybrid.kernels.self_contact_friction import GRIP, HOLD
 from hybrid.kernels.self_contact_law import INNER, OUTER, POINT, P, Q, foot, note_point, spline_point, spline_weights
-from hybrid.kernels.self_distance import DEPTH, LEAF, NEIGHBOURS, box_distance, fill_parents, runs_on
+from hybrid.kernels.self_distance import DEPTH, LEAF, NEIGHBOURS, box_distance, fill_parents, nearest_feet, runs_on
 from hybrid.kernels.state import Floats
 
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
 IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
 MOST_PRODUCTS = 60  # of GMRES
+FAR = 2.0  # diameters within which parts of the line are near each other
+LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of what is only foreseen
 (
     PART,  # of a correction that is safe
     ENERGY,  # J, of contact
@@ -32,8 +34,11 @@ MOST_PRODUCTS = 60  # of GMRES
     TRIED,  # J, in those that the last try has led to
     SINCE,  # s, time that the try led to
     SLIP_WORK,  # J, of friction in the step
-) = range(10)
-NUMBERS = 10
+    HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
+    ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
+) = range(12)
+NUMBERS = 12
+WATCH = -1  # beside LIMIT and TOUCH: how near the line is to itself
 POINTS, NODES, OVERFLOW, GRIPS, FRESH = range(5)  # of `counts`
 COUNTS = 5
 
@@ -51,6 +56,7 @@ class Contact(NamedTuple):
     stack: NDArray[np.int64]
     at: Floats  # (N+1, 3) m, nodes
     move: Floats  # (N+1, 3) m, the correction that is to be limited
+    near: Floats  # (N+1,) FAR diameters over the distance to other parts of the line, now or foreseen
     points: Floats  # (C, POINT)
     nodes: NDArray[np.int64]  # (N+1,) those in contact
     marks: NDArray[np.int64]  # (N+1,) 1 for those
@@ -77,7 +83,7 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contac
     return Contact(
         width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
         counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64), at=z((nodes, 3)),
-        move=z((nodes, 3)), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
+        move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
         x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
         basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
         holds=z((held, HOLD)), grips=z((held, GRIP)), fresh=z((held, GRIP)), heads=z(nodes, np.int64),
@@ -188,12 +194,30 @@ def gather(line, contact, p, q, width):
 
 
 @inner
+def note_near(contact, p, q, width):
+    """Keep how near the cells after nodes p and q are, now, and at the end of contact.move if they close in."""
+    r, near = contact.at, contact.near
+    a, b = get3(r, p), get3(r, q)
+    d, f = sub(get3(r, p + 1), a), sub(get3(r, q + 1), b)
+    x, y = nearest_feet(a, d, b, f)
+    away = sub(add(a, scale(x, d)), add(b, scale(y, f)))
+    apart = math.sqrt(dot(away, away))
+    left = apart - largest_difference(contact.move, p, q)
+    ratio = min(FAR * width / left, FORESEEN) if left > 0.0 else FORESEEN
+    ratio = max(ratio, FAR * width / apart)
+    for i in (p, p + 1, q, q + 1):
+        near[i] = max(near[i], ratio)
+
+
+@inner
 def look_at_pair(line, ends, contact, phase, p, q):
     """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
     if not may_touch(line, ends, contact.width, p, q):
         return
     apart, width = hull_distance(contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
-    if phase == LIMIT:
+    if phase == WATCH:
+        note_near(contact, p, q, width)
+    elif phase == LIMIT:
         moved = largest_difference(contact.move, p, q)
         if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
             limit_part(line, ends, contact, p, q, width, moved)
@@ -233,19 +257,38 @@ def look_at_pairs(line, ends, contact, phase):
 
 
 @inner
-def limit(line, ends, contact):
-    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m."""
-    numbers, move, n = contact.numbers, contact.move, line.h.shape[0]
+def farthest_from_mean(move):
+    """The largest difference of a displacement, m, from their mean."""
+    n = move.shape[0]
     m0, m1, m2 = 0.0, 0.0, 0.0
-    for i in range(n + 1):
+    for i in range(n):
         m0, m1, m2 = m0 + move[i, 0], m1 + move[i, 1], m2 + move[i, 2]
-    mean, square = (m0 / (n + 1), m1 / (n + 1), m2 / (n + 1)), 0.0
-    for i in range(n + 1):
+    mean, square = (m0 / n, m1 / n, m2 / n), 0.0
+    for i in range(n):
         d = sub(get3(move, i), mean)
         square = max(square, dot(d, d))
-    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * math.sqrt(square) / SAFE
+    return math.sqrt(square)
+
+
+@inner
+def limit(line, ends, contact):
+    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m."""
+    numbers = contact.numbers
+    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * farthest_from_mean(contact.move) / SAFE
     numbers[PART] = 1.0
     look_at_pairs(line, ends, contact, LIMIT)
+
+
+@inner
+def look_ahead(line, ends, contact, v):
+    """How near nodes are to other parts of the line, or will be within HORIZON at the velocities v, m/s."""
+    numbers, move = contact.numbers, contact.move
+    for i in range(v.shape[0]):
+        contact.near[i] = 0.0
+        for k in range(3):
+            move[i, k] = numbers[HORIZON] * v[i, k]
+    numbers[REACH] = FAR / LEAST_NEAR * numbers[WIDEST] + 2.0 * farthest_from_mean(move)
+    look_at_pairs(line, ends, contact, WATCH)
 
 
 @inner

@@ -24,7 +24,7 @@ from hybrid.kernels.cell_lengths import (
     weigh_curvature,
 )
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.criteria import CLAMP, CRITERIA, TORSION
+from hybrid.kernels.criteria import CLAMP, CONTACT, CRITERIA, TORSION
 from hybrid.kernels.energies import observe
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
@@ -38,6 +38,7 @@ from hybrid.kernels.zone_criteria import (
     blank_kinds,
     end_turn,
     largest_ratio,
+    raise_ratio,
     raise_ratios,
     twist_of_rods,
 )
@@ -144,13 +145,16 @@ class ZoneJob(NamedTuple):
     counts: NDArray[np.int64]
     work: Floats
     zones: Zones
+    near: Floats  # (N+1,) how near the line is to itself (kernels.self_contact_pairs.look_ahead); empty: unknown
 
 
 def blank_zone_job() -> ZoneJob:
     """A job with the types that every one has."""
     state = blank_state(1)
     clock, counts, work = np.zeros(b.CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64), np.zeros((2, WORKS))
-    return ZoneJob(blank_line(1), no_sea(1), no_ends(), state, state, clock, counts, work, blank_zones(1, 1))
+    return ZoneJob(
+        blank_line(1), no_sea(1), no_ends(), state, state, clock, counts, work, blank_zones(1, 1), np.zeros(0)
+    )
 
 
 read = reader(blank_zone_job())
@@ -226,7 +230,15 @@ def weigh_moments(state, zones):
 
 
 @inner
-def evaluate(line, sea, ends, state, zones, dt):
+def weigh_contact(near, zones):
+    """What is near another part of the line, on both sides of every node."""
+    of, last = zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1
+    for i in range(near.shape[0]):
+        raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], near[i])
+
+
+@inner
+def evaluate(line, sea, ends, state, zones, near, dt):
     """Raise the ratios since the last review to those of a state, dt after the last one; the loudest of catenaries.
 
     dt = 0: there was none, or it was on other nodes.
@@ -247,6 +259,7 @@ def evaluate(line, sea, ends, state, zones, dt):
     )
     if flags[LOADED]:
         weigh_moments(state, zones)
+    weigh_contact(near, zones)
     if z[SHARE] > 0.0:
         z[PEAK] = max(z[PEAK], largest_curvature(line, zones.kinds.turn))
         if z[PEAK] > 0.0:
@@ -324,7 +337,7 @@ def is_coming(zones):
 def evaluate_criteria(table):
     """`evaluate` for the state `new` of a job."""
     job = read(table)
-    evaluate(job.line, job.sea, job.ends, job.new, job.zones, job.zones.clock[DT])
+    evaluate(job.line, job.sea, job.ends, job.new, job.zones, job.near, job.zones.clock[DT])
 
 
 @kernel
@@ -354,7 +367,7 @@ def follow_zones(table):
         prepare(line, zones, clock[b.TRY_END], dt)
         return 0
     if phase == b.JUDGE:
-        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, dt)
+        evaluate(line, job.sea, ends, job.old if count[b.PARITY] else job.new, zones, job.near, dt)
         return 1 if zones.clock[LOUDEST] > REJECT_RATIO else 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new

@@ -70,7 +70,8 @@ def _watched(scene: Scene) -> Iterator[Entry]:
     why = "model.tolerance x length" if scene.model.tolerance else "1e-3 of the length, or a part of what accuracy asks"
     yield Entry(f"zones that move; tolerance {first_resolution(scene).zones * scene.length:.3g} m", True, why)
     for x in CRITERIA:
-        asked = x.name != "given" or scene.model.force_rod or scene.model.force_catenary
+        forced = scene.model.force_rod or scene.model.force_catenary
+        asked = {"given": forced, "contact": scene.contact.self}.get(x.name, True)
         yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)
 
 

@@ -173,11 +173,13 @@ def model_is_free(scene: Scene, moves: bool = True) -> bool:
 
     moves: in motion, by a pre-run; else an equilibrium.
 
-    Where the scene gives steps and asks for no accuracy, places the cells, or wants criteria as fields, zones move.
+    Where the scene gives steps and asks for no accuracy, places the cells, lets the line touch itself, or wants
+    criteria as fields, zones move.
     """
     named = "model" in scene.model_fields_set or not isinstance(scene.model, AdaptiveModel)
     wants = (scene.time is not None or not moves) and requested_accuracy(scene) is not None and mesh_is_free(scene)
-    return wants and not named and not scene.output.criteria and scene.solver == "elimination"
+    plain = scene.solver == "elimination" and not scene.contact.self
+    return wants and not named and not scene.output.criteria and plain
 
 
 def first_resolution(scene: Scene) -> Resolution:

@@ -144,7 +144,8 @@ class Contact(Table):
     self: bool = Field(
         default=False,
         description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs "
-        "model: rod and the diameter of every section; absent: they pass through each other, and an event says where",
+        "model: rod or adaptive, and the diameter of every section; absent: they pass through each other, and an "
+        "event says where",
     )
     friction: NonNegative = Field(
         default=0.0,

@@ -52,6 +52,12 @@ def diameters(model: Model) -> Floats:
     return np.asarray(model.cable.outer_diameter[model.cable.piece(0.5 * (s[:-1] + s[1:]))])
 
 
+def least_bending(model: Model) -> Floats:
+    """Bending stiffness (N,) N m2 of the sections of the cells, the lower of two; 0 where the scene gives none."""
+    s = model.line.s
+    return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
+
+
 def meeting_text(s: float, other: float, distance: float, width: float, dt: float) -> str:
     """Text of the event of a line that comes within `distance`, m, of itself at two arc lengths, m.
 
@@ -61,7 +67,7 @@ def meeting_text(s: float, other: float, distance: float, width: float, dt: floa
     return (
         f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
         f"diameter of {width:.3g} m: nothing keeps it from passing through itself here; contact: {{self: true}} "
-        f"does in a run of rods"
+        f"does in a run of rods, or of zones that move"
     )
 
 

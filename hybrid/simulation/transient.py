@@ -30,7 +30,7 @@ from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
-from hybrid.simulation.self_watch import diameters, refuse_start_in_itself
+from hybrid.simulation.self_watch import diameters, least_bending, refuse_start_in_itself
 from hybrid.simulation.zone_switching import ZoneSwitching
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.self_contact import SelfContact
@@ -414,7 +414,7 @@ class Transient:
         )  # fmt: skip
         if touches:
             before, friction = self.run.contact, self.scene.contact.friction
-            contact = SelfContact(model.line, diameters(model), model.tension_scale, friction)
+            contact = SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale, friction)
             if before is not None:
                 contact.restore(before.checkpoint(self.t))
             self.run.touch_itself(contact, model.line, model.ends.values, self.stepper.work)

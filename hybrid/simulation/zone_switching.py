@@ -19,7 +19,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.generalized_alpha import STEEPEST
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.torque_transfer import carry_torque
-from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, follow_zones, plan_nodes, take_arcs
+from hybrid.kernels.zone_step import LOOKAHEAD, REJECT_RATIO, Zones, blank_zone_job, follow_zones, plan_nodes, take_arcs
 from hybrid.kernels.zone_switch import (
     AFTER,
     BEFORE,
@@ -94,9 +94,11 @@ class ZoneSwitching:
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
         run.clock[b.ALLOWED] = longest * (1.0 if manager.ramping else READY)
         line, sea, ends = self.model.line, self.model.sea.values, self.model.ends.values
+        if run.contact is not None:
+            manager.near = run.contact.look_ahead(LOOKAHEAD * manager.pace)
         self.table.bind(
             line=line, sea=sea, ends=ends, old=run.states[0], new=run.states[1], clock=run.clock, counts=run.count,
-            work=run.books.work, zones=self.zones,
+            work=run.books.work, zones=self.zones, near=manager.near,
         )  # fmt: skip
         run.follow(self.table, self.compiled)
 

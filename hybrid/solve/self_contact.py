@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.binding import Table
+from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.newton import ADDRESS, ASKED, REST
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
@@ -16,7 +17,9 @@ from hybrid.kernels.self_contact_pairs import (
     FRESH,
     FRICTION,
     GRIPS,
+    HORIZON,
     POINTS,
+    ROLLS,
     SINCE,
     SPEED,
     STORED,
@@ -34,26 +37,31 @@ LEAST_POINTS, MOST_POINTS = 1000, 100_000
 STIFFNESS, TENSION = 0.16, 0.02
 
 
+def mean_beside(cells: Floats) -> Floats:
+    """At nodes (N+1,), the mean of the cells (N,) beside them."""
+    both = np.pad(cells, 1, mode="edge")
+    return np.asarray(0.5 * (both[1:] + both[:-1]))
+
+
 class SelfContact:
     """Contact of one line with itself; `table` and `call` are for the job of a run."""
 
-    def __init__(self, line: Line, width: Floats, tension_scale: float, friction: float = 0.0) -> None:
-        """width: (N,) m, diameters of cells; tension_scale: N; friction: its coefficient."""
+    def __init__(self, line: Line, width: Floats, bending: Floats, tension_scale: float, friction: float = 0.0) -> None:
+        """width: (N,) m, diameters of cells; bending: (N,) N m2, their stiffness, 0: none; tension_scale: N; friction:
+
+        its coefficient.
+        """
         n = line.h.size
-        both = np.pad(width, 1, mode="edge")
-        widths = 0.5 * (both[1:] + both[:-1])
-        length = np.pad(line.h, 1, mode="edge")
-        pieces = 0.5 * (length[1:] + length[:-1])
+        widths, pieces, bends = (mean_beside(x) for x in (width, np.diff(line.s), bending))
         samples = np.maximum(np.ceil(pieces / (SPACING * widths)), 1)
         contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)), friction > 0.0)
         contact.width[:], contact.samples[:] = widths, samples
-        bending = line.kb[:, :2].min(axis=1) * line.hn
-        contact.stiff[:] = np.maximum(
-            STIFFNESS * bending / contact.width**2, TENSION * tension_scale * (bending == 0.0)
-        )
+        contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))
         contact.mass[:] = line.mass / pieces
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
         contact.numbers[SINCE] = np.nan
+        holds_twist = line.spin.all() and bool((line.element * line.kb[:, 2])[[0, -1]].any())
+        contact.numbers[ROLLS] = float(bool(line.bits & ROTARY) or holds_twist)
         self.contact = contact
         self._middles = 0.5 * (line.s[1:] + line.s[:-1])
         self.call = np.zeros(3, np.int64)
@@ -87,6 +95,14 @@ class SelfContact:
             out[p - 1 : p + 2] += row[WX : WX + 3, None] * f
             out[q - 1 : q + 2] -= row[WY : WY + 3, None] * f
         return out
+
+    def look_ahead(self, horizon: float) -> Floats:
+        """From now on steps find how near nodes are to other parts of the line, or will be within `horizon`, s.
+
+        Returns where (N+1,): above 1, nearer than two diameters.
+        """
+        self.contact.numbers[HORIZON] = horizon
+        return self.contact.near
 
     # --- what goes on from step to step ---------------------------------------------------------
 

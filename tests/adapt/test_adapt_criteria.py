@@ -17,7 +17,7 @@ from adapt_cases import GRAVITY, X, Y, Z, along, cable, even, layout, on, polygo
 
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.zone_rules import wanted
-from hybrid.kernels.criteria import BEND, CLAMP, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
+from hybrid.kernels.criteria import BEND, CLAMP, CONTACT, CRITERIA, EDGE, GIVEN, POINT, SLACK, TORSION
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_criteria import FORESEEN
@@ -50,8 +50,8 @@ def least(T):
 
 def test_there_is_a_criterion_for_every_number():
     names = [x.name for x in CRITERIA]
-    assert [names[k] for k in (BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN)] == [
-        "bend", "slack", "clamp", "point", "edge", "torsion", "given",
+    assert [names[k] for k in (BEND, SLACK, CLAMP, POINT, EDGE, TORSION, GIVEN, CONTACT)] == [
+        "bend", "slack", "clamp", "point", "edge", "torsion", "given", "contact",
     ]  # fmt: skip
     assert all(0.0 < x.off < 1.0 for x in CRITERIA)
 

@@ -49,7 +49,7 @@ class Tangle:
         for state in states:
             state.r[:] = r
         self.work = workspace(n, keep=True)
-        self.contact = SelfContact(line, np.full(n, width), 1.0, friction)
+        self.contact = SelfContact(line, np.full(n, width), np.ones(n), 1.0, friction)
         ends = no_ends()
         ends.held[:] = 0
         clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)

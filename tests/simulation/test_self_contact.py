@@ -178,6 +178,63 @@ def test_it_resumes_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch,
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+def closing(model: Any, **more: Any) -> dict[str, Any]:
+    """A line hangs in a U; its ends approach until its legs touch."""
+    section = {
+        "length": 8.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e5, "bending_stiffness": 0.02,
+        "torsional_stiffness": 0.016, "damping": {"mass": 0.5},
+    }  # fmt: skip
+    closer = {"travel": {"by": [-2.5, 0.95 * WIDTH, 0.0], "over": 5.0}}
+    return {
+        "cable": {"sections": [section]}, "model": model, "contact": {"self": True, "friction": 0.3},
+        "initial": {"kind": "equilibrium"},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [2.5, 0, 0], "motion": closer},
+        },
+        "time": {"duration": 6.0, "step": 0.01}, "output": {"every": 0.1, "points": 81},
+    } | more  # fmt: skip
+
+
+def test_catenaries_that_come_near_themselves_become_rods() -> None:
+    rods = hybrid.run(hybrid.validate_scene(closing("rod", mesh={"cells": 160})))
+    watched = closing("adaptive")
+    watched["output"]["criteria"] = True
+    result = hybrid.run(hybrid.validate_scene(watched))
+    assert {"grow", "line touches itself"} <= {event.kind for event in result.events}
+    assert "contact" in {event.criterion for event in result.events}
+    assert float(result["self_distance/distance"]) > 0.85 * WIDTH
+    for zones, x, near in zip(result.zones, result["position"], result["criteria/contact"], strict=True):
+        apart = np.linalg.norm(x[:, None] - x[None], axis=2)
+        between = np.abs(result.s[:, None] - result.s[None])
+        apart[(between < 1.0) | (8.0 - between < 1.0)] = np.inf
+        touching = result.s[apart.min(axis=1) < 1.5 * WIDTH]
+        assert all(any(z.kind == "rod" and z.s_a <= s <= z.s_b for z in zones) for s in touching)
+        assert (near[apart.min(axis=1) < 1.5 * WIDTH] > 1.0).all()
+    assert any(any(z.kind == "catenary" for z in zones) for zones in result.zones)
+    assert np.linalg.norm(result["position"] - rods["position"], axis=2).max() < 1e-3 * 8.0
+
+
+def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    scene, stopping = hybrid.validate_scene(closing("adaptive")), Stopping(monkeypatch)
+    with hybrid.run(scene, tmp_path / "whole.h5", progress=stopping) as whole:
+        assert np.interp([5.0, 5.2], whole.times, whole["energy/self_contact"]).all()
+    assert went_on(scene, tmp_path / "run.h5", stopping, [500, 20]) == 2
+    assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
+
+
+@pytest.mark.parametrize(
+    "model",
+    [
+        "catenary", "corrected", {"kind": "adaptive", "correct": True},
+        {"kind": "adaptive", "force_catenary": [[1.0, 2.0]]}, {"zones": [{"rod": 4.0}, {"catenary": 4.0}]},
+    ],
+)  # fmt: skip
+def test_catenaries_that_stay_are_refused(model: Any) -> None:
+    with pytest.raises(hybrid.SceneError, match=r"contact"):
+        hybrid.validate_scene(closing(model))
+
+
 def test_a_start_within_itself_is_refused() -> None:
     r = hairpin(60.0, 0.3 * WIDTH)
     with pytest.raises(hybrid.SceneError, match=r"within itself at s = .* m"):
