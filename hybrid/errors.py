@@ -124,6 +124,7 @@ EVENTS_BY_WEIGHT = (
     "bending at point load neglected",
     "zones fixed",
     "static friction neglected",
+    "waves on body neglected",
     "end rotated in",
     "envelope incomplete",
     "other program",

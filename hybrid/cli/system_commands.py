@@ -58,26 +58,23 @@ def _ended(console: Console, result: Result, target: Path, plot: bool, text: str
             pictures.append(target.with_suffix(f".{name}.png"))
             hybrid.plot(line, pictures[-1])
     lines = {name: extremes_facts(line) for name, line in result.lines.items()}
-    points = {
-        name: {key: result[f"points/{name}/{key}"][-1].tolist() for key in keys}
-        for name, keys in _points(result).items()
-    }
+    points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
-    console.show(lambda: _table(lines, points))
-    console.done(text, target, *pictures, status=result.status, lines=lines, points=points, **facts)
+    console.show(lambda: _table(lines, points, bodies))
+    console.done(text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, **facts)
 
 
-def _points(result: Result) -> dict[str, list[str]]:
-    """What is known of each point, by its name."""
-    found: dict[str, list[str]] = {}
+def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
+    """The last value of all that is known of each point or body, by its name."""
+    found: dict[str, dict[str, Any]] = {}
     for full in result.names:
-        if full.startswith("points/"):
-            name, _, key = full.removeprefix("points/").rpartition("/")
-            found.setdefault(name, []).append(key)
+        if full.startswith(f"{group}/"):
+            name, _, key = full.removeprefix(f"{group}/").partition("/")
+            found.setdefault(name, {})[key] = result[full][-1].tolist()
     return found
 
 
-def _table(lines: dict[str, Any], points: dict[str, Any]) -> Any:
+def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any]) -> Any:
     from rich.table import Table
 
     table = Table.grid(padding=(0, 2))
@@ -88,12 +85,16 @@ def _table(lines: dict[str, Any], points: dict[str, Any]) -> Any:
     for name, facts in points.items():
         force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
         table.add_row(f"point {name}", f"{_vector(facts['position'])} m{force}")
+    for name, facts in bodies.items():
+        turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
+        loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
+        table.add_row(f"body {name}", f"{turned}, {loads}")
     table.columns[0].style = "bold"
     return table
 
 
-def _vector(x: list[float]) -> str:
-    zero = 1e-9 * max(abs(c) for c in x)
+def _vector(x: list[float], least: float = 0.0) -> str:
+    zero = max(1e-9 * max(abs(c) for c in x), least)
     return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
 
 
@@ -107,6 +108,8 @@ def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
         joined = asked.lines[name]
         rows.append(f"line {name:<12s}{joined.start} to {joined.end}, {kinds}, {sum(line.cells)} cells")
     rows.append(f"{'free points':<17s}{', '.join(made.free) or 'none'}")
+    if asked.bodies:
+        rows.append(f"{'bodies':<17s}{', '.join(f'{name} ({body.kind})' for name, body in asked.bodies.items())}")
     steps = f"{made.steps} steps of {made.step:.4g} s" if made.steps else "statics only"
     rows.append(f"{'time':<17s}{steps}; {made.cells} cells in all")
     console.show(lambda: "\n".join(rows))

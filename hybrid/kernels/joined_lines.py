@@ -123,8 +123,11 @@ def balance_of_start(X, row, columns, first, n, joined, out):
 
 
 @inner
-def solve_back(X, columns, first, carries, q, x, joined):
-    """As `substitute`, for a line whose last block is known, in x[n] (joined), and whose start moves by q (carries)."""
+def solve_back(X, columns, first, carries, q, place, x, joined):
+    """As `substitute`, for a line whose last block is known, in x[n] (joined), and whose start moves by q (carries).
+
+    place: the correction of the start, which is q and what it had still to go.
+    """
     n = x.shape[0] - 1
     y, z0, z1, z2 = (0.0, 0.0, 0.0, 0.0, 0.0), 0.0, 0.0, 0.0
     total, last = 0.0, n
@@ -147,7 +150,7 @@ def solve_back(X, columns, first, carries, q, x, joined):
         z0, z1, z2 = y[1], y[2], y[3]
         y = (x[i, 0], x[i, 1], x[i, 2], x[i, 3], x[i, 4])
     if carries:
-        x[0, 1], x[0, 2], x[0, 3] = q  # to the last digit as the other lines at that point have it
+        x[0, 1], x[0, 2], x[0, 3] = place  # to the last digit as the other lines at that point have it
     return total < math.inf
 
 

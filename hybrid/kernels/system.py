@@ -1,30 +1,33 @@
 """Newton's method for lines that meet at points: one nonlinear loop for all of them, in space.
 
 Every line is marched along s by the kernel of a single line, which is called by its address; what it hands over is a
-relation between its ends (kernels.joined_lines).  The unknowns of the small system are the tensions of the last cells
-and the places of the points; each line is then solved back.  Symbols and stopping rule as in kernels.newton.
+relation between its ends (kernels.joined_lines).  The unknowns of the small system are the tensions of the last cells,
+the places of the points, and the places and rotations of the bodies (kernels.junctions); each line is then solved back.
+Symbols and stopping rule as in kernels.newton.
 """
 
 from __future__ import annotations
 
 import math
 
+from hybrid.kernels.bodies import (
+    LINES,
+    book_bodies,
+    end_bodies,
+    move_bodies,
+    own_force,
+    predict_bodies,
+    size_of_moves,
+    start_here,
+)
 from hybrid.kernels.books import RATES, STORED
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.extremes import first_strains, note_extremes
 from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.generalized_alpha import Scheme, scheme
-from hybrid.kernels.joined_lines import (
-    LEFT,
-    OF_START,
-    balance_of_start,
-    carry_start,
-    end_row,
-    last_block,
-    solve_back,
-    solve_dense,
-)
+from hybrid.kernels.joined_lines import solve_dense
+from hybrid.kernels.junctions import END, START, add_pull, assemble_junctions, correct_all, place_ends
 from hybrid.kernels.newton import (
     ASSEMBLY,
     CORRECTION,
@@ -47,8 +50,6 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.powers import book_work, find_powers
 from hybrid.kernels.references import caller
 from hybrid.kernels.report import (
-    FORCE_A,
-    FORCE_B,
     RESIDUAL,
     RESIDUAL_NODE,
     SEABED_ENERGY,
@@ -59,102 +60,35 @@ from hybrid.kernels.run import read
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 
+JUNCTIONS = 5
 call_solver = caller((0, 0, 0.0, 0))
 # Where cv and ca of the task are among the numbers of a job, whose first field it is.
 TASK_CV, TASK_CA = Task._fields.index("cv"), Task._fields.index("ca")
-START, END = 0, 1
 
 
 @inner
-def march_lines(solver, tables, joints, net):
-    """March all lines; net (P, 3): force on each point, N.  Returns -1 or a line that failed, and its bad node."""
+def march_lines(solver, tables, joints, fairleads, arms, gaps, given, net, old, new, work):
+    """March all lines; net (P, 3): force on each point, N, that on bodies in `work`.
+
+    Returns -1 or a line that failed, and its bad node.
+    """
     for p in range(net.shape[0]):
         net[p, 0], net[p, 1], net[p, 2] = 0.0, 0.0, 0.0
+    for b in range(work.shape[0]):
+        for k in range(6):
+            work[b, LINES + k] = 0.0
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        start, end = joints[l, START], joints[l, END]
-        if start >= 0:
-            for k in range(3):
-                job.ends.position[0, k] = job.old.r[0, k] + job.work.u[0, k]
+        place_ends(l, job, joints, fairleads, arms, gaps, net.shape[0], old, new, work, given)
         outcome, _, _, where = call_solver(solver, tables[l])
-        if outcome != OK and not (outcome == SINGULAR and end >= 0 and where == n):  # the last block is not solved yet
+        # the last block is not solved yet
+        if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
             return l, where
-        report = job.work.report
-        for k in range(3):
-            if start >= 0:
-                net[start, k] += report[FORCE_A + k]
-            if end >= 0:
-                net[end, k] += report[FORCE_B + k]
+        for k in range(2):
+            if joints[l, k] >= 0:
+                add_pull(joints[l, k], job.work.report, k, arms[l, k], net, work)
     return -1, -1
-
-
-@inner
-def count_tensions(joints):
-    """How many lines hand over their last block, with the tension of its cell."""
-    found = 0
-    for l in range(joints.shape[0]):
-        if joints[l, END] >= 0:
-            found += 1
-    return found
-
-
-@inner
-def assemble_points(tables, joints, first, columns, functional, A, m):
-    """Equations (m, m+1) of the last tensions and of the points, from what the lines hand over."""
-    for r in range(m):
-        for c in range(m + 1):
-            A[r, c] = 0.0
-    row, tensions = 0, count_tensions(joints)
-    for l in range(tables.shape[0]):
-        start, end = joints[l, START], joints[l, END]
-        if start < 0 and end < 0:
-            continue
-        job = read(tables[l])
-        n, X, work = job.line.h.shape[0], job.work.X, job.work
-        k, at, to, o = 0, tensions + 3 * start, tensions + 3 * end, first[l]
-        if start >= 0:
-            carry_start(X, work.W, columns, o, n, end >= 0)
-            balance_of_start(X, work.rows[0], columns, o, n, end >= 0, functional)
-            for a in range(3):
-                f = functional[a]
-                for b in range(3):
-                    A[at + a, at + b] += f[OF_START + b]
-                A[at + a, m] -= f[LEFT]
-                if end >= 0:
-                    A[at + a, row] += f[0]
-                    for b in range(3):
-                        A[at + a, to + b] += f[1 + b]
-        if end >= 0:
-            k = last_block(X, n)
-            for r in range(4):
-                e = row if r == 0 else to + r - 1
-                A[e, row] += end_row(X, k, r, 0)
-                for b in range(3):
-                    A[e, to + b] += end_row(X, k, r, 1 + b)
-                    if start >= 0:
-                        A[e, at + b] -= columns[b, o + n, r]
-                A[e, m] += X[k + 64 + r]
-            row += 1
-
-
-@inner
-def correct_lines(tables, joints, first, columns, A, m):
-    """The correction of every line from that of the points; returns -1, or a line whose correction is not finite."""
-    row, tensions = 0, count_tensions(joints)
-    for l in range(tables.shape[0]):
-        job, start, end = read(tables[l]), joints[l, START], joints[l, END]
-        x, n, q = job.work.x, job.line.h.shape[0], (0.0, 0.0, 0.0)
-        if end >= 0:
-            to = tensions + 3 * end
-            x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], A[to, m], A[to + 1, m], A[to + 2, m]
-            row += 1
-        if start >= 0:
-            at = tensions + 3 * start
-            q = (A[at, m], A[at + 1, m], A[at + 2, m])
-        if not solve_back(job.work.X, columns, first[l], start >= 0, q, x, end >= 0):
-            return l
-    return -1
 
 
 @inner
@@ -265,22 +199,35 @@ def keep_books(tables, joints, dt, t):
 
 
 @kernel
-def solve_system(task, t, solver, tables, numbers, joints, floors, first, columns, functional, net, A):
+def solve_system(
+    task, t, solver, tables, numbers, joints, fairleads, arms, gaps, floors, first, columns, functional, net,
+    bodies, old, new, work, S, G, A,
+):  # fmt: skip
     """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
 
+    JUNCTIONS: leave in A the equations of the tensions, points and bodies, with all else eliminated.
+
     t: s, of the new states, for the books; tables: (L, ..) jobs of the lines, their task ASSEMBLY; numbers: the same
-    memory as float64; floors: (L,) N, tension at or below which a catenary cell is slack; joints: (L, 2) points that start and end are joined to, -1 where they are held; first: (L,) where columns
-    (3, .., 5) of a line begin whose start is joined; functional: (3, FUNCTIONAL), net: (P, 3) and A: (m+1, m+1), m
-    tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
-    Returns outcome, iterations, predicted next correction, line and cell or node.
+    memory as float64; joints: (L, 2) points, then bodies, that start and end are joined to, -1 where they are held;
+    fairleads: (L, 2, 3) m of ends at bodies, in their axes; gaps: (L, 2, 3) m that such ends have still to go, given
+    for a CORRECTION, else worked in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is
+    slack; first: (L,) where columns (3, .., 5) of a line begin whose start is joined; bodies, old, new, work: rows of
+    numbers of each body (kernels.bodies); functional: (3, FUNCTIONAL), net: (P, 3), S: (7, 8), G: (2, 3, 6) and
+    A: (m+1, m+1), m tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
+    Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
-    m, most, count = A.shape[0] - 1, task.limits.most, tables.shape[0]
+    m, most, count, points = A.shape[0] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
         s = scheme(task.rho, task.before, task.dt)
+        turn, line = predict_bodies(old, new, work, s)
+        if not turn < LARGEST_STEP_TURN:
+            return TURNED_TOO_FAR, 0, turn, -1, -1
         line, turn, cell = begin_lines(tables, s)
         if line >= 0:
             return TURNED_TOO_FAR, 0, turn, line, cell
+    else:
+        start_here(old, work)
     rubs = 0
     for l in range(count):
         numbers[l, TASK_CV], numbers[l, TASK_CA] = s.cv, s.ca
@@ -289,20 +236,28 @@ def solve_system(task, t, solver, tables, numbers, joints, floors, first, column
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1
-        line, where = march_lines(solver, tables, joints, net)
+        given = task.what == CORRECTION
+        line, where = march_lines(solver, tables, joints, fairleads, arms, gaps, given, net, old, new, work)
         if line >= 0:
             outcome = SINGULAR
             if not read(tables[line]).work.report[RESIDUAL] < math.inf:
                 outcome, where = NOT_FINITE, int(read(tables[line]).work.report[RESIDUAL_NODE])
             break
         if task.what == ASSEMBLY:
+            for b in range(work.shape[0]):
+                own_force(bodies[b], old[b], new[b], work[b])
             outcome = OK
             break
-        assemble_points(tables, joints, first, columns, functional, A, m)
+        assemble_junctions(
+            tables, joints, arms, gaps, first, columns, functional, net, bodies, old, new, work, S, G, A, m, s.cv, s.ca
+        )
+        if task.what == JUNCTIONS:
+            outcome = OK
+            break
         if m > 0 and not solve_dense(A, m):
             outcome = SINGULAR
             break
-        line = correct_lines(tables, joints, first, columns, A, m)
+        line = correct_all(tables, joints, arms, gaps, first, columns, points, work, A, m)
         if line >= 0:
             bad = read(tables[line])
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
@@ -311,6 +266,9 @@ def solve_system(task, t, solver, tables, numbers, joints, floors, first, column
             outcome = OK
             break
         shift, turn, size, line, where = size_up(tables, s.ca)
+        far, turned = size_of_moves(work)
+        far /= task.limits.reach
+        shift, turn, size = max(shift, far), max(turn, turned), max(size, max(turned, WHOLE * far))
         part = min(1.0, 1.0 / shift) if shift > 0.0 else 1.0
         if turn * part > LARGEST_TURN:
             part = LARGEST_TURN / turn
@@ -319,6 +277,7 @@ def solve_system(task, t, solver, tables, numbers, joints, floors, first, column
         for l in range(count):
             job = read(tables[l])
             update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
+        move_bodies(new, work, s.cv, s.ca, part)
         ratio = size / before
         left = size * min(1.0, ratio * ratio)
         if part == 1.0:
@@ -329,10 +288,15 @@ def solve_system(task, t, solver, tables, numbers, joints, floors, first, column
         before = size if part == 1.0 else math.inf
     if task.what == STEP:
         bad_line, turn, cell = end_lines(tables, floors, s, task, outcome == OK)
+        turned = end_bodies(old, new, work, s)
         if bad_line >= 0:
             outcome, line, where = TURNED_TOO_FAR if turn > 0.0 else SLACK, bad_line, cell
+        elif outcome == OK and not turned < LARGEST_STEP_TURN:
+            outcome, line, where = TURNED_TOO_FAR, -1, -1
         elif outcome == OK:
             keep_books(tables, joints, task.dt, t)
+            book_bodies(work, task.dt)
     if task.what == ASSEMBLY and outcome == OK:
         begin_books(tables, joints, t)
+        book_bodies(work, 0.0)
     return outcome, it, left, line, where

@@ -75,6 +75,11 @@ class EndLoad(NamedTuple):
     ramp: float | None
     history: Floats = CONSTANT
 
+    def grown(self, t: float) -> Floats:
+        """The load (3,) at t (s), as far as it has grown."""
+        part, _ = rise(t, self.ramp or 0.0)
+        return np.asarray(part * self.at(t))
+
     def at(self, t: float) -> Floats:
         """The load (3,) at t (s), when it has grown; at infinity: as at 0, as motions."""
         if not len(self.history):
@@ -301,8 +306,7 @@ class EndConditions:
         self.values.force[:] = 0.0
         self.values.moment[:] = 0.0
         for load in self._acting:
-            part, _ = rise(t, load.ramp or 0.0)
-            (self.values.force if load.what == "force" else self.values.moment)[load.end] += part * load.at(t)
+            (self.values.force if load.what == "force" else self.values.moment)[load.end] += load.grown(t)
 
     def acceleration(self, t: float, dt: float) -> Floats:
         """Accelerations (2, 3) of the ends at t, m/s2, by a central difference of their velocities over dt."""

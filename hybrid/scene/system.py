@@ -1,4 +1,4 @@
-"""Several lines that meet at points: the tables of a scene with `points` and `lines` in place of `cable` and `ends`.
+"""Several lines that meet at points and bodies: a scene with `points` and `lines` in place of `cable` and `ends`.
 
 Each line is checked as a scene of its own, between the places where its two points are, or are first looked for.
 """
@@ -10,103 +10,22 @@ from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
 from typing import Annotated, Any, Literal
 
-from pydantic import AfterValidator, Discriminator, Field, Tag, ValidationError, model_validator
+from pydantic import Field, ValidationError, model_validator
 
 from hybrid.errors import SceneError
 from hybrid.scene.analysis import CatenaryModel, Equilibrium, Mesh, Model, RodModel, Time, ZonesModel
-from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Attachment, Shape
-from hybrid.scene.base import (
-    Finding,
-    Kinds,
-    NonNegative,
-    Place,
-    Positive,
-    Table,
-    Text,
-    Vector,
-    Whole,
-    by_kind,
-    refuse,
-)
+from hybrid.scene.attachments import Attachment
+from hybrid.scene.base import Finding, Place, Positive, Table, Text, Whole, refuse
+from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody
 from hybrid.scene.cable import Cable, Environment, Section
-from hybrid.scene.ends import TURNS, Body, End, Ends, Free, Loading, Motion, Pinned, Triple
+from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
 from hybrid.scene.motion_checks import motion_findings
+from hybrid.scene.points import Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.suggestions import nearest
 
-# Names are keys of the result file and of its groups.
-FORBIDDEN = "/."
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
-
-
-class FixedPoint(Table):
-    """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
-
-    kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
-    position: Vector = Field(description="position, inertial frame [m]")
-    motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
-
-    @model_validator(mode="after")
-    def _does_not_turn(self) -> FixedPoint:
-        if self.motion is not None:
-            turns = [name for name in self.motion.harmonics() if name in TURNS]
-            expected = "no rotation, because lines turn freely at a point"
-            refuse(Finding(("motion", name), expected, "leave it out") for name in turns)
-        return self
-
-
-class FreePoint(Table):
-    """A point that lines alone hold: a knot, a buoy, a clump.  It turns freely and has no moment of inertia."""
-
-    kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
-    initial_guess: Vector = Field(
-        description="where the search of the equilibrium puts the point first, inertial frame [m]"
-    )
-    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
-    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
-    height: Positive | None = Field(default=None, description=HEIGHT)
-    shape: Shape = Field(default="sphere", description=SHAPE)
-    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
-    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
-    force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
-
-    @model_validator(mode="after")
-    def _added_mass_has_a_body(self) -> FreePoint:
-        if self.added_mass and not self.is_body:
-            refuse(
-                [Finding(("added_mass",), "0, because the point has no mass, volume or drag area", "add `volume: ...`")]
-            )
-        return self
-
-    @property
-    def is_body(self) -> bool:
-        """Whether the point is more than a knot."""
-        return bool(self.mass or self.volume or self.drag_area)
-
-    @property
-    def end(self) -> Body | Free:
-        """The end of a line that carries the point."""
-        if not self.is_body:
-            return Free(force=self.force)
-        given = {k: getattr(self, k) for k in ("mass", "volume", "height", "shape", "drag_area", "added_mass")}
-        return Body(**given, thrust=self.force, initial_guess=self.initial_guess)
-
-
-Point = Annotated[
-    Annotated[FixedPoint, Tag("<fixed>")] | Annotated[FreePoint, Tag("<free>")],
-    Discriminator(by_kind),
-    Kinds(("fixed", "free"), usual=("fixed",), implied=(("position", "fixed"), ("initial_guess", "free"))),
-]
-
-
-def _a_name(name: str) -> str:
-    if not name or any(x in name for x in FORBIDDEN):
-        raise ValueError("a name")
-    return name
-
-
-Name = Annotated[Text, AfterValidator(_a_name)]
 
 
 class JoinedLine(Table):
@@ -163,6 +82,9 @@ class System(Table):
     title: Text = Field(default="", description="a line for people; it heads plots and reports")
     environment: Environment = Field(default=Environment(), description="what acts on the lines from outside")
     points: dict[Name, Point] = Field(min_length=1, description="points by name: where lines end, are held, and meet")
+    bodies: dict[Name, RigidBody] = Field(
+        default={}, description="rigid bodies by name, with fairleads among the points"
+    )
     lines: dict[Name, JoinedLine] = Field(min_length=1, description="lines by name, each between two points")
     time: Time | None = Field(default=None, description="how long to compute; absent: statics only")
     output: SystemOutput = Field(default=SystemOutput(), description="what is kept")
@@ -173,9 +95,30 @@ class System(Table):
         return tuple(name for name, point in self.points.items() if isinstance(point, FreePoint))
 
     @property
+    def free_bodies(self) -> dict[str, FreeBody]:
+        """The bodies that are free, by name, in order."""
+        return {name: body for name, body in self.bodies.items() if isinstance(body, FreeBody)}
+
+    def first_place(self, point: str) -> Triple:
+        """Where a point is held at rest, or first looked for [m]."""
+        found = self.points[point]
+        if isinstance(found, Fairlead):
+            return self.bodies[found.body].place(found.place)
+        return found.position if isinstance(found, FixedPoint) else found.initial_guess
+
+    @property
     def guesses(self) -> dict[str, Triple]:
-        """Where the free points are first looked for, by name [m]."""
-        return {name: point.initial_guess for name, point in self.points.items() if isinstance(point, FreePoint)}
+        """Where the points that are joined are first looked for, by name [m]."""
+        return {name: self.first_place(name) for name in self.points if self.is_joined(name)}
+
+    def body_of(self, point: str) -> FixedBody | FreeBody | None:
+        """The body that a point is on; None: it is on none."""
+        found = self.points[point]
+        return self.bodies[found.body] if isinstance(found, Fairlead) else None
+
+    def is_joined(self, point: str) -> bool:
+        """Whether a point moves by what pulls there: it is free, or on a free body."""
+        return isinstance(self.points[point], FreePoint) or isinstance(self.body_of(point), FreeBody)
 
     def lines_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
         """Names of the lines that meet at a point, each with the end that does."""
@@ -197,18 +140,20 @@ class System(Table):
     def scene_of(self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None) -> Scene:
         """A line between the places where its points are, or are first looked for, as a scene of its own.
 
-        carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the free
-        points [m], wherever they are; None: where the scene has them, and what is wrong with the line is a
+        carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the points
+        that are joined [m], wherever they are; None: where the scene has them, and what is wrong with the line is a
         ValidationError of pydantic.
         """
         line = self.lines[name]
         first = self._places(line)
         ends: dict[str, End] = {}
         for key in ("start", "end"):
-            point = self.points[getattr(line, key)]
+            point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
             if isinstance(point, FixedPoint):
                 ends[key] = Pinned(position=point.position, motion=point.motion)
-            elif key in carrying:
+            elif isinstance(body, FixedBody):  # that it turns as well is for the model
+                ends[key] = Pinned(position=first[key], motion=body.shift)
+            elif key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
             else:
                 ends[key] = Pinned(position=first[key] if places is None else places[getattr(line, key)])
@@ -226,12 +171,12 @@ class System(Table):
 
     def _places(self, line: JoinedLine) -> dict[str, Triple]:
         """Where the points of a line are first [m], a free one no farther from the other than the line is long."""
-        found = {key: self.points[getattr(line, key)] for key in ("start", "end")}
-        places = {key: x.position if isinstance(x, FixedPoint) else x.initial_guess for key, x in found.items()}
+        names = {"start": line.start, "end": line.end}
+        places = {key: self.first_place(name) for key, name in names.items()}
         distance = math.dist(places["start"], places["end"])
         part = REACHED * line.cable.length / distance if distance > 0.0 else 1.0
         for key, other in (("end", "start"), ("start", "end")):
-            if part < 1.0 and isinstance(found[key], FreePoint):
+            if part < 1.0 and self.is_joined(names[key]):
                 (x, y, z), (a, b, c) = places[key], places[other]
                 places[key] = (a + part * (x - a), b + part * (y - b), c + part * (z - c))
                 break
@@ -254,20 +199,19 @@ class System(Table):
 
     @model_validator(mode="after")
     def _lines_join_points(self) -> System:
-        unknown = list(self._unknown_points())
-        refuse(unknown)
+        refuse(self._unknown_names())
         refuse(chain(self._lonely_points(), self._floating_groups()))
+        refuse(chain.from_iterable(self._body_findings(name) for name in self.bodies))
         refuse(chain.from_iterable(self._line_findings(name) for name in self.lines))
         return self
 
-    def _unknown_points(self) -> Iterator[Finding]:
+    def _unknown_names(self) -> Iterator[Finding]:
         for name, line in self.lines.items():
             for key in ("start", "end"):
-                point = getattr(line, key)
-                if point not in self.points:
-                    expected = f"the name of a point: {', '.join(self.points)}"
-                    fix = nearest(point, dict.fromkeys(self.points, "")) or f"add `{point}: ...` to points"
-                    yield Finding(("lines", name, key), expected, fix)
+                yield from _unknown(getattr(line, key), self.points, ("lines", name, key), "point")
+        for name, point in self.points.items():
+            if isinstance(point, Fairlead):
+                yield from _unknown(point.body, self.bodies, ("points", name, "body"), "body")
 
     def _lonely_points(self) -> Iterator[Finding]:
         for name, point in self.points.items():
@@ -277,19 +221,48 @@ class System(Table):
                 yield Finding(
                     ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
                 )
+        on = {point.body for point in self.points.values() if isinstance(point, Fairlead)}
+        for name in self.bodies:
+            if name not in on:
+                fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
+                yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
 
     def _floating_groups(self) -> Iterator[Finding]:
-        """Free points from which no way along lines leads to a fixed one."""
+        """Free points and bodies from which no way along lines leads to what is fixed."""
+        ways = [{x.start, x.end} for x in self.lines.values()]
+        ways += [{p, f"body {x.body}"} for p, x in self.points.items() if isinstance(x, Fairlead)]
         held = {name for name, point in self.points.items() if isinstance(point, FixedPoint)}
-        while True:
-            more = {p for x in self.lines.values() for p in (x.start, x.end) if {x.start, x.end} & held} - held
-            if not more:
-                break
+        held |= {f"body {name}" for name, body in self.bodies.items() if isinstance(body, FixedBody)}
+        while more := {p for way in ways if way & held for p in way} - held:
             held |= more
-        for name in self.points:
-            if name not in held and self.lines_at(name):
+        for name, point in self.points.items():
+            if name not in held and isinstance(point, FreePoint):
                 expected = "a free point that lines join to a fixed one, at least by way of others"
                 yield Finding(("points", name), expected, "make one of these points `kind: fixed`", "nothing holds it")
+        for name in self.bodies:
+            if f"body {name}" not in held:
+                expected = "a free body that lines join to what is fixed, at least by way of other points"
+                yield Finding(
+                    ("bodies", name), expected, "let one of its lines end at a fixed point", "nothing holds it"
+                )
+
+    def _body_findings(self, name: str) -> Iterator[Finding]:
+        """What is wrong with the motion of a body, or with what is given to act on it."""
+        body, still = self.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
+        if isinstance(body, FreeBody):
+            in_water = [key for key in ("volume", "hydrostatics", "damping", "added_mass") if getattr(body, key)]
+            if in_water and self.environment.fluid is None:
+                expected = f"a fluid, because body {name} has {in_water[0]}"
+                yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")
+        line = next(x for x in self.lines.values() for p in (x.start, x.end) if self.body_of(p) is body)
+        ends = Ends(start=still, end=body.end) if isinstance(body, FreeBody) else None
+        if isinstance(body, FixedBody):
+            moved = Clamped(position=body.position, tangent=(1.0, 0.0, 0.0), motion=body.motion)
+            ends = Ends(start=moved, end=Free())
+        tables = {"ends": ends, "time": self.time, "cable": line.cable, "environment": self.environment}
+        for found in motion_findings(tables):
+            at = ("bodies", name, *found.at[2:]) if found.at[:1] == ("ends",) else found.at
+            yield Finding(at, found.expected, found.fix, found.given)
 
     def _line_findings(self, name: str) -> Iterator[Finding]:
         """What is wrong with a line and its points, each under its own key of the system."""
@@ -320,5 +293,16 @@ class System(Table):
             if isinstance(self.points[point], FreePoint) and rest:
                 rest = ({"position": "initial_guess", "thrust": "force"}.get(str(rest[0]), rest[0]), *rest[1:])
             at = ("points", point, *rest)
+            if isinstance(found_point := self.points[point], Fairlead):
+                moved = rest[:1] == ("motion",)
+                at = ("bodies", found_point.body, *rest) if moved else ("points", point, "place")
         given = f"of line {name}: {found.given}" if found.given else None
         return Finding(at, found.expected.replace("ends.", "line's "), found.fix, given)
+
+
+def _unknown(name: str, known: Mapping[str, Any], at: Place, what: str) -> Iterator[Finding]:
+    if name not in known:
+        tables = {"point": "points", "body": "bodies"}[what]
+        expected = f"the name of a {what}: {', '.join(known) or 'there is none'}"
+        fix = nearest(name, dict.fromkeys(known, "")) or f"add `{name}: ...` to {tables}"
+        yield Finding(at, expected, fix)

@@ -53,7 +53,7 @@ class LineResult:
         self.recorder: Recorder = result_recorder(
             scene, model, self.observer, self.target, {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
-        self.books = self._own_books(found.states[number])
+        self.books = self._own_books(found.state.lines[number])
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
         self.diagnostics.begin()

@@ -7,24 +7,23 @@ import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome, ResultError
 from hybrid.kernels.cache import cache_folder
-from hybrid.kernels.report import BEND, FORCE_A, TWIST_NODE
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.report import BEND, TWIST_NODE
+from hybrid.kernels.state import Floats
 from hybrid.model.plan import output_times, parts
 from hybrid.model.resolution import first_resolution
 from hybrid.model.system import SystemModel, balanced_places, build_system
-from hybrid.scene.system import FixedPoint, System
+from hybrid.scene.system import System
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.system_lines import LineResult
+from hybrid.simulation.system_points import fields_of, values_of
 from hybrid.simulation.time_loop import SAME_STOP, apart
-from hybrid.solve.system import JoinedLine, SystemSolver, SystemTaken, joined_ends
+from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, SystemTaken, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
-from hybrid.store.format import Field
 from hybrid.store.lines import write_lines
 from hybrid.store.writer import Recorder
 
@@ -37,26 +36,28 @@ LOOK = 16
 def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
     try:
-        return solve_system_statics(joined_lines(model, t), len(model.free), _starts(system, model))
+        numbers = model.body_numbers(t)
+        return solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
     except LineFailed as failed:
         raise named(failed, model) from None
 
 
 def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
-    yield "lines hung between the first places", [x.start for x in model.models]
+    yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
     places = balanced_places(system, model)
-    if places is not None and model.free:
-        yield "lines hung between places that balance", [x.start for x in build_system(system, places).models]
+    if places is not None and (model.free or model.bodies):
+        models = build_system(system, *places).models
+        yield "lines hung between places that balance", SystemState([x.start for x in models], places[1])
 
 
 def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
     """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
     lines = []
-    for x, joints in zip(model.models, model.joints, strict=True):
+    for x, joints, fairleads in zip(model.models, model.joints, model.fairleads, strict=True):
         floor = x.slack_floor if x.slack == "stop" else -np.inf
         ends = joined_ends(x.ends.at(t), joints)
-        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints))
+        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads))
     return lines
 
 
@@ -83,24 +84,14 @@ class SystemRun:
             for k, (name, scene, model) in enumerate(zip(names, self.scenes, self.model.models, strict=True))
         ]
         self.t, self.steps = 0.0, 0
-        self.states: list[State] = [state.copy() for state in self.found.states]
+        self.loaded = 0.0  # s, loads that have stopped by then act no more
+        self.state: SystemState = self.found.state.copy()
         self.recorder = self._points_recorder(text)
 
     # --- the file -----------------------------------------------------------------------------------
 
     def _points_recorder(self, text: str) -> Recorder:
-        """The result of the points: place and velocity of all, and the force on those that are held."""
-        fields = []
-        for name, point in self.system.points.items():
-            fields.append(
-                Field(f"points/{name}/position", "m", f"position of point {name}", (3,), ("xyz",), "inertial")
-            )
-            fields.append(
-                Field(f"points/{name}/velocity", "m/s", f"velocity of point {name}", (3,), ("xyz",), "inertial")
-            )
-            if isinstance(point, FixedPoint):
-                what = f"force of the lines on point {name}, which its support bears"
-                fields.append(Field(f"points/{name}/force", "N", what, (3,), ("xyz",), "inertial"))
+        """The result of the points and bodies."""
         attributes: dict[str, str | float | int] = {
             "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
             "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
@@ -109,23 +100,15 @@ class SystemRun:
         target = io.BytesIO() if isinstance(self.target, io.BytesIO) else self.target
         self._root = target
         return Recorder(
-            target, grid_s=np.zeros(1), fields=fields, step_fields=(), attributes=attributes, texts={"scene": text},
-            outputs=len(self.times) + 1, overwrite=True, templates=cache_folder().parent,
+            target, grid_s=np.zeros(1), fields=fields_of(self.system), step_fields=(), attributes=attributes,
+            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, templates=cache_folder().parent,
         )  # fmt: skip
 
     def _output(self, solver: SystemSolver) -> None:
-        """Record points and lines as they are."""
-        values: dict[str, Any] = {}
-        for name, point in self.system.points.items():
-            at = [(self.model.names.index(line), -(end == "end")) for line, end in self.system.lines_at(name)]
-            line, node = at[0]
-            values[f"points/{name}/position"] = self.states[line].r[node].copy()
-            values[f"points/{name}/velocity"] = self.states[line].v[node].copy()
-            if isinstance(point, FixedPoint):
-                reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in at]
-                values[f"points/{name}/force"] = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
+        """Record points, bodies and lines as they are."""
+        values = values_of(self.system, self.model, solver, self.state, self.t)
         self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
-        for line_, x, state, work in zip(self.lines, solver.lines, self.states, solver.work, strict=True):
+        for line_, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True):
             line_.output(self.t, x.ends, state, work)
 
     def _close(self, status: str, message: str) -> None:
@@ -147,8 +130,8 @@ class SystemRun:
         try:
             solver = self.found.solver
             solver.keep_books([line.books for line in self.lines])
-            solver.evaluate_forces(self.states, 0.0)
-            for line, x, state in zip(self.lines, solver.lines, self.states, strict=True):
+            solver.evaluate_forces(self.state, 0.0)
+            for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, None)
             self._output(solver)
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
@@ -160,16 +143,21 @@ class SystemRun:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
         time = self.system.require_time()
         begin = clock.process_time()
-        solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free))
+        solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
         solver.keep_books([line.books for line in self.lines])
         try:
             self._settle(solver)
-            for line, x, state in zip(self.lines, solver.lines, self.states, strict=True):
+            if self.system.environment.waves is not None:
+                text = "waves act on lines and points, not on the body"
+                for body in self.model.bodies:
+                    self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
+            for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
                 line.note_equilibrium(x, state, 0.0)
                 line.diagnostics.scheme(time.rho_inf)
             self._output(solver)
-            other = [state.copy() for state in self.states]
-            breaks = sorted({x for model in self.model.models for x in model.ends.breaks if x < time.duration})
+            other = self.state.copy()
+            given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
+            breaks = sorted({x for each in given for x in each if x < time.duration})
             step = time.step or time.duration
             before = 0.0
             for stop in apart([*self.times, *breaks], 0.0, step):
@@ -184,6 +172,7 @@ class SystemRun:
                         if interrupted():
                             raise KeyboardInterrupt
                 if any(abs(x - stop) <= SAME_STOP * step for x in breaks):
+                    self.loaded = self.t
                     for model in self.model.models:
                         model.ends.set_loads(self.t)
                     self._settle(solver)
@@ -228,13 +217,14 @@ class SystemRun:
             model.ends.at(self.t)
             model.sea.at(self.t)
             line.books.velocity[:] = model.ends.velocity
-        taken = solver.consistent_accelerations(self.states, accelerations, self.t)
+        self.model.load_bodies(self.t, solver.bodies, self.loaded)
+        taken = solver.consistent_accelerations(self.state, accelerations, self.t)
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
 
     def _step(
-        self, solver: SystemSolver, other: list[State], end: float, before: float, rho: float, begin: float
-    ) -> tuple[list[State], float]:
+        self, solver: SystemSolver, other: SystemState, end: float, before: float, rho: float, begin: float
+    ) -> tuple[SystemState, float]:
         """To `end` (s), in one step or in halves; the states not in use, and the length of the last step."""
         shortest = SHORTEST * (end - self.t)
         dt, repeats = end - self.t, 0
@@ -245,14 +235,15 @@ class SystemRun:
                 model.ends.at(t)
                 model.sea.at(t)
                 line.books.velocity[:] = model.ends.velocity
-            taken = solver.step(self.states, other, t - self.t, rho, before, t)
+            self.model.load_bodies(t, solver.bodies, self.loaded)
+            taken = solver.step(self.state, other, t - self.t, rho, before, t)
             if taken.outcome != Outcome.OK:
                 dt, repeats = 0.5 * dt, repeats + 1
                 if dt < shortest:
                     raise self._stopped(solver, taken, 2.0 * dt)
                 continue
             before = t - self.t
-            self.t, self.states, other = t, other, self.states
+            self.t, self.state, other = t, other, self.state
             self.steps += 1
             cpu = clock.process_time() - begin
             for line, work in zip(self.lines, solver.work, strict=True):
@@ -273,7 +264,7 @@ class SystemRun:
 
     def _look(self, solver: SystemSolver) -> None:
         """Whether meshes resolve the lines, and sections bear them."""
-        for line, state, work in zip(self.lines, self.states, solver.work, strict=True):
+        for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
             line.judge(self.t, work.report[BEND : TWIST_NODE + 1].tolist(), state)
 
 

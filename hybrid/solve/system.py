@@ -1,7 +1,8 @@
 """Lines that meet at points: their equilibrium, their consistent accelerations, and their steps in time.
 
 One Newton for all of them (kernels.system).  States go in and come out as of a single line (solve.stepper); a free
-point has none of its own, it is the last or first node of every line that is joined to it.
+point has none of its own, it is the last or first node of every line that is joined to it.  A body has a row of numbers
+(kernels.bodies).
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
+from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.books import Books
 from hybrid.kernels.entry import NO_PUSH, workspace
 from hybrid.kernels.forces import FRICTION, WAVES
@@ -28,7 +30,7 @@ from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.run import blank_books, blank_job, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work
 from hybrid.kernels.step import friction_axes
-from hybrid.kernels.system import solve_system
+from hybrid.kernels.system import JUNCTIONS, solve_system
 from hybrid.kernels.water import wave_kinematics
 from hybrid.solve.stability import ANCHOR
 from hybrid.solve.statics import (
@@ -40,6 +42,10 @@ from hybrid.solve.statics import (
 from hybrid.solve.stepper import HEAVY, REACH
 from hybrid.solve.stepper import MOST_ITERATIONS as MOST_OF_STEP
 
+# Springs of points and bodies that nothing holds, in the test of stability, as a part of tension scale over length.
+NEUTRAL = 1e-6
+NO_BODIES: Floats = np.zeros((0, NUMBERS))
+
 
 class JoinedLine(NamedTuple):
     """One line of a system."""
@@ -50,7 +56,19 @@ class JoinedLine(NamedTuple):
     length: float  # m
     scale: float  # N, tension scale
     floor: float  # N, tension at or below which a catenary cell is slack in motion; -infinity: it may be
-    joints: tuple[int, int]  # numbers of the points that start and end are joined to; -1: held
+    joints: tuple[int, int]  # numbers of the points, or behind them bodies, that start and end are joined to; -1: held
+    fairleads: Floats = np.zeros((2, 3))  # m, of ends that are joined to bodies, in axes of the body
+
+
+class SystemState(NamedTuple):
+    """All that a system knows of itself at a time: the states of its lines, and (B, STATE) of its free bodies."""
+
+    lines: Sequence[State]
+    bodies: Floats = np.zeros((0, STATE))
+
+    def copy(self) -> SystemState:
+        """The same in arrays of its own."""
+        return SystemState([x.copy() for x in self.lines], self.bodies.copy())
 
 
 @dataclass(frozen=True)
@@ -87,9 +105,16 @@ class SystemSolver:
     It works in space: a line whose plane is known must not be marked as planar.
     """
 
-    def __init__(self, lines: Sequence[JoinedLine], points: int) -> None:
-        """points: how many free points there are; each must be at an end of some line."""
-        self.lines = tuple(lines)
+    def __init__(self, lines: Sequence[JoinedLine], points: int, bodies: Floats = NO_BODIES) -> None:
+        """points: how many free points there are; bodies: (B, NUMBERS), what they are, read at every step.
+
+        Each point and body must be at an end of some line.
+        """
+        self.lines, self.bodies = tuple(lines), bodies
+        self.body_work = np.zeros((len(bodies), WORK))
+        self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
+        self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
+        self._handed, self._follow = np.zeros((7, 8)), np.zeros((2, 3, 6))
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
         self.work = [_room(x.line.h.size, x.joints) for x in lines]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
@@ -98,14 +123,14 @@ class SystemSolver:
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
         self._columns = np.zeros((3, max(sum(carried), 1), SIZE))
         self._functional, self.net = np.zeros((3, FUNCTIONAL)), np.zeros((points, 3))
-        unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points
+        unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
         self._matrix = np.zeros((unknowns + 1, unknowns + 1))
         size = Table(blank_job()).numbers.size
         self._numbers = np.zeros((len(lines), size), np.int64)
         self._tables = [Table(blank_job(), room) for room in self._numbers]
-        self._states: tuple[list[State], list[State]] = ([], [])  # that are bound
+        self._states: tuple[list[State], list[State]] = ([], [])  # of lines, that are bound
         self._solver = in_space.address(self._numbers[0])
-        mass = sum(float(x.line.mass.sum()) for x in lines)
+        mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
         self.scale = max(x.scale for x in lines)
         self.length = max(x.length for x in lines)
         self.anchor = ANCHOR * self.scale / (mass * self.length)  # 1/s2
@@ -122,52 +147,60 @@ class SystemSolver:
         for table, each in zip(self._tables, books, strict=True):
             table.bind(books=each)
 
-    def _solve(self, task: Task, old: Sequence[State], new: Sequence[State], t: float = 0.0) -> SystemTaken:
-        turned = len(self._states[0]) == len(old) and all(map(is_, self._states[0] + self._states[1], [*new, *old]))
-        for table, a, b in zip(self._tables, old, new, strict=True):
+    def _solve(self, task: Task, old: SystemState, new: SystemState, t: float = 0.0) -> SystemTaken:
+        both = [*new.lines, *old.lines]
+        turned = 2 * len(self._states[0]) == len(both) and all(map(is_, self._states[0] + self._states[1], both))
+        for table, a, b in zip(self._tables, old.lines, new.lines, strict=True):
             if turned and a is not b:  # after a step the states take turns
                 table.exchange("old", "new")
             else:
                 table.bind(old=a, new=b)
-        self._states = [*old], [*new]
+        self._states = [*old.lines], [*new.lines]
         outcome, iterations, left, line, where = solve_system(
-            task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._floors,
-            self._first, self._columns, self._functional, self.net, self._matrix,
+            task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
+            self._arms, self._gaps, self._floors, self._first, self._columns, self._functional, self.net,
+            self.bodies, old.bodies, new.bodies, self.body_work, self._handed, self._follow, self._matrix,
         )  # fmt: skip
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
     def residual(self) -> float:
         """Largest residual force (N) of the last march, at a node or a point."""
         inside = max(float(work.report[RESIDUAL]) for work in self.work)
-        return max(inside, float(np.abs(self.net).max(initial=0.0)))
+        left = self.body_work[:, OWN : OWN + 6] + self.body_work[:, LINES : LINES + 6]
+        arm = max(1.0, float(np.abs(self._fairleads).max()))  # m, by which moments are compared with forces
+        turning = float(np.abs(left[:, 3:]).max(initial=0.0)) / arm
+        return max(inside, turning, *(float(np.abs(x).max(initial=0.0)) for x in (self.net, left[:, :3])))
 
     # --- motion -------------------------------------------------------------------------------------
 
     def step(
-        self, old: Sequence[State], new: Sequence[State], dt: float, rho: float, before: float, t: float = 0.0,
+        self, old: SystemState, new: SystemState, dt: float, rho: float, before: float, t: float = 0.0,
         most: int = MOST_OF_STEP,
     ) -> SystemTaken:  # fmt: skip
         """From `old` to `new` (overwritten) over dt, with the ends and the sea of the new time in the lines' arrays.
 
         before: s, the length of the step that led to `old`; 0 if it is a start.  t: s, of `new`, for extremes.
         """
-        taken = self._solve(Task(STEP, dt, before, rho, limits=Limits(1.0, 1.0, most)), old, new, t)
+        taken = self._solve(Task(STEP, dt, before, rho, limits=Limits(REACH * self.length, 1.0, most)), old, new, t)
         if taken.outcome != Outcome.OK:
             return taken
-        error = max(float(work.report[LOCAL_ERROR]) for work in self.work)
+        error = max(float(work.report[LOCAL_ERROR]) for work in self.work)  # fairleads move as their bodies
         return SystemTaken(
             taken.outcome, taken.iterations, taken.correction, taken.line, taken.where, taken.residual, error
         )
 
     def consistent_accelerations(
-        self, states: Sequence[State], accelerations: Sequence[Floats], t: float = 0.0
+        self, states: SystemState, accelerations: Sequence[Floats], t: float = 0.0
     ) -> SystemTaken:
         """Give `states` the accelerations and tensions that positions, velocities and loads imply (solve.stepper).
 
         accelerations: (2, 3) m/s2 of the held ends of each line.
         """
-        for x, table, work, state, given in zip(
-            self.lines, self._tables, self.work, states, accelerations, strict=True
+        states.bodies[:, A:W] = 0.0
+        states.bodies[:, WA:] = 0.0
+        self._turning_gaps(states)
+        for k, (x, table, work, state, given) in enumerate(
+            zip(self.lines, self._tables, self.work, states.lines, accelerations, strict=True)
         ):
             state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
             l = np.linalg.norm(state.e, axis=1)
@@ -176,9 +209,11 @@ class SystemSolver:
             across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
             gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
             work.u[:], work.X[:] = 0.0, 0.0
-            for k in (0, 1):
-                if x.joints[k] < 0:
-                    work.u[-k] = -given[k] / HEAVY  # what a held end has still to go is position - r - u
+            for end in (0, 1):
+                if x.joints[end] < 0:
+                    work.u[-end] = -given[end] / HEAVY  # what a held end has still to go is position - r - u
+            if x.joints[0] >= 0:
+                work.u[0] = -self._gaps[k, 0]
             self._around(x, state, work)
             ends = x.ends._replace(position=state.r[[0, -1]])
             table.bind(work=work._replace(gaps=gaps), ends=ends)
@@ -187,7 +222,10 @@ class SystemSolver:
             table.bind(work=work, ends=x.ends)
         if taken.outcome != Outcome.OK:
             return taken
-        for x, work, state in zip(self.lines, self.work, states, strict=True):
+        for row, solved in zip(states.bodies, self.body_work[:, X : X + 6], strict=True):
+            row[VD : VD + 3] = row[A : A + 3] = HEAVY * solved[:3]
+            row[WD : WD + 3] = row[WA : WA + 3] = HEAVY * solved[3:] @ row[FRAME:V].reshape(3, 3)
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             state.vd[:] = HEAVY * work.x[:, 1:4]
             state.a[:] = state.vd
             state.T[:] += work.x[1:, 0]
@@ -196,12 +234,23 @@ class SystemSolver:
             state.wa[:] = state.wd
         return self.evaluate_forces(states, 0.0, t)
 
-    def evaluate_forces(self, states: Sequence[State], ca: float, t: float = 0.0) -> SystemTaken:
+    def _turning_gaps(self, states: SystemState) -> None:
+        """What fairleads accelerate beside the acceleration of their bodies, towards the axis of rotation."""
+        self._gaps[:] = 0.0
+        for l, x in enumerate(self.lines):
+            for k in (0, 1):
+                if x.joints[k] >= len(self.net):
+                    row = states.bodies[x.joints[k] - len(self.net)]
+                    R = row[FRAME:V].reshape(3, 3)
+                    spin = R @ row[W : W + 3]
+                    self._gaps[l, k] = np.cross(spin, np.cross(spin, R @ x.fairleads[k])) / HEAVY
+
+    def evaluate_forces(self, states: SystemState, ca: float, t: float = 0.0) -> SystemTaken:
         """The forces, reports, powers and residuals of states as they are at t (s).
 
         ca: 1/s2, of springs of that times the mass.
         """
-        for x, work, state in zip(self.lines, self.work, states, strict=True):
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             work.u[:] = 0.0
             self._around(x, state, work)
         return self._solve(Task(ASSEMBLY, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states, t)
@@ -214,31 +263,76 @@ class SystemSolver:
 
     # --- equilibrium --------------------------------------------------------------------------------
 
-    def newton(self, start: Sequence[State]) -> tuple[SystemTaken, list[State]]:
-        """Static Newton from `start`; new states are returned, the old ones are left as they were.
-
-        SLACK: a catenary cell of what was found is not under tension.
+    def compliance(self, states: SystemState, ca: float) -> Floats | None:
+        """How points and bodies give way to forces on them: (n, n) m/N, rad/N, .., of the points (3 each), then of the
+        bodies (3 of the origin, 3 of the rotation), of an equilibrium, from the factors of its lines.  Friction is
+        left out.  ca: 1/s2, of springs of that times the mass.  None: the system is singular.
         """
-        new = [state.copy() for state in start]
-        for state in new:
+        for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
+            work.u[:] = 0.0
+            self._around(x, state, work)
+        taken = self._solve(Task(JUNCTIONS, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
+        m = self._matrix.shape[0] - 1
+        if taken.outcome != Outcome.OK:
+            return None
+        if m == 0:
+            return np.zeros((0, 0))
+        A = self._matrix[:m, :m]
+        columns = 1.0 / np.maximum(np.abs(A).max(axis=0), 1e-300)
+        rows = 1.0 / np.maximum(np.abs(A * columns).max(axis=1), 1e-300)
+        try:
+            inverse = columns[:, None] * np.linalg.inv(rows[:, None] * A * columns) * rows
+        except np.linalg.LinAlgError:
+            return None
+        first = int((self.joints[:, 1] >= 0).sum())
+        return np.asarray(-inverse[first:, first:])
+
+    def is_stable(self, states: SystemState) -> bool:
+        """Whether points and bodies come back to an equilibrium when they are moved a little; False also if neither.
+
+        The springs that hold what nothing else does are a part of NEUTRAL of what a force of the tension scale does
+        over the length.  Whether lines themselves would buckle is not asked.
+        """
+        C = self.compliance(states, NEUTRAL / ANCHOR * self.anchor)
+        if C is None:
+            return False
+        if C.size == 0:
+            return True
+        arm = np.ones(C.shape[0])
+        turns = 3 * len(self.net) + 6 * np.arange(len(self.bodies))[:, None] + np.arange(3, 6)
+        arm[turns.ravel()] = max(float(np.abs(self._fairleads).max()), 1e-3 * self.length)  # m, so that all are lengths
+        C = C * arm * arm[:, None]
+        give = np.linalg.eigvalsh(0.5 * (C + C.T))
+        return bool(give[0] > -1e-6 * NEUTRAL * give[-1])
+
+    def newton(self, start: SystemState) -> tuple[SystemTaken, SystemState]:
+        """Static Newton from `start`; a new state is returned, the old one is left as it was.
+
+        SLACK: a catenary cell of what was found is not under tension.  UNSTABLE: a point or body would leave it.
+        """
+        new = start.copy()
+        for state in new.lines:
             for still in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
                 still[:] = 0.0
+        new.bodies[:, V:] = 0.0
         taken = SystemTaken(Outcome.NOT_CONVERGED, 0, np.inf, -1, -1, np.inf)
         iterations = 0
         for _ in range(BALANCING):
-            for x, work, state in zip(self.lines, self.work, new, strict=True):
+            for x, work, state in zip(self.lines, self.work, new.lines, strict=True):
                 work.u[:] = 0.0
                 self._around(x, state, work)
-            task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(1.0, 1.0, MOST_ITERATIONS))
+            task = Task(EQUILIBRIUM, ca=self.anchor, limits=Limits(REACH * self.length, 1.0, MOST_ITERATIONS))
             taken = self._solve(task, new, new)
             iterations += taken.iterations
-            for work, state in zip(self.work, new, strict=True):
+            new.bodies[:, PLACE:FRAME] += self.body_work[:, U : U + 3]
+            new.bodies[:, V:] = 0.0
+            for work, state in zip(self.work, new.lines, strict=True):
                 state.r[:] += work.u
                 state.vd[:], state.wd[:] = 0.0, 0.0  # of the anchor's springs
             if taken.outcome != Outcome.OK:
                 break
             proof = self.evaluate_forces(new, self.anchor)
-            greatest = max(float(np.abs(state.T).max()) for state in new)
+            greatest = max(float(np.abs(state.T).max()) for state in new.lines)
             taken = SystemTaken(taken.outcome, iterations, taken.correction, taken.line, taken.where, proof.residual)
             if proof.residual <= BALANCED * (greatest + self.scale):
                 break
@@ -246,8 +340,10 @@ class SystemSolver:
                 Outcome.NOT_CONVERGED, iterations, taken.correction, taken.line, taken.where, proof.residual
             )
         if taken.outcome == Outcome.OK:
-            for k, (x, state) in enumerate(zip(self.lines, new, strict=True)):
+            for k, (x, state) in enumerate(zip(self.lines, new.lines, strict=True)):
                 tension, cell = lowest(x.line, state.T)
                 if np.isfinite(x.floor) and not tension > LEAST_TENSION * abs(x.floor):
                     taken = SystemTaken(Outcome.SLACK, iterations, taken.correction, k, cell, taken.residual)
+        if taken.outcome == Outcome.OK and not self.is_stable(new):
+            taken = SystemTaken(Outcome.UNSTABLE, iterations, taken.correction, -1, -1, taken.residual)
         return taken, new

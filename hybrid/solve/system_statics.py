@@ -8,18 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.bodies import DAMPING, MASS, V
 from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, ROTARY, SEABED, WAVES
-from hybrid.kernels.state import State
+from hybrid.kernels.state import Floats
 from hybrid.solve.statics import CALM, GYRATION, LIMP, RELAXING_STEPS, SOFT_BED
-from hybrid.solve.system import JoinedLine, SystemSolver, SystemTaken
+from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, SystemTaken
 
 
 @dataclass(frozen=True)
 class SystemEquilibrium:
-    """A static solution: states of the lines, how it was found (`path`), iterations, and its proof, the largest force
+    """A static solution: the state, how it was found (`path`), iterations, and its proof, the largest force
     out of balance at a node or a point (N)."""
 
-    states: tuple[State, ...]
+    state: SystemState
     path: tuple[str, ...]
     iterations: int
     residual: float
@@ -41,17 +42,19 @@ class LineFailed(ComputationError):
         self.line = line
 
 
-Start = tuple[str, Sequence[State]]
+Start = tuple[str, SystemState]
 
 
-def solve_system_statics(lines: Sequence[JoinedLine], points: int, starts: Iterable[Start]) -> SystemEquilibrium:
+def solve_system_statics(
+    lines: Sequence[JoinedLine], points: int, bodies: Floats, starts: Iterable[Start]
+) -> SystemEquilibrium:
     """Equilibrium of a system without friction; starts: shapes to begin with, with their names, made when asked for.
 
     Tries Newton from each start; then, over a seabed or in a current, from a soft bed and no current on; then a damped
     motion to rest.  Raises LineFailed when none arrives at lines under tension.
     """
     bits = FRICTION | WAVES
-    solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points)
+    solver = SystemSolver([x._replace(line=x.line._replace(bits=x.line.bits & ~bits)) for x in lines], points, bodies)
     path: list[str] = []
     total, failed = 0, list[SystemTaken]()
     for how, taken, states in _attempts(solver, points, starts):
@@ -59,7 +62,7 @@ def solve_system_statics(lines: Sequence[JoinedLine], points: int, starts: Itera
         path.append(f"{how}: {taken.outcome.cause if taken.outcome else 'found'} ({total} iterations in all)")
         if taken.outcome == Outcome.OK:
             residual = solver.evaluate_forces(states, solver.anchor).residual
-            return SystemEquilibrium(tuple(states), tuple(path), total, residual, solver)
+            return SystemEquilibrium(states, tuple(path), total, residual, solver)
         failed.append(taken)
     worst = next((x for x in failed if x.outcome == Outcome.SLACK), failed[0])
     line = worst.line
@@ -69,7 +72,7 @@ def solve_system_statics(lines: Sequence[JoinedLine], points: int, starts: Itera
 
 def _attempts(
     solver: SystemSolver, points: int, starts: Iterable[Start]
-) -> Iterator[tuple[str, SystemTaken, Sequence[State]]]:
+) -> Iterator[tuple[str, SystemTaken, SystemState]]:
     """Ways to an equilibrium, the quickest first; each is tried only when those before it failed."""
     given: list[Start] = []
     for name, start in starts:
@@ -93,13 +96,15 @@ def _easier(x: JoinedLine, part: float) -> JoinedLine:
     return x._replace(sea=sea, line=x.line._replace(kb=x.line.kb * LIMP ** (1.0 - part)))
 
 
-def _eased(solver: SystemSolver, points: int, start: Sequence[State]) -> tuple[str, SystemTaken, Sequence[State]]:
+def _eased(solver: SystemSolver, points: int, start: SystemState) -> tuple[str, SystemTaken, SystemState]:
     """Continuation from an easy sea to the real one.  A part of the way that fails is halved."""
     states, done, part, steps = start, -1.0, 1.0, 0
     while True:
         goal = min(1.0, done + part)
         last = goal >= 1.0
-        here = solver if last else SystemSolver([_easier(x, max(goal, 0.0)) for x in solver.lines], points)
+        here = solver
+        if not last:
+            here = SystemSolver([_easier(x, max(goal, 0.0)) for x in solver.lines], points, solver.bodies)
         taken, found = here.newton(states)
         steps += 1
         if taken.outcome == Outcome.OK or (taken.outcome == Outcome.SLACK and not last):
@@ -111,10 +116,10 @@ def _eased(solver: SystemSolver, points: int, start: Sequence[State]) -> tuple[s
             return f"from a soft seabed, no current and little bending in {steps} steps", taken, states
 
 
-def _relax(solver: SystemSolver, points: int, start: Sequence[State]) -> Sequence[State]:
+def _relax(solver: SystemSolver, points: int, start: SystemState) -> SystemState:
     """Pseudo-transient: rho = 0, doubling steps, mass-proportional damping, until the lines hardly move."""
     lines = []
-    mass = sum(float(x.line.mass.sum()) for x in solver.lines)
+    mass = sum(float(x.line.mass.sum()) for x in solver.lines) + float(solver.bodies[:, MASS].sum())
     time_scale = float(np.sqrt(mass * solver.length / solver.scale))
     for x in solver.lines:
         line = x.line
@@ -125,9 +130,10 @@ def _relax(solver: SystemSolver, points: int, start: Sequence[State]) -> Sequenc
             bits=line.bits | MASS_DAMPING | ROTARY,
         )  # fmt: skip
         lines.append(x._replace(line=damped, floor=-np.inf))
-    here = SystemSolver(lines, points)
-    old = [state.copy() for state in start]
-    new = [state.copy() for state in start]
+    bodies = solver.bodies.copy()
+    bodies[:, DAMPING : DAMPING + 36] += 2.0 / time_scale * bodies[:, MASS : MASS + 36]
+    here = SystemSolver(lines, points, bodies)
+    old, new = start.copy(), start.copy()
     dt, calm = 1e-3 * time_scale, 0
     for _ in range(RELAXING_STEPS):
         taken = here.step(old, new, dt, 0.0, dt)
@@ -135,11 +141,12 @@ def _relax(solver: SystemSolver, points: int, start: Sequence[State]) -> Sequenc
             dt *= 0.25
             if dt < 1e-9 * time_scale:
                 break
-            for state in old:
+            old.bodies[:, V:] = 0.0
+            for state in old.lines:
                 for rate in (state.v, state.a, state.vd, state.w, state.wa, state.wd):
                     rate[:] = 0.0
             continue
-        moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new, old, strict=True))
+        moved = max(float(np.abs(a.r - b.r).max()) for a, b in zip(new.lines, old.lines, strict=True))
         old, new = new, old
         calm = calm + 1 if moved < CALM * solver.length * dt / time_scale else 0
         if taken.iterations <= 5:

@@ -8,8 +8,10 @@ import pytest
 
 import hybrid
 from hybrid.errors import ComputationError, SceneError
+from hybrid.scene.bodies import FixedBody, FreeBody, Hydrostatics
+from hybrid.scene.points import Fairlead, FixedPoint, FreePoint
 from hybrid.scene.read import parse_either, scene_text
-from hybrid.scene.system import FixedPoint, FreePoint, JoinedLine, System, SystemOutput
+from hybrid.scene.system import JoinedLine, System, SystemOutput
 
 PAGE = Path(__file__).parents[2] / "docs" / "lines.md"
 TEXT = """\
@@ -93,7 +95,9 @@ def test_zones_that_move_are_refused() -> None:
         parse_either(text)
 
 
-@pytest.mark.parametrize("table", [FixedPoint, FreePoint, JoinedLine, SystemOutput])
+@pytest.mark.parametrize(
+    "table", [FixedPoint, FreePoint, Fairlead, FixedBody, FreeBody, Hydrostatics, JoinedLine, SystemOutput]
+)
 def test_every_key_is_on_the_page(table: type) -> None:
     page = PAGE.read_text(encoding="utf-8")
     for key in table.model_fields:

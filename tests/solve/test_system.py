@@ -16,7 +16,7 @@ from hybrid.model.build import Model, build
 from hybrid.simulation.system_run import SystemRun
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
-from hybrid.solve.system import JoinedLine, SystemSolver, joined_ends
+from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, joined_ends
 
 LENGTH, CELLS = 100.0, 40
 A, B = np.zeros(3), np.array([70.0, 10.0, -20.0])
@@ -81,26 +81,28 @@ class Cut:
 def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], flips: tuple[int, ...]) -> None:
     """Statics to 1e-9 of the length, Newton from places 0.6 m off; a step in motion to Newton's tolerance."""
     cut = Cut(kind, cuts, flips)
-    taken, states = cut.solver.newton(cut.start)
+    taken, found = cut.solver.newton(SystemState(cut.start))
+    states = found.lines
     assert taken.outcome == Outcome.OK and taken.iterations <= 12
     assert taken.residual < 1e-9 * np.abs(cut.state.T).max()
     assert cut.apart(states, "r", cut.state) < 1e-9 * LENGTH
     assert cut.apart(states, "T", cut.state) < 1e-9 * cut.state.T.max()
 
     stepper = Stepper(cut.line, LENGTH, cut.whole.tension_scale)
-    old, others = cut.state.copy(), [x.copy() for x in states]
+    old, others = cut.state.copy(), found.copy()
     assert stepper.consistent_accelerations(cut.sea, cut.ends, np.zeros((2, 3)), old).outcome == Outcome.OK
-    assert cut.solver.consistent_accelerations(states, [np.zeros((2, 3))] * len(flips)).outcome == Outcome.OK
+    assert cut.solver.consistent_accelerations(found, [np.zeros((2, 3))] * len(flips)).outcome == Outcome.OK
     new, dt, before, iterations = old.copy(), 0.05, 0.0, [0, 0]
     for k in range(1, 81):
         cut.move(B + np.array([0.1, 0.0, 0.3]) * (1.0 - np.cos(2.0 * np.pi * k * dt / 3.0)))
         one = stepper.step(cut.sea, cut.ends, old, new, dt, 0.8, before)
-        many = cut.solver.step(states, others, dt, 0.8, before)
+        many = cut.solver.step(found, others, dt, 0.8, before)
         assert one.outcome == many.outcome == Outcome.OK
-        old, new, states, others, before = new, old, others, states, dt
+        old, new, found, others, before = new, old, others, found, dt
         iterations = [iterations[0] + one.iterations, iterations[1] + many.iterations]
     assert iterations[1] <= iterations[0] + 8  # pieces are smaller: the same shift is a larger part of them
     # what Newton leaves in a step, in 80 steps
+    states = found.lines
     assert cut.apart(states, "r", old) < 10 * TOLERANCE * LENGTH
     assert cut.apart(states, "T", old) < 100 * TOLERANCE * old.T.max()
 
@@ -108,7 +110,8 @@ def test_a_line_cut_at_any_node_is_the_same_line(kind: str, cuts: list[int], fli
 def test_what_consistent_accelerations_are() -> None:
     """A heavy point let go: cut and uncut lines accelerate alike, on both sides of the cut."""
     cut = Cut("catenary", [16], (0, 0))
-    _, states = cut.solver.newton(cut.start)
+    _, found = cut.solver.newton(SystemState(cut.start))
+    states = found.lines
     state = cut.state.copy()
     state.v[:, 2] = np.sin(np.pi * cut.whole.line.s / LENGTH)
     for i, each in enumerate(states):  # the same to the last digit: lengths make tension
@@ -118,7 +121,7 @@ def test_what_consistent_accelerations_are() -> None:
     Stepper(cut.line, LENGTH, cut.whole.tension_scale).consistent_accelerations(
         cut.sea, cut.ends, np.zeros((2, 3)), state
     )
-    cut.solver.consistent_accelerations(states, [np.zeros((2, 3))] * 2)
+    cut.solver.consistent_accelerations(found, [np.zeros((2, 3))] * 2)
     assert np.abs(state.vd).max() > 0.1
     assert cut.apart(states, "vd", state) < 1e-9 * np.abs(state.vd).max()
 
@@ -167,7 +170,7 @@ def test_a_bridle_without_weight_against_its_force_polygon() -> None:
         return np.concatenate([pull(a - knot, legs[0]) + pull(b - knot, legs[1]) + down, force - down]) / 1e3
 
     exact = root(balance, np.array([1.0, 0, -9, 2, 1, -17]), tol=1e-14).x
-    left, _, down = found.found.states
+    left, _, down = found.found.state.lines
     assert np.abs(left.r[-1] - exact[:3]).max() < 1e-9 * legs[1]
     assert np.abs(down.r[-1] - exact[3:]).max() < 1e-9 * legs[1]
     assert np.abs(down.T - np.linalg.norm(force)).max() < 1e-9 * np.linalg.norm(force)
@@ -188,7 +191,7 @@ def test_a_symmetric_mooring_of_three_lines_against_one_of_them(flipped: int) ->
     for k in range(3):
         ends = ("buoy", f"anchor{k}") if flipped and k == 1 else (f"anchor{k}", "buoy")
         lines[f"line{k}"] = {"start": ends[0], "end": ends[1], "sections": sections, "mesh": {"cells": n}}
-    states = equilibrium({"points": points, "lines": lines}).found.states
+    states = equilibrium({"points": points, "lines": lines}).found.state.lines
 
     h, w = length / n, mass * length / n * g
 

@@ -1,0 +1,116 @@
+"""Rigid bodies as numbers: what a free one is, where it is first, what loads it, and how a known one moves."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NoReturn
+
+import numpy as np
+
+from hybrid.kernels.bodies import (
+    ARM,
+    DAMPING,
+    FORCE,
+    FRAME,
+    LEVEL,
+    LIFT,
+    MASS,
+    MOMENT,
+    NUMBERS,
+    PLACE,
+    STATE,
+    STIFFNESS,
+    V,
+)
+from hybrid.kernels.state import Floats
+from hybrid.model.ends import EndLoad, end_load
+from hybrid.model.sea import Surroundings
+from hybrid.scene.bodies import FixedBody, FreeBody, turned
+from hybrid.scene.motion import EndMotion
+
+
+def frame_of(rotation: tuple[float, float, float]) -> Floats:
+    """Axes (3, 3) of a body turned by roll, pitch and yaw (deg), as columns."""
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    return np.array([turned(rotation, x) for x in axes]).T
+
+
+def angles_of(frame: Floats) -> Floats:
+    """Roll, pitch and yaw (3,) deg of axes (3, 3)."""
+    roll, pitch = np.arctan2(frame[2, 1], frame[2, 2]), np.arcsin(np.clip(-frame[2, 0], -1.0, 1.0))
+    return np.degrees([roll, pitch, np.arctan2(frame[1, 0], frame[0, 0])])
+
+
+@dataclass(frozen=True)
+class BodyModel:
+    """A free body made ready to compute."""
+
+    name: str
+    numbers: Floats  # (NUMBERS,) of kernels.bodies, without what is given to act on it
+    start: Floats  # (STATE,) where it is first looked for
+    loads: tuple[EndLoad, ...]  # forces and moments that are given
+
+    def load(self, t: float, since: float, out: Floats) -> None:
+        """Write the force and the moment given at t (s; infinity: of full size) into `out` (NUMBERS,).
+
+        since: s, loads that have stopped by then are left out.
+        """
+        out[FORCE : MOMENT + 3] = self.numbers[FORCE : MOMENT + 3]
+        for x in self.loads:
+            if since < x.until:
+                at = FORCE if x.what == "force" else MOMENT
+                out[at : at + 3] += x.grown(t)
+
+    @property
+    def breaks(self) -> list[float]:
+        """Times (s) at which a load stops."""
+        return [x.until for x in self.loads if np.isfinite(x.until)]
+
+
+def body_model(name: str, body: FreeBody, density: float, gravity: float) -> BodyModel:
+    """The numbers of a free body in a fluid of a density (kg/m3)."""
+    numbers, start = np.zeros(NUMBERS), np.zeros(STATE)
+    numbers[MASS : MASS + 36] = np.ravel(body.mass_matrix)
+    if body.damping is not None:
+        numbers[DAMPING : DAMPING + 36] = np.ravel(body.damping)
+    if body.hydrostatics is None:
+        weight, lift = gravity * body.mass, gravity * density * body.volume
+        numbers[LIFT] = lift - weight
+        numbers[ARM : ARM + 3] = lift * np.array(body.centre_of_buoyancy) - weight * np.array(body.centre)
+    else:
+        floats = body.hydrostatics
+        numbers[LEVEL], numbers[STIFFNESS : STIFFNESS + 3] = floats.level, (floats.heave, floats.roll, floats.pitch)
+    start[PLACE:FRAME] = body.initial_guess
+    start[FRAME:V] = frame_of(body.initial_rotation).ravel()
+    loads = [
+        end_load(x.what, 0, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in body.end.loads
+    ]
+    return BodyModel(name, numbers, start, tuple(loads))
+
+
+class KnownMotion(EndMotion):
+    """How a body that is held or moved is at a time: `at` gives its origin and its axes (`EndMotion`)."""
+
+    def __init__(self, body: FixedBody, around: Surroundings) -> None:
+        waves = around.values.waves, float(around.values.ramps[1]), True
+        super().__init__(body.motion, body.position, frame_of(body.rotation), around.elevation, waves)
+
+
+class FairleadMotion(EndMotion):
+    """The motion of a point of a body whose motion is known; place: (3,) m, in axes of the body."""
+
+    def __init__(self, body: KnownMotion, place: tuple[float, float, float]) -> None:
+        self._body, self._place = body, np.array(place)
+        position, _, _, _ = self.at(0.0)
+        super().__init__(None, position)
+
+    def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]:
+        """As of `EndMotion`; lines turn freely at the point, so that it has no frame."""
+        origin, velocity, frame, spin = self._body.at(t)
+        assert frame is not None
+        arm = frame @ self._place
+        return origin + arm, velocity + np.cross(spin, arm), None, np.zeros(3)
+
+    def terms(self) -> NoReturn:
+        """A fairlead is moved by its body: only systems of lines, which ask `at`, have one."""
+        raise TypeError("a fairlead moves with its body, not by terms of its own")

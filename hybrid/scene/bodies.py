@@ -1,0 +1,228 @@
+"""Rigid bodies of a system of lines: what they are, how they float, and how they move where that is known."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Annotated, Any, Literal
+
+from pydantic import (
+    BeforeValidator,
+    Discriminator,
+    Field,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    Tag,
+    model_validator,
+)
+from pydantic_core import CoreSchema, core_schema
+
+from hybrid.scene.base import (
+    Finding,
+    Kinds,
+    NonNegative,
+    Number,
+    Positive,
+    Table,
+    Vector,
+    Words,
+    by_kind,
+    numbers,
+    refuse,
+    unwrap,
+)
+from hybrid.scene.ends import Free, Loading, Motion, Triple
+
+ROTATION = "roll, pitch and yaw, about x, then y, then z of the inertial frame [deg]"
+# Of the largest number of a matrix: how far it may be from symmetric.
+SYMMETRIC = 1e-6
+
+
+class _Diagonal:
+    """Annotation of a square matrix of numbers for which the numbers of its diagonal may stand."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+        return core_schema.no_info_before_validator_function(self.expand, handler(source))
+
+    def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
+        short = {"type": "array", "items": {"type": "number"}, "minItems": 6, "maxItems": 6}
+        return {"anyOf": [handler(schema), short | {"description": "short for a diagonal matrix"}]}
+
+    def expand(self, value: Any) -> Any:
+        value = unwrap(value)
+        if isinstance(value, list | tuple) and not any(isinstance(unwrap(x), list | tuple) for x in value):
+            return [[x if i == j else 0.0 for j in range(len(value))] for i, x in enumerate(value)]
+        return value
+
+
+_Row = Annotated[tuple[Number, Number, Number, Number, Number, Number], BeforeValidator(numbers(6))]
+SixBySix = Annotated[
+    tuple[_Row, _Row, _Row, _Row, _Row, _Row],
+    BeforeValidator(numbers(6)),
+    _Diagonal(),
+    Words("six numbers (surge, sway, heave, roll, pitch, yaw), or six rows of six"),
+]
+Matrix = Sequence[Sequence[float]]
+
+
+def turned(angles: Triple, vector: Triple) -> Triple:
+    """A vector turned by roll, pitch and yaw [deg], in this order, about the inertial axes."""
+    (cx, cy, cz), (sx, sy, sz) = ([f(math.radians(a)) for a in angles] for f in (math.cos, math.sin))
+    x, y, z = vector
+    y, z = cx * y - sx * z, sx * y + cx * z
+    x, z = cy * x + sy * z, -sy * x + cy * z
+    return cz * x - sz * y, sz * x + cz * y, z
+
+
+def no_pivot(matrix: Matrix, least: float) -> bool:
+    """Whether a symmetric matrix has a pivot below `least` times its largest number: it is not positive definite."""
+    rows, n = [list(row) for row in matrix], len(matrix)
+    big = max(abs(x) for row in rows for x in row)
+    for k in range(n):
+        pivot = rows[k][k]
+        if pivot < least * big or (pivot <= 0.0 and any(abs(rows[i][k]) > 1e-12 * big for i in range(k + 1, n))):
+            return True
+        for i in range(k + 1, n):
+            f = rows[i][k] / pivot if pivot > 0.0 else 0.0
+            for j in range(k, n):
+                rows[i][j] -= f * rows[k][j]
+    return False
+
+
+class Hydrostatics(Table):
+    """A body that floats: how high, and how stiffly the water carries it; moments with its weight and its buoyancy."""
+
+    level: Number = Field(default=0.0, description="height of the origin where the body floats without lines [m]")
+    heave: NonNegative = Field(default=0.0, description="stiffness of heave, density g times the waterplane [N/m]")
+    roll: Number = Field(default=0.0, description="stiffness of roll, weight times metacentric height [N m/rad]")
+    pitch: Number = Field(default=0.0, description="stiffness of pitch [N m/rad]")
+
+
+class FixedBody(Table):
+    """A body that is held, or moves as is known: a platform, a vessel.  It does not feel its lines."""
+
+    kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
+    position: Vector = Field(description="position of the origin of the body, inertial frame [m]")
+    rotation: Vector = Field(default=(0.0, 0.0, 0.0), description=f"how the body is turned at rest: {ROTATION}")
+    motion: Motion | None = Field(default=None, description="how the body moves and turns; absent: not at all")
+
+    def place(self, place: Triple) -> Triple:
+        """Where a point of the body is at rest, inertial [m]."""
+        return _placed(self.position, self.rotation, place)
+
+    @property
+    def shift(self) -> Motion | None:
+        """The motion of the body without its rotations, as far as tables give it."""
+        motion = self.motion
+        if motion is None or motion.file is not None or not motion.shifts():
+            return None
+        return motion.model_copy(update={"roll": None, "pitch": None, "yaw": None})
+
+    @model_validator(mode="after")
+    def _fairleads_are_points(self) -> FixedBody:
+        vessel = self.motion.vessel if self.motion is not None else None
+        if vessel is not None and vessel.fairlead is not None:
+            expected = "nothing, because lines end at points of kind fairlead"
+            refuse([Finding(("motion", "vessel", "fairlead"), expected, "leave it out")])
+        return self
+
+
+class FreeBody(Table):
+    """A rigid body that water and lines hold, in six degrees of freedom: a buoy, a spar, a vessel."""
+
+    kind: Literal["free"] = Field(default="free", description="moves under its loads and the pull of its lines")
+    initial_guess: Vector = Field(
+        description="where the search of the equilibrium puts the origin first, inertial frame [m]"
+    )
+    initial_rotation: Vector = Field(default=(0.0, 0.0, 0.0), description=f"and how it is turned there: {ROTATION}")
+    mass: Positive = Field(description="mass, without added mass [kg]")
+    centre: Vector = Field(
+        default=(0.0, 0.0, 0.0), description="centre of mass, from the origin, in axes of the body [m]"
+    )
+    inertia: Annotated[tuple[Positive, Positive, Positive], BeforeValidator(numbers(3)), Words("three numbers > 0")] = (
+        Field(description="moments of inertia about axes through the centre of mass along those of the body [kg m^2]")
+    )
+    added_mass: SixBySix | None = Field(
+        default=None,
+        description="added mass about the origin, in axes of the body: six numbers of the diagonal, or six rows "
+        "[kg, kg m, kg m^2]",
+    )
+    damping: SixBySix | None = Field(
+        default=None,
+        description="linear damping about the origin, in axes of the body, of its velocity in still water "
+        "[N s/m, N s, N m s]",
+    )
+    volume: NonNegative = Field(default=0.0, description="displaced volume of a body that stays submerged [m^3]")
+    centre_of_buoyancy: Vector = Field(
+        default=(0.0, 0.0, 0.0), description="centre of that volume, from the origin, in axes of the body [m]"
+    )
+    hydrostatics: Hydrostatics | None = Field(
+        default=None, description="how the body floats at the surface; absent: it does not, and its weight counts"
+    )
+    force: Loading | None = Field(default=None, description="force at the origin, inertial frame [N]")
+    moment: Loading | None = Field(default=None, description="moment, inertial frame [N m]")
+
+    def place(self, place: Triple) -> Triple:
+        """Where a point of the body is first looked for, inertial [m]."""
+        return _placed(self.initial_guess, self.initial_rotation, place)
+
+    @property
+    def end(self) -> Free:
+        """Its given loads, as those of an end."""
+        return Free(force=self.force, moment=self.moment)
+
+    @property
+    def mass_matrix(self) -> list[list[float]]:
+        """(6, 6) of mass, inertia and added mass about the origin, axes of the body."""
+        m, (x, y, z), I = self.mass, self.centre, self.inertia
+        M = [[m if i == j < 3 else 0.0 for j in range(6)] for i in range(6)]
+        offset = ((0.0, m * z, -m * y), (-m * z, 0.0, m * x), (m * y, -m * x, 0.0))
+        square, c = x * x + y * y + z * z, (x, y, z)
+        for i in range(3):
+            for j in range(3):
+                M[i][3 + j] = M[3 + j][i] = offset[i][j]
+                M[3 + i][3 + j] = (I[i] + m * square if i == j else 0.0) - m * c[i] * c[j]
+        if self.added_mass is not None:
+            M = [[a + b for a, b in zip(*rows, strict=True)] for rows in zip(M, self.added_mass, strict=True)]
+        return M
+
+    @model_validator(mode="after")
+    def _floats_or_is_submerged(self) -> FreeBody:
+        if self.volume and self.hydrostatics is not None:
+            expected = "nothing, because hydrostatics holds the buoyancy of a body that floats"
+            refuse([Finding(("volume",), expected, "leave it out, or leave hydrostatics out")])
+        return self
+
+    @model_validator(mode="after")
+    def _matrices_are_possible(self) -> FreeBody:
+        for key, unit in (("added_mass", "kg"), ("damping", "N s/m")):
+            matrix: Matrix | None = getattr(self, key)
+            if matrix is None:
+                continue
+            big = max(max(abs(x) for row in matrix for x in row), 1e-300)
+            worst = max((abs(matrix[i][j] - matrix[j][i]), i, j) for i in range(6) for j in range(i))
+            if key == "added_mass" and worst[0] > SYMMETRIC * big:
+                _, i, j = worst
+                expected = f"a symmetric matrix; here row {i + 1}, column {j + 1} and its mirror image differ"
+                refuse([Finding((key, i, j), expected, f"{matrix[j][i]:g} ({unit}), or the mean of both")])
+            even = [[0.5 * (matrix[i][j] + matrix[j][i]) for j in range(6)] for i in range(6)]
+            if key == "damping" and no_pivot(even, -1e-9):
+                expected = "a matrix that takes energy, whatever the velocity: no negative eigenvalue"
+                refuse([Finding((key,), expected, "check signs and units", "a matrix that gives energy")])
+        if no_pivot(self.mass_matrix, 1e-12):
+            expected = "a matrix that leaves, with the mass, some inertia to every motion"
+            given = "a matrix that leaves none"
+            refuse([Finding(("added_mass",), expected, "check signs, units and the order surge to yaw", given)])
+        return self
+
+
+def _placed(origin: Triple, rotation: Triple, place: Triple) -> Triple:
+    x, y, z = turned(rotation, place)
+    return origin[0] + x, origin[1] + y, origin[2] + z
+
+
+RigidBody = Annotated[
+    Annotated[FixedBody, Tag("<fixed>")] | Annotated[FreeBody, Tag("<free>")],
+    Discriminator(by_kind),
+    Kinds(("fixed", "free"), usual=("free",), implied=(("position", "fixed"), ("initial_guess", "free"))),
+]

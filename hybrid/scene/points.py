@@ -1,0 +1,97 @@
+"""Points where lines of a system end: fixed ones, free ones, and fairleads of bodies."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
+from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
+from hybrid.scene.ends import TURNS, Body, Free, Loading, Motion
+
+# Names are keys of the result file and of its groups.
+FORBIDDEN = "/."
+
+
+def _a_name(name: str) -> str:
+    if not name or any(x in name for x in FORBIDDEN):
+        raise ValueError("a name")
+    return name
+
+
+Name = Annotated[Text, AfterValidator(_a_name)]
+
+
+class FixedPoint(Table):
+    """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
+
+    kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
+    position: Vector = Field(description="position, inertial frame [m]")
+    motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
+
+    @model_validator(mode="after")
+    def _does_not_turn(self) -> FixedPoint:
+        if self.motion is not None:
+            turns = [name for name in self.motion.harmonics() if name in TURNS]
+            expected = "no rotation, because lines turn freely at a point"
+            refuse(Finding(("motion", name), expected, "leave it out") for name in turns)
+        return self
+
+
+class FreePoint(Table):
+    """A point that lines alone hold: a knot, a buoy, a clump.  It turns freely and has no moment of inertia."""
+
+    kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
+    initial_guess: Vector = Field(
+        description="where the search of the equilibrium puts the point first, inertial frame [m]"
+    )
+    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
+    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
+    height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
+    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
+    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
+    force: Loading | None = Field(default=None, description="force on the point, inertial frame [N]")
+
+    @model_validator(mode="after")
+    def _added_mass_has_a_body(self) -> FreePoint:
+        if self.added_mass and not self.is_body:
+            refuse(
+                [Finding(("added_mass",), "0, because the point has no mass, volume or drag area", "add `volume: ...`")]
+            )
+        return self
+
+    @property
+    def is_body(self) -> bool:
+        """Whether the point is more than a knot."""
+        return bool(self.mass or self.volume or self.drag_area)
+
+    @property
+    def end(self) -> Body | Free:
+        """The end of a line that carries the point."""
+        if not self.is_body:
+            return Free(force=self.force)
+        given = {k: getattr(self, k) for k in ("mass", "volume", "height", "shape", "drag_area", "added_mass")}
+        return Body(**given, thrust=self.force, initial_guess=self.initial_guess)
+
+
+class Fairlead(Table):
+    """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body, and lines turn freely there."""
+
+    kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
+    body: Name = Field(description="name of the body")
+    place: Vector = Field(description="where on the body, from its origin, in axes of the body [m]")
+
+
+Point = Annotated[
+    Annotated[FixedPoint, Tag("<fixed>")]
+    | Annotated[FreePoint, Tag("<free>")]
+    | Annotated[Fairlead, Tag("<fairlead>")],
+    Discriminator(by_kind),
+    Kinds(
+        ("fixed", "free", "fairlead"),
+        usual=("fixed",),
+        implied=(("position", "fixed"), ("initial_guess", "free"), ("body", "fairlead")),
+    ),
+]

@@ -1,0 +1,95 @@
+"""What is recorded of the points and bodies of a system of lines."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels.bodies import DONE, FRAME, KINETIC, LINES, PLACE, POTENTIAL, V, W
+from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.state import Floats
+from hybrid.model.bodies import angles_of
+from hybrid.model.system import SystemModel
+from hybrid.scene.bodies import FreeBody
+from hybrid.scene.points import FreePoint
+from hybrid.scene.system import System
+from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.store.format import Field
+
+WORKS = ("lines", "damping", "loads")
+
+
+def fields_of(system: System) -> list[Field]:
+    """Place and velocity of all points and bodies, the forces on them, and the energies of free bodies."""
+
+    def vector(name: str, unit: str, what: str) -> Field:
+        return Field(name, unit, what, (3,), ("xyz",), "inertial")
+
+    fields = []
+    for name, point in system.points.items():
+        at = f"points/{name}"
+        fields.append(vector(f"{at}/position", "m", f"position of point {name}"))
+        fields.append(vector(f"{at}/velocity", "m/s", f"velocity of point {name}"))
+        if not isinstance(point, FreePoint):
+            bears = "its body" if system.body_of(name) is not None else "its support"
+            fields.append(vector(f"{at}/force", "N", f"force of the lines on point {name}, which {bears} bears"))
+    for name, body in system.bodies.items():
+        at = f"bodies/{name}"
+        fields.append(vector(f"{at}/position", "m", f"position of the origin of body {name}"))
+        turns = f"rotation of body {name}: roll, pitch and yaw, about x, then y, then z"
+        fields.append(Field(f"{at}/rotation", "deg", turns, (3,), ("xyz",), "inertial"))
+        fields.append(vector(f"{at}/velocity", "m/s", f"velocity of the origin of body {name}"))
+        fields.append(vector(f"{at}/angular_velocity", "rad/s", f"angular velocity of body {name}"))
+        fields.append(vector(f"{at}/force", "N", f"force of the lines on body {name}"))
+        fields.append(vector(f"{at}/moment", "N m", f"moment of the lines on body {name} about its origin"))
+        if isinstance(body, FreeBody):
+            fields.append(Field(f"{at}/energy/kinetic", "J", f"kinetic energy of body {name}, with its added mass"))
+            what = f"potential energy of body {name}: weight, buoyancy and hydrostatics"
+            fields.append(Field(f"{at}/energy/potential", "J", what))
+            for work in WORKS:
+                what = {"lines": "its lines", "damping": "its damping", "loads": "given loads"}[work]
+                fields.append(Field(f"{at}/work/{work}", "J", f"work done on body {name} by {what} since t = 0"))
+    return fields
+
+
+def values_of(
+    system: System, model: SystemModel, solver: SystemSolver, state: SystemState, t: float
+) -> dict[str, Any]:  # fmt: skip
+    """The values of all fields for a state at t (s) and the forces that the solver has found for it."""
+    values: dict[str, Any] = {}
+    pulls: dict[str, list[tuple[Floats, Floats]]] = {name: [] for name in system.bodies}
+    for name, point in system.points.items():
+        at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]
+        line, node = at[0]
+        values[f"points/{name}/position"] = position = state.lines[line].r[node].copy()
+        values[f"points/{name}/velocity"] = state.lines[line].v[node].copy()
+        if isinstance(point, FreePoint):
+            continue
+        reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in at]
+        values[f"points/{name}/force"] = force = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
+        if system.body_of(name) is not None:
+            pulls[point.body].append((position, force))  # type: ignore[union-attr]
+    for name, known in model.known.items():
+        position, velocity, frame, spin = known.at(t)
+        assert frame is not None
+        force = sum((f for _, f in pulls[name]), np.zeros(3))
+        moment = sum((np.cross(place - position, f) for place, f in pulls[name]), np.zeros(3))
+        values |= _of_body(name, position, frame, velocity, spin, force, moment)
+    for body, row, work in zip(model.bodies, state.bodies, solver.body_work, strict=True):
+        R, at_body = row[FRAME:V].reshape(3, 3), f"bodies/{body.name}"
+        force, moment = work[LINES : LINES + 3].copy(), work[LINES + 3 : LINES + 6].copy()
+        values |= _of_body(
+            body.name, row[PLACE:FRAME].copy(), R, row[V : V + 3].copy(), R @ row[W : W + 3], force, moment
+        )
+        values[f"{at_body}/energy/kinetic"], values[f"{at_body}/energy/potential"] = work[KINETIC], work[POTENTIAL]
+        values |= {f"{at_body}/work/{key}": work[DONE + k] for k, key in enumerate(WORKS)}
+    return values
+
+
+def _of_body(
+    name: str, position: Floats, frame: Floats, velocity: Floats, spin: Floats, force: Floats, moment: Floats
+) -> dict[str, Any]:
+    keys = ("position", "rotation", "velocity", "angular_velocity", "force", "moment")
+    found = (position, angles_of(frame), velocity, spin, force, moment)
+    return {f"bodies/{name}/{key}": np.array(x) for key, x in zip(keys, found, strict=True)}
