@@ -10,8 +10,9 @@ from moordyn_decks import DECKS, FOLDER, one_scene, text_of
 
 import hybrid
 from hybrid.interop.moordyn import import_moordyn
+from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.scene.read import parse_either
-from hybrid.scene.system import FixedPoint, FreePoint, System
+from hybrid.scene.system import System
 
 # A riser over a buoyant section, held by a tether: rods without length join its sections, a body the tether.
 RISER = """\
