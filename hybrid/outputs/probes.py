@@ -132,6 +132,14 @@ def model_errors(plain: Observation, corrected: Observation) -> dict[str, Floats
     return out
 
 
+def elevation(sea: Sea, places: Floats, now: Floats) -> Floats:
+    """Elevation (nb, n) m of the surface above still water at places (n, 2); now: (nb, 4) `Sea.now`."""
+    A, w, kx, ky, phase, _ = sea.waves.T
+    angle = places[:, :1] * kx + places[:, 1:] * ky + phase
+    turned = w * now[:, :1]
+    return np.asarray(now[:, 2:3] * (np.cos(turned) @ (A * np.cos(angle)).T + np.sin(turned) @ (A * np.sin(angle)).T))
+
+
 class Observer:
     """Fields and values for one run: what its line has, on its output grid."""
 
@@ -151,6 +159,7 @@ class Observer:
         jumps: Sequence[float] | Floats = (),
         changes: Sequence[float] = (),
         finest: Floats | None = None,
+        gauges: Sequence[tuple[float, float]] = (),
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -158,7 +167,8 @@ class Observer:
         errors: whether what leaving bending out makes of the results is written; corrected: whether they are corrected
         for it.  `values_of` gets the criteria, and for both of the latter the shift.
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
-        section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature.
+        section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
+        gauges: places (x, y), m, where the elevation of the sea is recorded.
         """
         self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
@@ -213,6 +223,10 @@ class Observer:
                 replace(f, name=sided[f.name], shape=self.jumps.shape, dims=("right/s",),
                         description=f"{f.description}, just after the point") for f in fields if f.name in sided
             ]  # fmt: skip
+        self.gauges = np.array(gauges, float).reshape(-1, 2)
+        if len(self.gauges):
+            text = "elevation of the sea above still water"
+            fields.append(Field("elevation", "m", text, (len(self.gauges),), ("gauge",)))
         if finest is not None:
             text = "which of the nodes mesh/s there are: bit k % 64 of word k // 64"
             fields.append(Field(THERE, "", text, (-(-finest.size // 64),), ("word",), dtype="int64"))
@@ -270,6 +284,8 @@ class Observer:
             if ratios is None:
                 raise ValueError("criteria are written, but `ratios` is not given")
             out |= {name: ratios[:, k] for k, name in enumerate(self._criteria)}
+        if len(self.gauges):
+            out["elevation"] = elevation(self.sea, self.gauges, batch.sea_now)
         if self._finest is not None:
             out[THERE] = np.tile(there(self._finest, self.line.s), (batch.t.size, 1))
         if self._with_work:

@@ -16,6 +16,7 @@ from hybrid.scene.base import (
     NonNegative,
     NonNegativePair,
     Number,
+    Pair,
     Positive,
     Renamed,
     Table,
@@ -398,6 +399,9 @@ class Output(Table):
         default=None, min_length=1, description="arc lengths that plots follow over time [m]"
     )
 
+    elevation: tuple[Pair, ...] | None = Field(
+        default=None, min_length=1, description="places [x, y] at which the elevation of the sea is recorded [m]"
+    )
     exact: Truth = Field(
         default=False,
         description="steps end at outputs; else an output within a step is interpolated in time, to second order",

@@ -237,6 +237,12 @@ def _accuracy_has_errors(accuracy: Accuracy | None, output: Output) -> Iterator[
         yield Finding(("output", "errors"), expected, "leave it out, or leave accuracy out")
 
 
+def _elevation_has_waves(output: Output, environment: Environment) -> Iterator[Finding]:
+    if output.elevation and (environment.fluid is None or environment.fluid.waves is None):
+        expected = "nothing, because the sea has no waves (environment.fluid.waves)"
+        yield Finding(("output", "elevation"), expected, "leave it out, or give waves")
+
+
 def _moment_is_there(accuracy: Accuracy | None, model: Model) -> Iterator[Finding]:
     if accuracy is None or accuracy.bending_moment is None:
         return
@@ -353,6 +359,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _releases,
     _tolerance_is_felt,
     _accuracy_has_errors,
+    _elevation_has_waves,
     _moment_is_there,
     _sections_that_come_and_go,
     _in_a_plane,

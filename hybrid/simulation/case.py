@@ -365,6 +365,7 @@ class Case:
             model.line, model.sea.values, model.zones, s, not only, model.attached, kinds, criteria, only, errors,
             model.corrected, self.points.jumps, section_changes(self.scene),
             model.layout.finest.nodes if follows_curvature(self.scene) and model.layout and not only else None,
+            () if only else self.scene.output.elevation or (),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

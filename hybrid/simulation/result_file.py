@@ -68,6 +68,9 @@ def result_recorder(
         fixed.append(
             (Field("history", "m", "arc lengths to follow in histories", (points.size,), ("history",)), points)
         )
+    if len(observer.gauges):
+        text = "x and y, inertial, of the places at which `elevation` is recorded"
+        fixed.append((Field("elevation_at", "m", text, observer.gauges.shape, ("gauge", "xy")), observer.gauges))
     if observer.jumps.size:
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))

@@ -116,6 +116,7 @@ class StaticCase:
         return Observer(
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
             corrected=model.corrected, jumps=jumps, changes=section_changes(self.scene),
+            gauges=() if only else self.scene.output.elevation or (),
         )  # fmt: skip
 
 

@@ -140,6 +140,7 @@ ends:
 initial: {kind: equilibrium, guess: catenary, friction: settled}
 model: {kind: catenary}
 time: {duration: 60.0, step: 0.05}
+output: {elevation: [[0.0, 0.0], [20.0, 5.0]]}
 """
 
 SEA_TOO = """\

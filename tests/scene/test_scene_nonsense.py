@@ -210,6 +210,7 @@ SIGNED |= {
     "shape",
     "turns",
     "history",
+    "elevation",
 }
 
 

@@ -98,6 +98,7 @@ def test_a_sea_in_yaml_and_in_python_is_the_same() -> None:
         initial=Equilibrium(guess="catenary", friction="settled"),
         model=CatenaryModel(),
         time={"duration": 60.0, "step": 0.05},
+        output={"elevation": ((0.0, 0.0), (20.0, 5.0))},
     )
     assert parse_scene(SEA) == built
     assert parse_scene(scene_text(built)) == built
