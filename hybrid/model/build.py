@@ -228,6 +228,9 @@ def _spare_start(scene: Scene, r: Floats, line: Line, scale: float, sea: Surroun
 BASE_CELLS, ROD_CELL, MOST_PARTS = 60, 0.25, 32
 LEAST_WEIGHT = 1e-3  # of the weight in air: a cable that floats bends under what is left of its weight
 GRADED_ROD_CELL = 1.0  # the same where the mesh follows the bends of an earlier run
+# Base cells of a graded mesh are as long as its rod cells but for rounding: up to so many more of these are none, or
+# rods of a coarse mesh would have as many cells as those of a fine one.
+NEARLY = 0.25
 # Twist, rad, that a cell takes of what the ends prescribe, at fineness 1: runs to compare with have cells four times as
 # long, and must stay below the twist at which a run stops (simulation.diagnostics).  Beyond so many cells it is left
 # to that: it is more likely that a stiffness is in another unit.
@@ -322,7 +325,8 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
         halvings = np.ceil(np.log2(np.maximum(np.diff(base) / cell, 1.0)) - 1e-9)
         parts = np.minimum(2 ** halvings.astype(int), MOST_FOLLOWING)
         return Layout(base, parts, np.ones(base.size - 1, bool))
-    parts = np.clip(np.ceil(np.diff(base) / cell - 1e-9), 1, MOST_PARTS).astype(int)
+    nearly = NEARLY if resolution.grading is not None else 1e-9
+    parts = np.clip(np.ceil(np.diff(base) / cell - nearly), 1, MOST_PARTS).astype(int)
     return Layout(base, parts, np.ones(base.size - 1, bool))
 
 
