@@ -137,76 +137,93 @@ class SystemRun:
             text = f"equilibrium: {self.found.summary}; residual force {self.found.residual:.2g} N"
             self._close("complete", text)
         except LineFailed as failed:
-            raise self._failed(failed) from None
+            raise self.failed(failed) from None
 
     def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
-        time = self.system.require_time()
-        begin = clock.process_time()
-        solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
-        solver.keep_books([line.books for line in self.lines])
         try:
-            self._settle(solver)
-            if self.system.environment.waves is not None:
-                text = "waves act on lines and points, not on the body"
-                for body in self.model.bodies:
-                    self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
-            for line, x, state in zip(self.lines, solver.lines, self.state.lines, strict=True):
-                line.note_equilibrium(x, state, 0.0)
-                line.diagnostics.scheme(time.rho_inf)
-            self._output(solver)
-            other = self.state.copy()
-            given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
-            breaks = sorted({x for each in given for x in each if x < time.duration})
-            step = time.step or time.duration
-            before = 0.0
-            for stop in apart([*self.times, *breaks], 0.0, step):
-                span, first = stop - self.t, self.t
-                count = parts(span, step)
-                for k in range(count):
-                    end = stop if k == count - 1 else first + (k + 1) * span / count
-                    other, before = self._step(solver, other, end, before, time.rho_inf, begin)
-                    if self.steps % LOOK == 0:
-                        self._look(solver)
-                        reporter(self.t, self.steps, 0, self.model.models[0].zones)
-                        if interrupted():
-                            raise KeyboardInterrupt
-                if any(abs(x - stop) <= SAME_STOP * step for x in breaks):
-                    self.loaded = self.t
-                    for model in self.model.models:
-                        model.ends.set_loads(self.t)
-                    self._settle(solver)
-                    before = 0.0
-                if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
-                    self._look(solver)
-                    self._output(solver)
-            for line in self.lines:
-                line.write_down()
+            self.begin_motion()
+
+            def look() -> None:
+                reporter(self.t, self.steps, 0, self.model.models[0].zones)
+                if interrupted():
+                    raise KeyboardInterrupt
+
+            for stop in self.stops():
+                self.go_to(stop, look)
             reporter(self.t, self.steps, 0, self.model.models[0].zones, True)
-            self._close("complete", f"{self.steps} steps")
+            self.finish()
         except LineFailed as failed:
-            raise self._failed(failed) from None
+            raise self.failed(failed) from None
         except KeyboardInterrupt:
-            self._write_rest()
-            self._close("interrupted", f"stopped from outside at t = {self.t:.6g} s")
+            self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
 
-    def _failed(self, failed: LineFailed) -> ComputationError:
+    def begin_motion(self) -> None:
+        """Make the start ready for steps, and record it."""
+        time = self.system.require_time()
+        self._begin, self._last_step = clock.process_time(), 0.0
+        self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
+        self.solver.keep_books([line.books for line in self.lines])
+        self._settle(self.solver)
+        if self.system.environment.waves is not None:
+            text = "waves act on lines and points, not on the body"
+            for body in self.model.bodies:
+                self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
+        for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
+            line.note_equilibrium(x, state, 0.0)
+            line.diagnostics.scheme(time.rho_inf)
+        self._output(self.solver)
+        self._other = self.state.copy()
+
+    def stops(self) -> list[float]:
+        """Times (s) at which a step ends: outputs, and where loads jump."""
+        time = self.system.require_time()
+        given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
+        self._breaks = sorted({x for each in given for x in each if x < time.duration})
+        return apart([*self.times, *self._breaks], 0.0, time.step or time.duration)
+
+    def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
+        """Steps to `stop` (s), equal ones, with what is due there; look: called every LOOK steps."""
+        time = self.system.require_time()
+        step = time.step or time.duration
+        span, first = stop - self.t, self.t
+        count = parts(span, step)
+        for k in range(count):
+            self._step(stop if k == count - 1 else first + (k + 1) * span / count, time.rho_inf)
+            if self.steps % LOOK == 0:
+                self._look(self.solver)
+                look()
+        if any(abs(x - stop) <= SAME_STOP * step for x in self._breaks):
+            self.loaded = self.t
+            for model in self.model.models:
+                model.ends.set_loads(self.t)
+            self._settle(self.solver)
+            self._last_step = 0.0
+        if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
+            self._look(self.solver)
+            self._output(self.solver)
+
+    def finish(self, status: str = "complete", message: str = "") -> None:
+        """Write what waits, and close the file."""
+        for line in self.lines:
+            if status == "complete":
+                line.write_down()
+            else:
+                with suppress(LineFailed):
+                    line.write_down()
+        self._close(status, message or f"{self.steps} steps")
+
+    def failed(self, failed: LineFailed) -> ComputationError:
         """What a failure becomes: a file with all that there is, and an error that names the line."""
         error = named(failed, self.model)
-        self._write_rest()
         for line in self.lines:
             if line.number == failed.line or failed.line < 0:
                 s = failed.s or 0.0
                 line.events.event(failed.t or 0.0, s, s, failed.outcome.name.lower(), str(error))
         with suppress(ResultError):
-            self._close("failed", str(error))
+            self.finish("failed", str(error))
         return error
-
-    def _write_rest(self) -> None:
-        for line in self.lines:
-            with suppress(LineFailed):
-                line.write_down()
 
     def _settle(self, solver: SystemSolver) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
@@ -222,11 +239,9 @@ class SystemRun:
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
 
-    def _step(
-        self, solver: SystemSolver, other: SystemState, end: float, before: float, rho: float, begin: float
-    ) -> tuple[SystemState, float]:
-        """To `end` (s), in one step or in halves; the states not in use, and the length of the last step."""
-        shortest = SHORTEST * (end - self.t)
+    def _step(self, end: float, rho: float) -> None:
+        """To `end` (s), in one step or in halves."""
+        solver, shortest = self.solver, SHORTEST * (end - self.t)
         dt, repeats = end - self.t, 0
         while self.t < end:
             dt = min(dt, end - self.t)
@@ -236,20 +251,19 @@ class SystemRun:
                 model.sea.at(t)
                 line.books.velocity[:] = model.ends.velocity
             self.model.load_bodies(t, solver.bodies, self.loaded)
-            taken = solver.step(self.state, other, t - self.t, rho, before, t)
+            taken = solver.step(self.state, self._other, t - self.t, rho, self._last_step, t)
             if taken.outcome != Outcome.OK:
                 dt, repeats = 0.5 * dt, repeats + 1
                 if dt < shortest:
                     raise self._stopped(solver, taken, 2.0 * dt)
                 continue
-            before = t - self.t
-            self.t, self.state, other = t, other, self.state
+            self._last_step = t - self.t
+            self.t, self.state, self._other = t, self._other, self.state
             self.steps += 1
-            cpu = clock.process_time() - begin
+            cpu = clock.process_time() - self._begin
             for line, work in zip(self.lines, solver.work, strict=True):
-                line.log(t, before, taken, repeats, work, cpu)
+                line.log(t, self._last_step, taken, repeats, work, cpu)
             repeats = 0
-        return other, before
 
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
         """Why no step leads on."""
