@@ -401,6 +401,58 @@ def test_buoy_follows_an_irregular_sea() -> None:
     assert result.events[0].kind == "static friction neglected"
 
 
+def event_times(result: hybrid.Result, kind: str) -> list[float]:
+    return [event.t for event in result.events if event.kind == kind]
+
+
+def test_the_twisted_rod_goes_from_a_helix_to_a_loop_to_intertwining() -> None:
+    """The sequence of Goyal, Perkins and Lee: by writhe, crossings and contact, with all turns kept."""
+    result = ran("plectoneme")
+    writhe, crossings = result["turns/writhe"], result["turns/crossings"]
+    contact, radius = result["energy/self_contact"], 1.0 / result.curvature.max(axis=1)
+    np.testing.assert_allclose(result["turns/link"], 8.0, atol=1e-9)
+    at = {t: int(np.searchsorted(result.times, t - 1e-9)) for t in (0.0, 2.0, 4.0, 7.0, 14.0)}
+    assert writhe[0] < 1e-3 and crossings[0] == 0  # straight
+    assert 0.05 < writhe[at[2.0]] < 0.1 and crossings[at[2.0]] == 0 and radius[at[2.0]] > 0.2  # helix
+    assert writhe[at[4.0]] == pytest.approx(1.1, abs=0.1) and crossings[at[4.0]] == 1  # loop, in contact
+    assert not contact[: at[2.0]].any() and contact[at[4.0] :].all()
+    assert crossings[at[7.0]] == 4 and crossings[at[14.0]] == 6  # wound up
+    assert writhe[-1] == pytest.approx(5.27, abs=0.05) and result["turns/twist"][-1] == pytest.approx(2.73, abs=0.05)
+    assert result.torque[-1].mean() == pytest.approx(3.43, rel=0.02)
+    (touches,) = event_times(result, "line touches itself")
+    assert touches == pytest.approx(3.65, abs=0.1) and event_times(result, "loop formed")[0] == pytest.approx(3.7)
+    assert float(result["self_distance/distance"]) > 0.85 * 0.02
+    assert not event_times(result, "unstable")
+
+
+def test_the_twisted_tether_throws_a_loop_that_pops_out_too_tight() -> None:
+    result = ran("twisted_tether")
+    writhe, tension = result["turns/writhe"], result.reaction_end[:, 0]
+    late = result.times > 20.1
+    np.testing.assert_allclose(result["turns/link"][late], 10.0, atol=2e-3)  # of the spline through the file
+    assert writhe[late].max() == pytest.approx(2.79, abs=0.1)
+    held = int(tension.argmax())  # just before it pops out
+    assert result.times[held] == pytest.approx(49.4, abs=0.3) and tension[held] == pytest.approx(730, rel=0.03)
+    assert tension[held + 3] < 40 and writhe[held + 3] < 0.2
+    (event,) = (event for event in result.events if event.kind == "bend radius below limit")
+    assert event.value == pytest.approx(0.0357, rel=0.05)
+    assert np.abs(writhe[-1]) < 1e-3
+
+
+def test_the_laid_cable_throws_a_loop_at_its_touchdown() -> None:
+    result = ran("laying_loop")
+    np.testing.assert_allclose(result["turns/link"][result.times > 20.1], 14.0, atol=2e-3)  # as above
+    foreseen, formed = event_times(result, "loop can form")[0], event_times(result, "loop formed")[0]
+    assert foreseen == pytest.approx(34.4, abs=0.5) and formed == pytest.approx(42.8, abs=0.5)
+    (warned,) = (event for event in result.events if event.kind == "loop can form" and event.t == foreseen)
+    touchdown = result.touchdown[np.searchsorted(result.times, foreseen), 1]
+    assert abs(warned.s_a - touchdown) < 3.0
+    assert result.touchdown[:, 1].max() - result.touchdown[-1, 1] == pytest.approx(20, abs=2)
+    assert result.torque[-1].mean() < 0.5 * result.torque[np.searchsorted(result.times, 30.0)].mean()
+    (event,) = (event for event in result.events if event.kind == "bend radius below limit")
+    assert event.value == pytest.approx(0.137, rel=0.1)
+
+
 def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """Distances of the reference solutions (validation): hybrid 5.36 cm, its joint at 0.2 ... 1.7 m as listed."""
     script = runpy.run_path(str(EXAMPLES / "08_python_api.py"))

@@ -57,6 +57,8 @@ SNAP = 3.0
 TURNED = 0.01
 # A line whose kinetic energy is below this part of its elastic energy is at rest for the test of stability.
 AT_REST = 1e-4
+# More bending than this part of the elastic energy is no symmetry that something could break.
+BENT = 1e-3
 # Inertia above this part of the load is a motion that has begun.
 LET_GO = 0.01
 NOWHERE: Floats = np.zeros((0, 3))
@@ -416,6 +418,11 @@ class Diagnostics:
         calm = (values["energy/kinetic"] <= AT_REST * elastic) | ~batch.v.any(axis=(1, 2))
         # what is let go has no velocity yet, but is no longer at rest
         calm &= twisted | (float(line.mass.sum()) * np.abs(batch.vd).max(axis=(1, 2)) <= LET_GO * -lowest_)
+        # a line that is bent and whose ends move follows them, and snaps where it must; contact is not judged
+        moves = np.abs(batch.v[:, [0, -1]]).max(axis=(1, 2)) > 0.0
+        calm &= ~(moves & (values["energy/bending"] > BENT * elastic))
+        if "energy/self_contact" in values:
+            calm &= values["energy/self_contact"] == 0.0
         for k in np.flatnonzero(pressed & calm):
             ends, state = ends_in(batch, int(k)), state_in(batch, int(k))
             if not is_stable(line, model.sea.values, ends, state, model.length, model.tension_scale):
