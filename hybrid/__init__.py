@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from hybrid.couple.fmu_export import export_fmu
     from hybrid.errors import ComputationError, HybridError, Outcome, ResultError, SceneError
     from hybrid.exports.api import export
-    from hybrid.interop.moordyn import import_moordyn
+    from hybrid.interop.moordyn import export_moordyn, import_moordyn
     from hybrid.model.plan import plan
     from hybrid.scene.read import load_scene, load_system, parse_scene, scene_text, validate_scene
     from hybrid.scene.schema import Scene
@@ -47,6 +47,7 @@ _HOME = {
     "System": ("hybrid.scene.system", "System"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
     "export": ("hybrid.exports.api", "export"),
+    "export_moordyn": ("hybrid.interop.moordyn", "export_moordyn"),
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "load_system": ("hybrid.scene.read", "load_system"),
@@ -77,6 +78,7 @@ __all__ = [
     "System",
     "export",
     "export_fmu",
+    "export_moordyn",
     "import_moordyn",
     "load_scene",
     "load_system",

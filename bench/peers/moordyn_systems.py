@@ -1,8 +1,8 @@
 """Decks of several lines from the tests of MoorDyn, as numbers.
 
 From the folder tests/Mooring of MoorDyn, Copyright Matt Hall and contributors, BSD 3-clause licence
-(https://github.com/FloatingArrayDesign/MoorDyn): lines.txt, lines_body.txt, tripod.txt, local_euler/duplicated.txt and
-local_euler/complex_system.txt.  Line types and points that no line uses are left out.
+(https://github.com/FloatingArrayDesign/MoorDyn): lines.txt, lines_body.txt, local_euler/duplicated.txt and
+local_euler/complex_system.txt.
 """
 
 from __future__ import annotations
@@ -66,24 +66,5 @@ DECKS = {
             "cable R2B R3A 107 11", "bouyancy R3B R4A 80 8", "cable R4B 4 340 34",
         ),
         kb=3e6, cb=3e5, WtrDpth=320,
-    ),
-    "tripod": _deck(
-        _TYPES, "Anchor-Chain 0.029256013 5.2972 35870379.7 -0.5 1918.873134 1.2 1.0 0.08 1.0\n",
-        "Anchor-Line 0.01 0.195 5002986.301 -0.5 31.26866438 1.2 1.0 0.08 1.0\n",
-        "Anchor-Bridle 0.019371902 0.336 389814.3373 -0.5 9.142866329 1.2 1.0 0.08 1.0\n",
-        "nodeFloat 0.82 133.3333333 2218027245.0 -0.5 93212594.98 1.2 1.0 0.455555556 1.0\n",
-        "nodeTether 0.024778998 3.8 25789847.71 -0.5 989.6834156 1.2 1.0 0.08 1.0\n",
-        _points(
-            "free -0.82284 1.47731 -0.17035", "free -0.41298 1.50121 0.30750", "free -0.82037 1.48247 -1.28410",
-            "free -4.14696 -0.56003 -5.84491", "free -10.84865 -4.66315 -14.58361", "fixed -14.24 -6.74 -15.8012",
-            "free 2.95977 2.79944 -5.75889", "free 10.52435 5.44562 -14.35501", "fixed 14.24 6.74 -15.9860",
-            "free -3.90598 2.64018 -6.29939", "free -10.43752 5.09097 -15.75171", "fixed -14.24 6.74 -15.8911",
-        ),
-        _lines(
-            "nodeFloat 1 2 0.63 3", "nodeTether 3 1 1.11374 5", "Anchor-Bridle 3 4 6 7", "Anchor-Line 4 5 11.7524 14",
-            "Anchor-Chain 5 6 4.42 5", "Anchor-Bridle 3 7 6 7", "Anchor-Line 7 8 11.7524 14", "Anchor-Chain 8 9 4.42 5",
-            "Anchor-Bridle 3 10 6 7", "Anchor-Line 10 11 11.7524 14", "Anchor-Chain 11 12 4.42 5",
-        ),
-        kb=3e6, cb=3e5, WtrDpth=16,
     ),
 }  # fmt: skip

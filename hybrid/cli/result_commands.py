@@ -98,11 +98,18 @@ def export(
     names: Annotated[Any, typer.Option(metavar="NAME,..", parser=words, help="Only these fields or groups.")] = None,
     times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
     line: LineName = None,
+    moordyn: Annotated[bool, flag("--moordyn", help="The scene of the result as a MoorDyn deck, RUN.txt.")] = False,
     settings: Settings = None,
     keep: Annotated[bool, flag("--no-overwrite", help="Refuse to replace an older export.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
-    """Write a result for xarray, spreadsheets, ParaView, or as cycles for fatigue; or a scene as an FMU (FMI 3.0)."""
+    """Write a result for xarray, spreadsheets, ParaView, fatigue; its scene for MoorDyn; or a scene as an FMU."""
+    if moordyn:
+        given = {"--format": format, "--at": at, "--names": names, "--times": times, "--line": line, "--set": settings}
+        if unfit := [name for name, value in given.items() if value]:
+            raise UsageError(f"{', '.join(unfit)}: of other exports; --moordyn writes the scene of a result")
+        _deck(result, output or result.with_suffix(".txt"), keep, quiet, as_json)
+        return
     if "fmu" in (format, (output or Path()).suffix.removeprefix(".").lower()):
         given = {"--at": at, "--names": names, "--times": times, "--line": line}
         if unfit := [name for name, value in given.items() if value is not None]:
@@ -123,6 +130,16 @@ def export(
             console.note(f"note: {text}")
         status = "" if opened.status == "complete" else f"; {opened.status_text}"
         console.done(made.text + status, *made.files, status=opened.status, notes=list(made.notes))
+
+
+def _deck(source: Path, target: Path, keep: bool, quiet: bool, as_json: bool) -> None:
+    """Write the scene of a result as a MoorDyn deck."""
+    with session(as_json, quiet) as console, hybrid.open(source) as opened:
+        made = hybrid.export_moordyn(opened, target, overwrite=not keep)
+        for text in made.notes:
+            console.json("note", text=text)
+            console.note(f"note: {text}")
+        console.done("MoorDyn deck", target, notes=list(made.notes))
 
 
 def _film(console: Console, result: Result, source: Path, output: Path | None, overwrite: bool) -> None:

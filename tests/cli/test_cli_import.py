@@ -73,6 +73,26 @@ def test_several_cables_are_one_scene(call: Call) -> None:
     assert said.code == 1 and "rods_and_bodies.txt:43: left out" in said.err and "--separate" in said.err
 
 
+def test_a_result_is_written_as_a_deck(call: Call, capsys: pytest.CaptureFixture[str]) -> None:
+    assert call("chain.txt").code == 0
+    for arguments, code, says in (
+        (["static", "chain.yaml"], 0, "equilibrium"),
+        (["export", "chain.static.h5", "--moordyn", "-o", "back.txt"], 0, "MoorDyn deck -> back.txt"),
+        (["export", "chain.static.h5", "--moordyn", "-o", "back.txt", "--no-overwrite"], 1, "not there yet"),
+        (["export", "chain.static.h5", "--moordyn", "--at", "1"], 1, "--at: of other exports"),
+    ):
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as leaving:
+            main(arguments)
+        out = capsys.readouterr()
+        assert (leaving.value.code or 0) == code and says in out.out + out.err
+    assert call("back.txt").code == 0
+    ours, theirs = hybrid.load_scene("chain.yaml"), hybrid.load_scene("back.yaml")
+    assert (ours.cable, ours.ends, ours.mesh, ours.environment) == (
+        theirs.cable, theirs.ends, theirs.mesh, theirs.environment,
+    )  # fmt: skip
+
+
 def test_what_is_there_is_not_replaced_unless_asked(call: Call) -> None:
     assert call("chain.txt").code == 0
     Path("chain.yaml").write_text("edited by hand")

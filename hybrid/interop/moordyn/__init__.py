@@ -8,6 +8,7 @@
     tables   what all scenes have in common
     scenes   the scene of a cable
     systems  the scene of all lines of a deck
+    writer   the other way: a deck of what a result was computed from
     notes    what could not be carried over as it stands
 
 docs/import.md lists what becomes of each part.
@@ -25,8 +26,9 @@ from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, in_o
 from hybrid.interop.moordyn.rows import Source, read_source
 from hybrid.interop.moordyn.scenes import ImportedScene, scene_of
 from hybrid.interop.moordyn.systems import system_of
+from hybrid.interop.moordyn.writer import Computed, WrittenDeck, deck_of
 
-__all__ = ["ImportedDeck", "ImportedScene", "Note", "import_moordyn"]
+__all__ = ["ImportedDeck", "ImportedScene", "Note", "WrittenDeck", "export_moordyn", "import_moordyn"]
 
 # Sections of which no row has a place in a scene: why, and what to do.
 _NO_PLACE = {
@@ -104,6 +106,23 @@ def import_moordyn(path: str | Path, line: int | None = None, separate: bool = F
     scenes = _all_scenes(deck, found)
     notes = [*deck.notes, *lost, *_no_place(source, deck)]
     return ImportedDeck(deck.file, {made.name: made for made in scenes}, in_order(notes))
+
+
+def export_moordyn(result: Computed, path: str | Path, overwrite: bool = False) -> WrittenDeck:
+    """Write a deck of MoorDyn 2 of the scene of a result (`hybrid.static` or `run`), with the cells of the result.
+
+    Free points begin where the result has them at its first output.  `.notes` says what the deck does not have.
+    SceneError if the scene has what MoorDyn has not, or if the file is there and `overwrite` is not given.
+    """
+    made, path = deck_of(result), Path(path)
+    if path.exists() and not overwrite:
+        raise SceneError([Complaint("output", str(path), "a file that is not there yet", "another name (-o)")])
+    try:
+        path.write_text(made.text, encoding="utf-8")
+    except OSError as error:
+        expected = f"a place that can be written to ({error.strerror})"
+        raise SceneError([Complaint("output", str(path), expected, "give another (-o)")]) from None
+    return made
 
 
 def _chosen(deck: Deck, found: list[Cable], lost: list[Note], line: int) -> list[Cable]:

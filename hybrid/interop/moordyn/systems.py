@@ -25,13 +25,12 @@ from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
 from hybrid.interop.moordyn.notes import TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Row, number, show
 from hybrid.interop.moordyn.scenes import ImportedScene
-from hybrid.interop.moordyn.tables import Tables, flow, lines_of
+from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
 from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.read import parse_either
 
 # Two lines are one only where a rod without length joins them: points are points.
 _JOINTS = ("rod",)
-_NEAR = 0.05  # part of the depth: an end that is as near to the bed has a line that may lie there
 _APART = "; or --separate, for each cable that can be as a scene of its own"
 
 
@@ -92,7 +91,7 @@ class _SystemMaker(Tables):
         found = []
         for line in self.deck.lines.values():
             low = min(end_of(self.deck, end).place[2] for end in line.ends)
-            found += [self.deck.types[line.type]] if low < -(1.0 - _NEAR) * depth else []
+            found += [self.deck.types[line.type]] if low < -(1.0 - NEAR) * depth else []
         return found or self.types
 
     # --- lines ---------------------------------------------------------------------------------

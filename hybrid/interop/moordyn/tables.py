@@ -25,6 +25,7 @@ from hybrid.scene.attachments import sphere_diameter
 
 # Segments whose lengths differ by less are equal: lengths are written with six digits.
 SAME_SEGMENT = 1e-6
+NEAR = 0.05  # part of the depth: a line with an end as near to the bed may lie there
 
 
 class Tables:

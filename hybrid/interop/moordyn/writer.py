@@ -1,0 +1,377 @@
+"""A deck of MoorDyn 2 of what a result was computed from, so that anyone can compare.
+
+hybrid                                  MoorDyn
+section                                 line type; BA = damping.stiffness EA
+where sections of a line meet           Free point; Free rod without length where both bend
+clump, float, free point, body          Free point with M, V, CdA, Ca = added_mass / (rho V)
+fixed point, pinned end                 Fixed point, Coupled if it moves
+clamped end of a line that bends        Fixed or Coupled rod without length, along the tangent
+surface                                 z = 0: all heights are shifted
+seabed.stiffness, .damping              kBot, cBot, per diameter of the thickest line
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from itertools import accumulate, pairwise
+from typing import Any, Protocol
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.tables import NEAR
+from hybrid.scene.cable import Section
+from hybrid.scene.read import parse_either
+from hybrid.scene.schema import Scene
+
+Triple = tuple[float, float, float]
+NO_BED = 1e4  # m under the surface, where a scene has none
+UNDER = 10.0  # m under the surface, where a scene has none
+NO_DIAMETER = 0.01  # m, where a section has none and is in no fluid
+# Of the stability limits of RK4: 2.8 over the highest frequency of stretch, 2 c/l, and of bending, 4/l^2 sqrt(EI/m);
+# 2.8 over the highest rate of its damper, 4 BA/(m l^2).
+STRETCH, BEND, DAMPED = 1.2, 0.6, 0.6
+_TOP = (
+    "--- LINE TYPES ---\nTypeName Diam Mass/m EA BA EI Cd Ca CdAx CaAx\n"
+    "(-) (m) (kg/m) (N) (N-s) (N-m^2) (-) (-) (-) (-)\n"
+)
+_RODS = (
+    "--- ROD TYPES ---\nTypeName Diam Mass/m Cd Ca CdEnd CaEnd\n(-) (m) (kg/m) (-) (-) (-) (-)\njoint 0.01 1 0 0 0 0\n"
+    "--- RODS ---\nID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs Outputs\n"
+    "(#) (-) (-) (m) (m) (m) (m) (m) (m) (-) (-)\n"
+)
+_POINTS = "--- POINTS ---\nID Attachment X Y Z M V CdA Ca\n(#) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)\n"
+_LINES = "--- LINES ---\nID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (-) (-) (-) (m) (-) (-)\n"
+
+
+class Computed(Protocol):
+    """What is read of a result (`hybrid.Result`)."""
+
+    @property
+    def scene_text(self) -> str: ...
+    @property
+    def lines(self) -> Mapping[str, Any]: ...
+    @property
+    def s(self) -> Any: ...
+    def __getitem__(self, name: str) -> Any: ...
+
+
+@dataclass(frozen=True)
+class WrittenDeck:
+    """The text of a deck, and what it does not have of the scene."""
+
+    text: str
+    notes: tuple[str, ...]
+
+
+@dataclass
+class _Shape:
+    """Where a line is at the first output: s (m) and positions there (m); and its nodes (m)."""
+
+    s: Sequence[float]
+    places: Sequence[Sequence[float]]
+    nodes: Sequence[float]
+
+    def at(self, s: float) -> Triple:
+        k = max(i for i in range(len(self.s)) if i == 0 or self.s[i] <= s)
+        k = min(k, len(self.s) - 2)
+        part = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
+        a, b = self.places[k], self.places[k + 1]
+        x, y, z = (float(p + part * (q - p)) for p, q in zip(a, b, strict=True))
+        return x, y, z
+
+    def cells(self, a: float, b: float) -> int:
+        """Cells between two arc lengths, at least one."""
+        near = 1e-6 * (b - a)
+        return 1 + sum(a + near < s < b - near for s in self.nodes)
+
+
+def deck_of(result: Computed) -> WrittenDeck:
+    """The deck of the scene of a result, its free points where the result has them first.
+
+    SceneError, with every complaint, if the scene has what MoorDyn has not.
+    """
+    scene, _ = parse_either(result.scene_text)
+    shapes = {name: _shape(line) for name, line in result.lines.items()} or {"": _shape(result)}
+    writer = _Writer(scene, shapes)
+    text = writer.text()
+    if writer.complaints:
+        raise SceneError(list(dict.fromkeys(writer.complaints)), scene.title)
+    return WrittenDeck(text, tuple(dict.fromkeys(writer.notes)))
+
+
+def _shape(result: Any) -> _Shape:
+    return _Shape(result.s.tolist(), result["position"][0].tolist(), result["mesh/s"][:].reshape(-1).tolist())
+
+
+@dataclass
+class _Lump:
+    """What is at a point: kg, m^3, m^2, kg."""
+
+    mass: float = 0.0
+    volume: float = 0.0
+    drag_area: float = 0.0
+    added_mass: float = 0.0
+
+    def add(self, item: Any, volume: float) -> None:
+        self.mass += item.mass
+        self.volume += volume
+        self.drag_area += item.drag_area
+        self.added_mass += item.added_mass
+
+
+@dataclass
+class _Writer:
+    """Rows of the tables of a deck."""
+
+    scene: Any
+    shapes: dict[str, _Shape]
+    types: dict[tuple[float, ...], str] = field(default_factory=dict)
+    rods: list[str] = field(default_factory=list)
+    points: list[str] = field(default_factory=list)
+    lines: list[str] = field(default_factory=list)
+    names: list[str] = field(default_factory=list)  # which point or rod is what, for people
+    steps: list[float] = field(default_factory=list)
+    widths: list[tuple[float, float]] = field(default_factory=list)  # m, of pieces; and the height of their lower end
+    notes: list[str] = field(default_factory=list)
+    complaints: list[Complaint] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        environment = self.scene.environment
+        self.fluid = environment.fluid
+        self.density = self.fluid.density if self.fluid is not None else 0.0
+        highest = max(z for shape in self.shapes.values() for _, _, z in shape.places)
+        surface = self.fluid.surface if self.fluid is not None else None
+        self.surface = surface if surface is not None else highest + UNDER
+
+    def text(self) -> str:
+        self._sea()
+        if isinstance(self.scene, Scene):
+            shape = self.shapes[""]
+            ends = [self._end(name, shape) for name in ("start", "end")]
+            self._line("cable", "", self.scene.cable, ends)
+        else:
+            self._system()
+        types = "".join(f"{name} {' '.join(map(_number, values))}\n" for values, name in self.types.items())
+        rods = _RODS + "".join(f"{i} {row}\n" for i, row in enumerate(self.rods, 1)) if self.rods else ""
+        points = _POINTS + "".join(f"{i} {row}\n" for i, row in enumerate(self.points, 1))
+        lines = _LINES + "".join(f"{i} {row} -\n" for i, row in enumerate(self.lines, 1))
+        options = "--- OPTIONS ---\n" + "".join(f"{_number(v)} {k}\n" for k, v in self._options()) + "RK4 tScheme\n"
+        title = f"{' '.join(self.scene.title.split()) or 'a scene of hybrid'}\n".replace("---", "-")
+        return f"{title}{'; '.join(self.names)}\n{_TOP}{types}{rods}{points}{lines}{options}--- need this line ---\n"
+
+    # --- what surrounds ------------------------------------------------------------------------
+
+    def _refuse(self, where: str, value: Any, expected: str, fix: str) -> None:
+        self.complaints.append(Complaint(where, str(value), expected, fix))
+
+    def _sea(self) -> None:
+        fluid, bed = self.fluid, self.scene.environment.seabed
+        if fluid is not None and fluid.surface is None:
+            self.notes.append(f"environment.fluid has no surface: MoorDyn's lies {UNDER:g} m above the line")
+        if fluid is not None and fluid.flows():
+            self.notes.append("environment.fluid.current is left out: MoorDyn reads currents from other files")
+        if fluid is not None and fluid.waves is not None:
+            self.notes.append("environment.fluid.waves is left out: MoorDyn reads waves from other files")
+        if bed is not None and bed.slope is not None and any(bed.slope):
+            expected = "a level bed, which a deck has"
+            self._refuse("environment.seabed.slope", bed.slope, expected, "leave slope out, for a comparison")
+
+    def _options(self) -> Iterator[tuple[str, float]]:
+        environment, bed = self.scene.environment, self.scene.environment.seabed
+        depth = self.surface - bed.z if bed is not None else NO_BED
+        several = not isinstance(self.scene, Scene)  # as the import takes kBot
+        near = [width for width, low in self.widths if several and low < self.surface - (1.0 - NEAR) * depth]
+        width = max(near or [width for width, _ in self.widths], default=NO_DIAMETER)
+        if bed is not None and any(x != width for x, _ in self.widths):
+            self.notes.append(
+                f"seabed.stiffness and .damping are taken on a width of {width:g} m; kBot acts on that of each line"
+            )
+        yield "g", environment.gravity
+        yield "rho", self.density
+        yield "WtrDpth", depth
+        yield "kBot", bed.stiffness / width if bed is not None else 1.0
+        yield "cBot", bed.damping / width if bed is not None else 0.0
+        if bed is not None and bed.friction is not None:
+            yield "MU_KA", bed.friction.axial
+            yield "MU_KT", bed.friction.lateral
+            self.notes.append("seabed.friction: MoorDyn's fades with the speed and holds nothing at rest")
+        yield "dtM", float(f"{min(self.steps, default=1e-3):.2g}")
+        yield "TmaxIC", 120.0
+
+    # --- lines ---------------------------------------------------------------------------------
+
+    def _system(self) -> None:
+        made: dict[str, str] = {}
+        for name in self.scene.points:
+            made[name] = self._free_or_fixed(name)
+        for name, line in self.scene.lines.items():
+            self._line(f"lines.{name}", name, line.cable, [made[line.start], made[line.end]])
+
+    def _line(self, where: str, name: str, cable: Any, ends: list[str]) -> None:
+        """Lines of the deck between places where sections meet or something hangs; ends: where it begins and ends."""
+        shape, bounds = self.shapes[name], [0.0, *accumulate(section.length for section in cable.sections)]
+        kinds = [self._type(f"{where}.sections[{i}]", section) for i, section in enumerate(cable.sections)]
+        hung = self._hung(f"{where}.attachments", cable, bounds)
+        cuts = sorted({*bounds, *hung})
+        at = ends[0]
+        for a, b in pairwise(cuts):
+            i = _section_at(bounds, a)
+            ahead = behind = ends[1]
+            if b != cuts[-1]:
+                both = cable.sections[i], cable.sections[_section_at(bounds, b)]
+                ahead, behind = self._joint(shape.at(b), hung.get(b), both, where)
+            cells = shape.cells(a, b)
+            self._step(cable.sections[i], (b - a) / cells)
+            width = cable.sections[i].diameter or NO_DIAMETER
+            self.widths.append((width, min(shape.at(a)[2], shape.at(b)[2])))
+            self.lines.append(f"{kinds[i]} {at} {ahead} {_number(b - a)} {cells}")
+            at = behind
+
+    def _hung(self, where: str, cable: Any, bounds: Sequence[float]) -> dict[float, _Lump]:
+        """What hangs on a line, by arc length; where sections meet, at just that."""
+        found: dict[float, _Lump] = {}
+        for i, item in enumerate(cable.attachments):
+            if item.kind == "modules":
+                fix = "give their mass, volume and drag to a section of that length"
+                self._refuse(f"{where}[{i}]", "modules", "a clump or a float, which a deck has as points", fix)
+                continue
+            s = next((x for x in (*bounds, *found) if abs(x - item.at) <= 1e-9 * bounds[-1]), item.at)
+            if s in (0.0, bounds[-1]):
+                self._refuse(f"{where}[{i}]", f"at {s:g} m", "nothing at an end", "give it to the body or point there")
+            volume = item.volume_in(self.density, self.scene.environment.gravity) if self.fluid is not None else 0.0
+            found.setdefault(s, _Lump()).add(item, volume)
+        return found
+
+    def _joint(
+        self, place: Triple, lump: _Lump | None, sections: tuple[Section, Section], where: str
+    ) -> tuple[str, str]:
+        """What ends one piece and begins the next."""
+        both = all(section.weakest_bending for section in sections)
+        if both and lump is None:
+            x, y, z = self._moved(place)
+            row = " ".join(map(_number, (x, y, z)))
+            self.rods.append(f"joint Free {row} {row} 0 -")
+            return f"R{len(self.rods)}A", f"R{len(self.rods)}B"
+        if both:
+            self.notes.append(f"{where}: the line turns freely where something hangs on it; in hybrid it bends through")
+        point = self._point("Free", place, lump or _Lump())
+        return point, point
+
+    def _type(self, where: str, section: Section) -> str:
+        if section.axial_stiffness is None:
+            expected = "a number, in N, because MoorDyn's lines are springs"
+            self._refuse(
+                f"{where}.axial_stiffness", "nothing", expected, "give axial_stiffness: 1000 times the tension is stiff"
+            )
+            return "none"
+        if section.anisotropic or (section.intrinsic_curvature is not None and any(section.intrinsic_curvature)):
+            expected = "a round, straight section, which MoorDyn's are"
+            self._refuse(
+                f"{where}.bending_stiffness", section.bending_stiffness, expected, "give one bending stiffness"
+            )
+        damping = section.damping
+        if damping is not None and damping.mass:
+            self.notes.append(f"{where}.damping.mass is left out: MoorDyn has none")
+        if section.weakest_bending:
+            self.notes.append("MoorDyn has no torsion")
+        drag = (section.drag.normal, section.drag.tangential) if section.drag is not None else (0.0, 0.0)
+        added = (
+            (section.added_mass.normal, section.added_mass.tangential) if section.added_mass is not None else (0.0, 0.0)
+        )
+        ba = damping.stiffness * section.axial_stiffness if damping is not None else 0.0
+        values = (
+            section.diameter or NO_DIAMETER, section.mass, section.axial_stiffness, ba, section.weakest_bending or 0.0,
+            drag[0], added[0], drag[1], added[1],
+        )  # fmt: skip
+        return self.types.setdefault(values, f"type{len(self.types) + 1}")
+
+    def _step(self, section: Section, l: float) -> None:
+        """A time step with which MoorDyn is stable on segments of length l, m."""
+        if section.axial_stiffness is None:
+            return
+        self.steps.append(STRETCH * l / math.sqrt(section.axial_stiffness / section.mass))
+        if section.weakest_bending:
+            self.steps.append(BEND * l * l / math.sqrt(section.weakest_bending / section.mass))
+        if section.damping is not None and section.damping.stiffness:
+            self.steps.append(DAMPED * section.mass * l * l / (section.damping.stiffness * section.axial_stiffness))
+
+    # --- points --------------------------------------------------------------------------------
+
+    def _moved(self, place: Iterable[float]) -> Triple:
+        x, y, z = place
+        return x, y, z - self.surface
+
+    def _point(self, kind: str, place: Triple, lump: _Lump) -> str:
+        added = lump.added_mass / (self.density * lump.volume) if self.density and lump.volume else 0.0
+        if lump.added_mass and not added:
+            self.notes.append("added_mass of a point without volume is left out: MoorDyn's goes with the volume")
+        row = (*self._moved(place), lump.mass, lump.volume, lump.drag_area, added)
+        self.points.append(f"{kind} {' '.join(map(_number, row))}")
+        return str(len(self.points))
+
+    def _free_or_fixed(self, name: str) -> str:
+        point = self.scene.points[name]
+        line, end = self.scene.lines_at(name)[0]
+        shape = self.shapes[line]
+        if point.kind == "fixed":
+            kind = "Coupled" if point.motion is not None else "Fixed"
+            made = self._point(kind, shape.at(0.0 if end == "start" else shape.s[-1]), _Lump())
+        elif point.kind == "free":
+            made = self._loose(f"points.{name}", point.end, shape.at(0.0 if end == "start" else shape.s[-1]))
+        else:
+            self._refuse(f"points.{name}", point.kind, "a fixed or a free point", "write it as one of these")
+            return "0"
+        self.names.append(f"point {made}: {name}")
+        return made
+
+    def _loose(self, where: str, end: Any, place: Triple) -> str:
+        if any(load.what == "force" for load in end.loads) or any(load.what == "moment" for load in end.loads):
+            self._refuse(
+                where, "force", "no force, because points of a deck have none", "leave the force out, for a comparison"
+            )
+        lump = _Lump()
+        if end.kind == "body":
+            lump.add(end, end.volume if self.fluid is not None else 0.0)
+        return self._point("Free", place, lump)
+
+    def _end(self, name: str, shape: _Shape) -> str:
+        end = getattr(self.scene.ends, name)
+        place = shape.at(0.0 if name == "start" else shape.s[-1])
+        kind = "Coupled" if end.prescribed_motion is not None else "Fixed"
+        if end.release is not None:
+            self.notes.append(f"ends.{name}.release_at is left out")
+        if end.kind in ("free", "body"):
+            made = self._loose(f"ends.{name}", end, place)
+        elif end.kind == "pinned":
+            made = self._point(kind, place, _Lump())
+        elif end.kind == "clamped":
+            made = self._clamp(end, name, kind, place)
+        else:
+            self._refuse(
+                f"ends.{name}", end.kind, "a pinned, clamped or free end, or a body", "MoorDyn has no guided ends"
+            )
+            return "0"
+        self.names.append(f"{'rod ' + made[1:-1] if made.startswith('R') else 'point ' + made}: {name}")
+        return made
+
+    def _clamp(self, end: Any, name: str, kind: str, place: Triple) -> str:
+        section = self.scene.cable.sections[0 if name == "start" else -1]
+        if not section.weakest_bending:
+            return self._point(kind, place, _Lump())
+        if not end.swivel:
+            self.notes.append(f"ends.{name} holds the twist; MoorDyn has none")
+        size = math.hypot(*end.tangent)
+        a = self._moved(place)
+        b = tuple(p + t / size for p, t in zip(a, end.tangent, strict=True))
+        self.rods.append(f"joint {kind} {' '.join(map(_number, (*a, *b)))} 0 -")
+        return f"R{len(self.rods)}{'B' if name == 'start' else 'A'}"
+
+
+def _section_at(bounds: Sequence[float], s: float) -> int:
+    """The section that begins at s or goes through it."""
+    return max(i for i, x in enumerate(bounds[:-1]) if x <= s)
+
+
+def _number(x: float) -> str:
+    return f"{x:.12g}"

@@ -1,0 +1,145 @@
+"""Decks written of scenes: they come back as the same scenes, and what MoorDyn has not is refused or named."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from moordyn_decks import FOLDER, one_scene, text_of
+from test_moordyn_systems import RISER
+
+import hybrid
+from hybrid.interop.moordyn import export_moordyn, import_moordyn
+from hybrid.interop.moordyn.writer import deck_of
+from hybrid.scene.read import scene_text
+from hybrid.scene.system import System
+
+
+class Straight:
+    """A result of lines that are straight between the places of their ends, with the cells of the scene."""
+
+    def __init__(self, scene: Any) -> None:
+        self.scene_text = scene_text(scene)
+        self.lines: dict[str, Any] = {}
+        if isinstance(scene, System):
+            self.lines = {name: Straight(scene.scene_of(name)) for name in scene.lines}
+            return
+        mesh, length = scene.mesh, scene.cable.length
+        places = [*(scene.ends.held() | scene.ends.initial_guesses()).values()]
+        if len(places) == 1:
+            places.append((places[0][0], places[0][1], places[0][2] - length))
+        self.s = np.linspace(0.0, length, 11)
+        nodes = np.array(mesh.nodes) if mesh.nodes else np.linspace(0.0, length, mesh.cells + 1)
+        self._arrays = {"position": np.linspace(*places, 11)[None], "mesh/s": nodes[None]}
+
+    def __getitem__(self, name: str) -> Any:
+        return self._arrays[name]
+
+
+def back(scene: Any, folder: Path) -> Any:
+    (folder / "back.txt").write_text(deck_of(Straight(scene)).text)
+    (made,) = import_moordyn(folder / "back.txt").scenes.values()
+    return made.scene
+
+
+def same(ours: Any, theirs: Any) -> None:
+    """Two cables are made of the same, to the digits of a deck."""
+    for a, b in zip(ours.sections, theirs.sections, strict=True):
+        for key in ("length", "mass", "diameter", "axial_stiffness", "bending_stiffness"):
+            assert (getattr(b, key) or 0.0) == pytest.approx(getattr(a, key) or 0.0, rel=1e-10)
+        assert (a.drag, a.added_mass) == (b.drag, b.added_mass)
+        taus = [x.damping.stiffness if x.damping else 0.0 for x in (a, b)]
+        assert taus[1] == pytest.approx(taus[0], rel=1e-10)
+
+
+@pytest.mark.parametrize("name", ["three_lines", "generator_spread"])
+def test_several_lines_come_back(name: str, tmp_path: Path) -> None:
+    (made,) = import_moordyn(FOLDER / f"{name}.txt").scenes.values()
+    again = back(made.scene, tmp_path)
+    for ours, theirs in zip(made.scene.lines.values(), again.lines.values(), strict=True):
+        same(ours.cable, theirs.cable)
+        for a, b in ((ours.start, theirs.start), (ours.end, theirs.end)):
+            assert again.points[b].position == pytest.approx(made.scene.points[a].position)
+    assert again.environment == made.scene.environment
+
+
+def test_a_riser_with_joints_comes_back(tmp_path: Path) -> None:
+    scene = one_scene(RISER, tmp_path).scene
+    again = back(scene, tmp_path)
+    ours, theirs = ([x.cable for x in s.lines.values()] for s in (scene, again))
+    assert sorted(len(x.sections) for x in ours) == sorted(len(x.sections) for x in theirs) == [1, 1, 3]
+    riser, copy = (max(x, key=lambda cable: len(cable.sections)) for x in (ours, theirs))
+    same(riser, copy)
+    body, point = scene.points["body1"], next(p for p in again.points.values() if p.kind == "free")
+    assert (point.mass, point.volume, point.drag_area) == (body.mass, body.volume, body.drag_area)
+    assert point.added_mass == pytest.approx(body.added_mass)
+    assert again.environment == scene.environment
+
+
+def test_a_cable_with_a_clump_comes_back(tmp_path: Path) -> None:
+    (made,) = import_moordyn(FOLDER / "rope_and_chain.txt").scenes.values()
+    scene, again = made.scene, back(made.scene, tmp_path)
+    same(scene.cable, again.cable)
+    (clump,), (copy,) = scene.cable.attachments, again.cable.attachments
+    assert (clump.at, clump.mass, clump.volume, clump.drag_area) == (copy.at, copy.mass, copy.volume, copy.drag_area)
+    assert again.mesh.nodes == pytest.approx(scene.mesh.nodes)
+    assert again.environment.seabed.stiffness == pytest.approx(scene.environment.seabed.stiffness)
+
+
+def test_a_clamp_is_a_rod_without_length(tmp_path: Path) -> None:
+    text = text_of("chain").replace("2.0e8    0          0   ", "2.0e8    0          1.0e3   ")
+    scene = one_scene(text, tmp_path).scene
+    clamp = {"kind": "clamped", "position": [205, 0, -2], "tangent": [3, 0, 4], "motion": {"heave": {"amplitude": 1, "period": 9}, "ramp": 9}}  # fmt: skip
+    clamp["swivel"] = True
+    data = scene.model_dump(mode="json", exclude_none=True)
+    scene = hybrid.validate_scene(
+        data | {"ends": {"start": {**clamp, "position": [0, 0, -99], "motion": None}, "end": clamp}}
+    )
+    again = back(scene, tmp_path)
+    for a, b in zip(scene.ends.both, again.ends.both, strict=True):
+        assert b.position == a.position and b.tangent == pytest.approx((0.6, 0.0, 0.8)) and b.swivel
+    deck = deck_of(Straight(scene))
+    assert " Coupled 205 0 -2 205.6 0 -1.2 0 -" in deck.text and "rod 1: start; rod 2: end" in deck.text
+    assert deck.notes == ("MoorDyn has no torsion",)
+
+
+@pytest.mark.parametrize(
+    ("change", "where", "says"),
+    [
+        ({"environment": {"fluid": {"density": 1025}, "seabed": {"z": -100, "stiffness": 1e4, "slope": [0.01, 0]}}}, "environment.seabed.slope", "level"),
+        ({"cable": {"sections": [{"length": 250, "mass": 20}]}}, "cable.sections[0].axial_stiffness", "springs"),
+        ({"ends": {"start": {"kind": "pinned", "position": [0, 0, -99]}, "end": {"kind": "free", "force": [9e4, 0, 9e4]}}},
+         "ends.end", "no force"),
+    ],
+)  # fmt: skip
+def test_what_moordyn_has_not_is_refused(change: dict[str, Any], where: str, says: str) -> None:
+    (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True)
+    if "cable" in change:
+        del data["environment"]["fluid"]
+    scene = hybrid.validate_scene(data | change)
+    with pytest.raises(hybrid.SceneError) as refused:
+        deck_of(Straight(scene))
+    assert where in {c.where for c in refused.value.complaints} and says in str(refused.value)
+
+
+def test_currents_and_waves_are_named(tmp_path: Path) -> None:
+    (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
+    data = made.scene.model_dump(mode="json", exclude_none=True)
+    data["environment"]["fluid"] |= {
+        "current": [1, 0, 0],
+        "waves": {"kind": "regular", "height": 2, "period": 8, "ramp": 8},
+    }
+    notes = deck_of(Straight(hybrid.validate_scene(data))).notes
+    assert [note.split(" ")[0] for note in notes] == ["environment.fluid.current", "environment.fluid.waves"]
+
+
+def test_a_deck_that_is_there_is_kept(tmp_path: Path) -> None:
+    (made,) = import_moordyn(FOLDER / "chain.txt").scenes.values()
+    path = tmp_path / "deck.txt"
+    assert export_moordyn(Straight(made.scene), path).text == path.read_text()
+    with pytest.raises(hybrid.SceneError, match="not there yet"):
+        export_moordyn(Straight(made.scene), path)
+    export_moordyn(Straight(made.scene), path, overwrite=True)
