@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hybrid.scene.system import System
     from hybrid.simulation.api import resume, run, static
     from hybrid.simulation.stepping import Simulation
+    from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
     from hybrid.studies.tradeoff import trade
@@ -51,6 +52,7 @@ _HOME = {
     "import_moordyn": ("hybrid.interop.moordyn", "import_moordyn"),
     "load_scene": ("hybrid.scene.read", "load_scene"),
     "load_system": ("hybrid.scene.read", "load_system"),
+    "offsets": ("hybrid.simulation.system_stiffness", "offsets"),
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
@@ -61,6 +63,7 @@ _HOME = {
     "run": ("hybrid.simulation.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulation.api", "static"),
+    "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "trade": ("hybrid.studies.tradeoff", "trade"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
 }
@@ -82,6 +85,7 @@ __all__ = [
     "import_moordyn",
     "load_scene",
     "load_system",
+    "offsets",
     "open",
     "parse_scene",
     "plan",
@@ -92,6 +96,7 @@ __all__ = [
     "run",
     "scene_text",
     "static",
+    "stiffness",
     "trade",
     "validate_scene",
 ]

@@ -42,6 +42,7 @@ from hybrid.cli.app import (
 from hybrid.cli.pipe import guard_output
 from hybrid.cli.plan_tables import contents_table, plan_lines
 from hybrid.cli.system_commands import plan_of_lines, run_lines, static_lines
+from hybrid.cli.system_stiffness import refuse_for_a_cable, show_holding
 from hybrid.cli.tables import (
     equilibrium_facts,
     equilibrium_table,
@@ -121,13 +122,23 @@ def resume(
 def static(
     scene: SceneFile, output: StaticFile = None, settings: Settings = None,
     plot: Drawn = False, keep: Keep = False, quiet: Quiet = False, as_json: Json = False,
+    stiffness: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="Of several lines: stiffness at point:NAME or body:NAME.")
+    ] = None,
+    offsets: Annotated[
+        str | None, typer.Option(metavar="WHAT", help="Of several lines: forces on WHAT, held beside its place ..")
+    ] = None,
+    reach: Annotated[float | None, typer.Option(metavar="M", help=".. up to so many metres to either side ..")] = None,
+    heading: Annotated[float, typer.Option(metavar="DEG", help=".. along a heading from the x axis.")] = 0.0,
 ) -> None:  # fmt: skip
     """Find the equilibrium of a cable at t = 0 and write it to a file."""
     with session(as_json, quiet) as console:
         asked = load_either(console, scene, settings)
         if not isinstance(asked, hybrid.Scene):
             static_lines(console, asked, output or Path(f"{scene.stem}.static.h5"), plot, keep)
+            show_holding(console, asked, stiffness, offsets, reach, heading)
             return
+        refuse_for_a_cable(stiffness, offsets)
         target = console.will_write(output or Path(f"{scene.stem}.static.h5"))
         picture = picture_beside(target, plot)
         console.compiling(asked, static=True)

@@ -193,6 +193,86 @@ def test_a_mooring_without_symmetry_balances_whatever_the_guess() -> None:
     assert np.abs(found[0] - found[1]).max() < 1e-6
 
 
+# --- stiffness -----------------------------------------------------------------------------------------
+
+
+def turn_between(before: np.ndarray, after: np.ndarray) -> np.ndarray:
+    """Small turn (3,) rad from roll, pitch and yaw (deg) to others."""
+    E = frame_of(tuple(after)) @ frame_of(tuple(before)).T
+    return 0.5 * np.array([E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]])
+
+
+def test_stiffness_of_a_free_body_against_differences_of_equilibria() -> None:
+    """K times what a small load moves is that load, for each of six, about an equilibrium without symmetry."""
+    load, size = np.array([5e4, 2e4, -1e4, 1e5, -8e4, 5e4]), np.array([2e2, 2e2, 2e2, 2e3, 2e3, 2e3])
+
+    def scene(loads: np.ndarray) -> dict[str, Any]:
+        return moored(force=loads[:3].tolist(), moment=loads[3:].tolist())
+
+    found = hybrid.stiffness(scene(load), "body:buoy")
+    assert found.rotation is not None and np.abs(found.rotation).max() > 0.1
+    for i in range(6):
+        there = []
+        for sign in (1.0, -1.0):
+            result = hybrid.static(scene(load + sign * size[i] * (np.arange(6) == i)))
+            there.append([result[f"bodies/buoy/{key}"][-1] for key in ("position", "rotation")])
+        moved = np.concatenate([there[0][0] - there[1][0], turn_between(there[1][1], there[0][1])])
+        needed = found.matrix @ moved
+        assert np.abs(needed[:3] - 2.0 * size[i] * (np.arange(3) == i)).max() < 1e-4 * 2e3
+        assert np.abs(needed[3:] - 2.0 * size[i] * (np.arange(3, 6) == i)).max() < 1e-4 * 2e4
+    own = found.matrix - found.lines
+    assert abs(own[2, 2] - HEAVE) < 1.0 and abs(own[3, 3] / 2e7 - 1.0) < 1e-2
+
+
+@pytest.mark.parametrize("at", ["point:a", "body:buoy", "point:knot"])
+def test_stiffness_of_what_is_held_or_joined_against_differences(at: str) -> None:
+    tables = moored()
+    tables["points"]["knot"] = {"initial_guess": [60, 5, -20], "mass": 30}
+    section = LEG | {"length": 70, "mass": 2.0, "diameter": 0.02}
+    tables["lines"]["tie"] = {"start": "a", "end": "knot", "sections": [section], "mesh": {"cells": 8}}
+    tables["lines"]["tail"] = {"start": "knot", "end": "on_a", "sections": [section], "mesh": {"cells": 8}}
+    if at == "body:buoy":
+        tables["bodies"]["buoy"] = {"position": [1.0, 0.5, 0.2], "rotation": [2, 3, 10]}
+    found = hybrid.stiffness(tables, at)
+    name, size, step = at.partition(":")[2], found.matrix.shape[0], 1e-3
+    if at == "point:knot":  # by forces on it
+        C = np.zeros((3, 3))
+        for i in range(3):
+            there = []
+            for sign in (1.0, -1.0):
+                tables["points"]["knot"]["force"] = (sign * (np.arange(3) == i)).tolist()
+                there.append(hybrid.static(tables)["points/knot/position"][-1])
+            C[:, i] = 0.5 * (there[0] - there[1])
+        assert np.abs(found.matrix @ C - np.eye(3)).max() < 1e-4
+        return
+    table = tables["points" if size == 3 else "bodies"][name]
+    place = np.array(table["position"], float)
+    for i in range(3):  # by shifts, and what the lines then do
+        there = []
+        for sign in (1.0, -1.0):
+            table["position"] = (place + sign * step * (np.arange(3) == i)).tolist()
+            result = hybrid.static(tables)
+            keys = ("force",) if size == 3 else ("force", "moment")
+            group = "points" if size == 3 else "bodies"
+            there.append(np.concatenate([result[f"{group}/{name}/{key}"][-1] for key in keys]))
+        change = -(there[0] - there[1]) / (2.0 * step)
+        assert np.abs(found.matrix[:, i] - change).max() < 1e-4 * np.abs(found.matrix).max()
+
+
+def test_offsets_are_equilibria_beside_the_place() -> None:
+    curve = hybrid.offsets(moored(), "body:buoy", [-1.0, 0.0, 1.0], heading=0.0)
+    stiff = hybrid.stiffness(moored(), "body:buoy").lines
+    assert abs(curve.restoring[1]) < 1e-3 and curve.restoring[2] > 0.0 > curve.restoring[0]
+    slope = (curve.restoring[2] - curve.restoring[0]) / 2.0
+    assert abs(slope / stiff[0, 0] - 1.0) < 0.02
+    assert set(curve.tension) == {"a", "b", "c"} and curve.tension["a"][0] > curve.tension["a"][2]
+    assert curve.moment is not None and curve.moment.shape == (3, 3)
+    with pytest.raises(SceneError, match="body:buoy"):
+        hybrid.stiffness(moored(), "body:boy")
+    with pytest.raises(SceneError, match="write body:buoy"):
+        hybrid.offsets(moored(), "point:on_a", [1.0])
+
+
 # --- bodies whose motion is known ----------------------------------------------------------------------
 
 

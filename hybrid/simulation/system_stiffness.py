@@ -1,0 +1,246 @@
+"""How a system of lines holds a point or a body: its stiffness at the equilibrium, and forces at offsets from it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
+from hybrid.kernels.assembly import JOINED
+from hybrid.kernels.bodies import ARM, FRAME, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.state import Floats
+from hybrid.model.bodies import angles_of, frame_of
+from hybrid.model.system import SystemModel, build_system
+from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.points import Fairlead, FixedPoint
+from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
+from hybrid.scene.suggestions import nearest
+from hybrid.scene.system import System
+from hybrid.simulation.system_run import equilibrium_of_system
+from hybrid.solve.system import SystemSolver, SystemState
+from hybrid.solve.system_statics import SystemEquilibrium
+
+VERTICAL = np.array([0.0, 0.0, 1.0])
+
+
+@dataclass(frozen=True)
+class Stiffness:
+    """Linearised stiffness of a system at a point, or at the origin of a body, at the equilibrium.
+
+    matrix: (3, 3) N/m of a point, (6, 6) N/m, N/rad, N m/m, N m/rad of a body: force and moment that it takes to shift
+    and turn it, inertial axes; other points and bodies that are free follow.  lines: the part of the lines; that of a
+    free point has the weight and buoyancy of the point in it.  position (3,) m and rotation (3,) deg are where it is.
+    Without friction on the seabed.
+    """
+
+    at: str
+    matrix: Floats
+    lines: Floats
+    position: Floats
+    rotation: Floats | None
+
+
+@dataclass(frozen=True)
+class Offsets:
+    """What lines do to a point or body that is held beside its equilibrium, without friction on the seabed.
+
+    distance: (n,) m along a heading; force: (n, 3) N of the lines on it, inertial; moment: (n, 3) N m about the origin
+    of a body; restoring: (n,) N, force against the offset; tension: (n,) N, the largest by the name of each line.
+    """
+
+    at: str
+    heading: float  # deg, counter-clockwise from the x axis
+    distance: Floats
+    force: Floats
+    moment: Floats | None
+    restoring: Floats
+    tension: dict[str, Floats]
+
+
+def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
+    """Stiffness of a system of lines at `point:NAME` or `body:NAME`, free or held; from the factors of the equilibrium.
+
+    SceneError where the scene has no such point or body, ComputationError where no equilibrium is found.
+    """
+    system = _system(scene)
+    kind, name = _target(system, at)
+    model = build_system(system)
+    found = equilibrium_of_system(system, model, np.inf)
+    solver, state, first = found.solver, found.state, 0
+    size = 6 if kind == "body" else 3
+    free = [*model.free], [body.name for body in model.bodies]
+    if kind == "point" and name in free[0]:
+        first, position, rotation = 3 * free[0].index(name), _place(system, model, found, name), None
+        own = np.zeros((3, 3))
+    elif kind == "body" and name in free[1]:
+        b = free[1].index(name)
+        first, row = 3 * len(free[0]) + 6 * b, state.bodies[b]
+        own, position = _own_stiffness(solver.bodies[b], row), row[PLACE:FRAME].copy()
+        rotation = angles_of(row[FRAME:V].reshape(3, 3))
+    else:
+        solver, state = _let_go(system, model, found, kind, name)
+        held = system.bodies[name] if kind == "body" else None
+        position = np.array(held.position if isinstance(held, FixedBody) else system.first_place(name))
+        rotation = np.array(held.rotation) if isinstance(held, FixedBody) else None
+        first, own = 3 * len(free[0]) + (6 * len(free[1]) if kind == "body" else 0), np.zeros((size, size))
+    C = solver.compliance(state, solver.anchor)
+    try:
+        matrix = None if C is None else np.linalg.inv(C[first : first + size, first : first + size])
+    except np.linalg.LinAlgError:
+        matrix = None
+    if matrix is None:
+        raise ComputationError(Outcome.SINGULAR, None, None, f"nothing gives way at {at}: its lines do not stretch")
+    return Stiffness(at, np.asarray(matrix, float), np.asarray(matrix - own, float), position, rotation)
+
+
+def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:
+    """Forces of the lines on `point:NAME` or `body:NAME` held at distances (m) from its equilibrium along a heading
+    (deg, counter-clockwise from the x axis), at the height and rotation that it has there.
+
+    Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
+    """
+    system = _system(scene)
+    kind, name = _target(system, at)
+    model = build_system(system)
+    found = equilibrium_of_system(system, model, np.inf)
+    place = _place(system, model, found, name) if kind == "point" else None
+    free = [body.name for body in model.bodies]
+    rotation = np.zeros(3)
+    if kind == "body":
+        body = system.bodies[name]
+        if isinstance(body, FixedBody):
+            place, rotation = np.array(body.position), np.array(body.rotation)
+        else:
+            row = found.state.bodies[free.index(name)]
+            place, rotation = row[PLACE:FRAME].copy(), angles_of(row[FRAME:V].reshape(3, 3))
+    assert place is not None
+    along = np.array([np.cos(np.radians(heading)), np.sin(np.radians(heading)), 0.0])
+    forces, moments, tensions = [], [], []
+    which = _points_of(system, kind, name)
+    for distance in distances:
+        try:
+            moved = _held(system, kind, name, place + distance * along, rotation)
+            there = build_system(moved)
+            here = equilibrium_of_system(moved, there, np.inf)
+        except SceneError as error:
+            given = f"an offset of {distance:g} m"
+            raise SceneError([replace(x, value=f"{given}: {x.value}") for x in error.complaints]) from None
+        except ComputationError as error:
+            detail = f"at an offset of {distance:g} m; {error.detail}"
+            raise ComputationError(error.outcome, error.t, error.s, detail) from None
+        force, moment = np.zeros(3), np.zeros(3)
+        for l, ends in enumerate(_ends(moved)):
+            for k, point in enumerate(ends):
+                if point in which:
+                    report = here.solver.work[l].report
+                    f = report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
+                    force += f
+                    moment += np.cross(here.state.lines[l].r[-k] - place - distance * along, f)
+        forces.append(force)
+        moments.append(moment)
+        tensions.append([float(x.T.max()) for x in here.state.lines])
+    total = np.array(forces).reshape(-1, 3)
+    by_line = dict(zip(model.names, np.array(tensions).reshape(len(forces), -1).T, strict=True))
+    return Offsets(
+        at, heading, np.array(distances, float), total, np.array(moments).reshape(-1, 3) if kind == "body" else None,
+        -total @ along, by_line,
+    )  # fmt: skip
+
+
+def _system(scene: SceneLike | System) -> System:
+    found = as_scene_or_system(scene)
+    if not isinstance(found, System):
+        expected = "a scene of several lines, with points and lines"
+        raise SceneError(
+            [Complaint("cable", "a scene of one cable", expected, "write it as one line between two points")]
+        )
+    return found
+
+
+def _target(system: System, at: str) -> tuple[str, str]:
+    """Kind and name of what is asked for."""
+    kind, _, name = at.partition(":")
+    if name not in (system.points if kind == "point" else system.bodies if kind == "body" else ()):
+        names = [f"point:{x}" for x, p in system.points.items() if not isinstance(p, Fairlead)]
+        names += [f"body:{x}" for x in system.bodies]
+        fix = nearest(at, dict.fromkeys(names, "")) or f"write {names[0]}"
+        raise SceneError([Complaint("stiffness", at, f"one of {', '.join(names)}", fix)])
+    point = system.points.get(name) if kind == "point" else None
+    if isinstance(point, Fairlead):
+        expected = f"a point that is on no body; {name} is on body {point.body}"
+        raise SceneError([Complaint("stiffness", at, expected, f"write body:{point.body}")])
+    return kind, name
+
+
+def _ends(system: System) -> list[tuple[str, str]]:
+    return [(x.start, x.end) for x in system.lines.values()]
+
+
+def _points_of(system: System, kind: str, name: str) -> list[str]:
+    if kind == "point":
+        return [name]
+    return [p for p, point in system.points.items() if isinstance(point, Fairlead) and point.body == name]
+
+
+def _place(system: System, model: SystemModel, found: SystemEquilibrium, point: str) -> Floats:
+    """Where a point is in an equilibrium."""
+    line, end = system.lines_at(point)[0]
+    return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
+
+
+def _held(system: System, kind: str, name: str, place: Floats, rotation: Floats) -> System:
+    """The system with a point or body held somewhere."""
+    at, turned = tuple(place.tolist()), tuple(rotation.tolist())
+    changed: dict[str, object] = {"points": {**system.points, name: FixedPoint(position=at)}}
+    if kind == "body":
+        changed = {"bodies": {**system.bodies, name: FixedBody(position=at, rotation=turned)}}
+    moved, _ = parse_either(scene_text(system.model_copy(update=changed)))  # so that lines too short are refused
+    assert isinstance(moved, System)
+    return moved
+
+
+def _let_go(
+    system: System, model: SystemModel, found: SystemEquilibrium, kind: str, name: str
+) -> tuple[SystemSolver, SystemState]:
+    """The lines of an equilibrium as they are, with what is held at a point or body free to move."""
+    points, bodies = len(model.free), found.solver.bodies
+    which = _points_of(system, kind, name)
+    numbers, rows = bodies, found.state.bodies
+    if kind == "body":
+        body = system.bodies[name]
+        assert not isinstance(body, FreeBody)
+        row = np.zeros(STATE)
+        row[PLACE:FRAME], row[FRAME:V] = body.position, frame_of(body.rotation).ravel()
+        numbers, rows = np.vstack([bodies, np.zeros(NUMBERS)]), np.vstack([rows, row])
+    lines = []
+    for x, ends in zip(found.solver.lines, _ends(system), strict=True):
+        # a point that is let go is numbered between the free points and the bodies
+        joints = [j + 1 if kind == "point" and j >= points else j for j in x.joints]
+        held, fairleads = x.ends.held.copy(), x.fairleads.copy()
+        for k, point in enumerate(ends):
+            if point in which:
+                joints[k] = points if kind == "point" else points + len(bodies)
+                held[k] = JOINED
+                found_point = system.points[point]
+                if isinstance(found_point, Fairlead):
+                    fairleads[k] = found_point.place
+        ends_now = x.ends._replace(held=held, position=x.ends.position.copy())
+        lines.append(x._replace(joints=(joints[0], joints[1]), ends=ends_now, fairleads=fairleads))
+    return SystemSolver(lines, points + (kind == "point"), numbers), SystemState(found.state.lines, rows)
+
+
+def _own_stiffness(numbers: Floats, row: Floats) -> Floats:
+    """(6, 6) of weight, buoyancy and hydrostatics of a body at rest, against shifts and turns (inertial)."""
+    R, roll, pitch = row[FRAME:V].reshape(3, 3), numbers[STIFFNESS + 1], numbers[STIFFNESS + 2]
+    K, t, arm = np.zeros((6, 6)), R.T @ VERTICAL, R @ numbers[ARM : ARM + 3]
+    a = np.array([-pitch * t[0], -roll * t[1], 0.0])
+    K[2, 2] = numbers[STIFFNESS]
+    for k, turn in enumerate(np.eye(3)):
+        dt = R.T @ np.cross(VERTICAL, turn)
+        da = np.array([-pitch * dt[0], -roll * dt[1], 0.0])
+        change = np.cross(np.cross(turn, arm), VERTICAL) + R @ (np.cross(da, t) + np.cross(a, dt))
+        K[3:, 3 + k] = -(change + np.cross(turn, R @ np.cross(a, t)))
+    return K
