@@ -135,6 +135,8 @@ def accept(line, ends, old, new, books, work, end, dt):
         books.report[2, j], books.report[1, j], books.report[0, j] = books.report[1, j], books.report[0, j], report[j]
     for c in range(old.T.shape[0]):
         books.tension[1, c], books.tension[0, c] = books.tension[0, c], old.T[c]
+    for i in range(books.touch.shape[1]):
+        books.touch[1, i], books.touch[0, i] = books.touch[0, i], books.touch[2, i]
     for j in range(books.power.shape[1]):
         books.power[1, j] = books.power[0, j]
     keep_imposed(ends, books.imposed)

@@ -105,8 +105,8 @@ WORST = 3
 # Bits of `marks`: what a node has.
 LOADED, SEAM = 1, 2  # a point load; where one section ends and the next begins
 # Rows of `extremes`.
-TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT = range(6)
-EXTREMES = 6
+TENSION, CURVATURE, MOMENT, TORQUE, PRESSURE, DISPLACEMENT, SELF_PRESSURE = range(7)
+EXTREMES = 7
 
 
 class Books(NamedTuple):
@@ -134,11 +134,14 @@ class Books(NamedTuple):
     marks: NDArray[np.int8]  # (N+1,)
     right: NDArray[np.int64]  # (N+1,) column of `extremes` for the value just after a node; of K marked nodes behind N
     extremes: Floats  # (4, EXTREMES, N+1+K) lowest, highest, and their times (s); empty: not wanted
+    # (3, N+1) N/m, of contact of the line with itself: now, before the last step, where the try has led; empty: there is none
+    touch: Floats
 
 
 # A sample, one row: t, sea.now (4), of both ends position (2, 3), frame (2, 9), spin, force and moment (2, 3 each), report,
 # work; r, v, vd (N+1, 3 each), e (N, 3), T (N), a1 (N, 3), w (N); where they vary, h (N) and kb (N+1, 3); turns (K, 3)
-# of zones that a torque passes through; of the model error, where it is followed, K numbers.
+# of zones that a torque passes through; of a line that touches itself, the force of that (N+1); of the model error,
+# where it is followed, K numbers.
 SAMPLE_SEA, SAMPLE_POSITION, SAMPLE_FRAME, SAMPLE_SPIN, SAMPLE_FORCE, SAMPLE_MOMENT, SAMPLE_REPORT = (
     1,
     5,
@@ -152,9 +155,11 @@ SAMPLE_WORK = SAMPLE_REPORT + REPORT_SIZE
 HEAD = SAMPLE_WORK + WORKS
 
 
-def sample_size(cells: int, varies: bool = False, zones: int = 0) -> int:
-    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns.
+def sample_size(cells: int, varies: bool = False, zones: int = 0, touches: bool = False) -> int:
+    """Numbers of a sample of a line of so many cells; varies: with lengths and stiffness; zones: with turns; touches:
+
+    with the force of contact with itself.
 
     What is sampled of the model error comes behind them.
     """
-    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1)) + 3 * zones
+    return HEAD + 9 * (cells + 1) + 8 * cells + varies * (cells + 3 * (cells + 1)) + 3 * zones + touches * (cells + 1)

@@ -14,7 +14,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.assembly import get9
-from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, TENSION, TORQUE
+from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.forces import PLANAR, SEABED
@@ -219,6 +219,8 @@ def note_extremes(line, sea, ends, state, books, t):
             p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
             q, _, _ = pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)
             widen_both(books.extremes, books.right, PRESSURE, i, q, t)
+        if books.touch.shape[1] > 0:
+            widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
         x = sub(get3(state.r, i), get3(books.start, i))
         widen_both(books.extremes, books.right, DISPLACEMENT, i, math.sqrt(dot(x, x)), t)
 

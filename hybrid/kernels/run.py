@@ -131,7 +131,7 @@ def blank_books(cells: int = 1, rows: int = 1) -> Books:
         borne=np.full(cells, np.inf), worst=z((WORST, 4)), log=z((rows, len(LOG))),
         samples=z((rows, sample_size(cells))), model_error=z((2, 0)), strains=z((0, 3)), start=z((nodes, 3)), marks=z(nodes, np.int8),
         right=np.arange(nodes),
-        extremes=z((4, 0, nodes)),
+        extremes=z((4, 0, nodes)), touch=z((3, 0)),
     )  # fmt: skip
 
 

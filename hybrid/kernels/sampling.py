@@ -217,6 +217,9 @@ def sample_step(line, sea, old, new, books):
             for j in range(3):
                 row[at + j] = x * new.turn[z, j] + (1.0 - x) * old.turn[z, j]
             at += 3
+        for i in range(books.touch.shape[1]):
+            row[at + i] = x * books.touch[0, i] + (1.0 - x) * books.touch[1, i]
+        at += books.touch.shape[1]
         sample_model_error(books.model_error, x, row, at)
         count[SAMPLES] += 1
         count[OUTPUT] += 1

@@ -32,7 +32,7 @@ from hybrid.kernels.self_contact_friction import (
     keep_grips,
     link_grips,
 )
-from hybrid.kernels.self_contact_law import add_gradient, add_product
+from hybrid.kernels.self_contact_law import FORCE, WX, WY, P, Q, add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import (
     ENERGY,
     FRESH,
@@ -74,6 +74,7 @@ class ContactJob(NamedTuple):
     counts: NDArray[np.int64]
     call: NDArray[np.int64]
     contact: Contact
+    touch: Floats  # (3, N+1) as kernels.books.Books has it
 
 
 def blank_contact_job() -> ContactJob:
@@ -82,7 +83,8 @@ def blank_contact_job() -> ContactJob:
     clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
     call = np.zeros(3, np.int64)
     return ContactJob(
-        blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1)
+        blank_line(1), no_ends(), state, state, no_work(), clock, counts, call, blank_contact(1),
+        np.zeros((3, 2)),
     )  # fmt: skip
 
 
@@ -328,6 +330,23 @@ def prepare(line, ends, contact, old, u, dt):
     return near
 
 
+@inner
+def press(line, contact, touch, row):
+    """Force across per length, N/m, at the nodes, into a row of `touch`: of both strands, as the seabed has it."""
+    n = line.h.shape[0]
+    for i in range(n + 1):
+        touch[row, i] = 0.0
+    for k in range(contact.counts[POINTS]):
+        point = contact.points[k]
+        p, q = int(point[P]), int(point[Q])
+        for j in range(3):
+            touch[row, p - 1 + j] -= point[WX + j] * point[FORCE]
+            touch[row, q - 1 + j] -= point[WY + j] * point[FORCE]
+    for i in range(n + 1):
+        a, b = line.s[max(i - 1, 0)], line.s[min(i + 1, n)]
+        touch[row, i] *= 2.0 / (b - a)
+
+
 @kernel
 def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
@@ -366,6 +385,8 @@ def contact_task(table):
         work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
     if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
         look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
+    if phase in (FINISH, REST):
+        press(line, contact, job.touch, 2 if phase == FINISH else 0)
     if phase != TOUCH:
         return numbers[ENERGY] + (numbers[TRIED] if rubs else 0.0)
     if contact.counts[OVERFLOW] or (contact.counts[POINTS] > 0 and not solve_contact(line, ends, contact, work)):

@@ -183,6 +183,7 @@ class Batch(NamedTuple):
     h: Floats = NOT_VARYING  # (nb, N) m, lengths of cells where they change in a run; else empty: those of the line
     kb: Floats = NOT_VARYING  # (nb, N+1, 3) N m, stiffness of elements, likewise
     turn: Floats = NO_TURNS  # (nb, K, 3) as `State.turn`
+    touch: Floats = NOT_VARYING  # (nb, N+1) N/m, of contact of the line with itself; empty: there is none
 
     def line(self, k: int, line: Line) -> Line:
         """The line at output k, from the one of all outputs."""

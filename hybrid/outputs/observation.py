@@ -20,6 +20,7 @@ from hybrid.kernels.observed_outputs import observed
 from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
+from hybrid.outputs.local_means import means_beside
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, touchdown
 from hybrid.solve.bending_corrector import Shift
@@ -364,6 +365,14 @@ class Observation:
         """(ns, nb) N/m."""
         p = self.grid.chords @ self._depth
         return contact_pressure(self.sea, p, self.grid.chords @ -along(self.sea.normal, self._plain.v))
+
+    @property
+    def self_contact(self) -> Floats:
+        """(ns, nb) N/m, force across where the line touches itself: means of what lies nearest to an output point."""
+        touch = self.batch.touch
+        if not touch.size:
+            return np.zeros((self.grid.s.size, self.batch.t.size))
+        return means_beside(self.grid.s, self.line.s, touch) if self.grid.s.size > 1 else self.grid.chords @ touch.T
 
     @property
     def contact_force(self) -> Floats:

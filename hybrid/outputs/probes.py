@@ -59,6 +59,13 @@ PROBES: dict[str, Probe] = {
         "N m", "moment on the cable at its end", _X, lambda v: v.end_moment(1), "rod torsion", "inertial"
     ),
     "contact": Probe("N/m", "force of the seabed per length, along its normal", _S, lambda v: v.contact, "seabed"),
+    "self_contact": Probe(
+        "N/m",
+        "force per length where the line touches itself, across both strands",
+        _S,
+        lambda v: v.self_contact,
+        "self_contact",
+    ),
     "contact_force": Probe("N", "force of the seabed along its normal", (), lambda v: v.contact_force, "seabed"),
     "grounded_length": Probe("m", "length in contact with the seabed", (), lambda v: v.touchdown.grounded, "seabed"),
     "touchdown": Probe(

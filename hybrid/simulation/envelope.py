@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
 from hybrid.kernels.extremes import fold_extremes
-from hybrid.kernels.forces import PLANAR, SEABED
+from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
@@ -37,6 +37,7 @@ QUANTITIES = {
     b.MOMENT: ("bending_moment", "N m", "bending moment of the elastic strain", "rod"),
     b.TORQUE: ("torque", "N m", "torque of the elastic strain", "torsion"),
     b.PRESSURE: ("contact", "N/m", "normal force of the seabed per length", "seabed"),
+    b.SELF_PRESSURE: ("self_contact", "N/m", "force per length where the line touches itself", "self_contact"),
     b.DISPLACEMENT: ("displacement", "m", "distance from where the node was at the start", "time"),
 }
 
@@ -88,6 +89,7 @@ class Envelope:
         self._bounds = no_extremes(self.s.size)  # of meshes before that of now
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
+        has |= {"self_contact"} if moves and model.line.bits & SELF_CONTACT else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section

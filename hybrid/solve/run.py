@@ -16,7 +16,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.binding import Table
 from hybrid.kernels.books import sample_size
 from hybrid.kernels.entry import NO_PUSH, check_turns
-from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.forces import PLANAR, SELF_CONTACT
 from hybrid.kernels.newton import RUN, Limits, Task
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.run import blank_books, blank_job, in_plane, in_space, run
@@ -80,7 +80,8 @@ class CompiledRun:
         check_turns(line, state)
         cells = line.h.size
         followed = corrector.sampled if corrector is not None else np.zeros((2, 0))
-        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion)) + followed.shape[1]
+        touches = bool(line.bits & SELF_CONTACT)
+        size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches) + followed.shape[1]
         if not self._room.size:
             self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
         rows = max(1, min(ROWS, self._room.size // size))
@@ -92,6 +93,7 @@ class CompiledRun:
             borne=borne, base=first.astype(np.int64), strains=np.zeros((nodes, 3) if some else (0, 3)), marks=marks,
             right=right, start=np.zeros((nodes, 3)), model_error=followed,
             extremes=no_extremes(nodes + marked.size) if some else np.zeros((4, 0, nodes)),
+            touch=np.zeros((3, nodes if touches else 0)),
         )  # fmt: skip
         if books.samples.shape != (rows, size):  # in the same room, which a new one of some MB would cost a ms
             if self._room.size < rows * size:
@@ -141,7 +143,7 @@ class CompiledRun:
 
     def touch_itself(self, contact: SelfContact, line: Line, ends: Ends, work: Work) -> None:
         """The line touches itself from now on (kernels.self_contact)."""
-        table = contact.attach(line, ends, self.states, work, self.clock, self.count)
+        table = contact.attach(line, ends, self.states, work, self.clock, self.count, self.books.touch)
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
 
@@ -247,10 +249,11 @@ class CompiledRun:
         e, T, a1, w = take(cells, 3), take(cells), take(cells, 3), take(cells)
         h, kb = (take(cells), take(cells + 1, 3)) if self.count[b.VARIES] else (NOT_VARYING, NOT_VARYING)
         turn = take(len(self.state.turn), 3)
+        touch = take(self.books.touch.shape[1])
         held = np.repeat(ends.held[None], count, axis=0)
         self.sampled_errors = rows[:, at:]
         return Batch(
-            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, h, kb, turn,
+            t, r, v, vd, e, T, a1, w, held, position, frame, spin, force, moment, report, work, sea, h, kb, turn, touch,
         )  # fmt: skip
 
 

@@ -132,14 +132,15 @@ class SelfContact:
             self.contact.grips[: len(grips)], counts[GRIPS] = grips, len(grips)
 
     def attach(
-        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, clock: Floats, count: np.ndarray
-    ) -> np.ndarray:
-        """The table of the kernel for a run; `call` has its address then."""
+        self, line: Line, ends: Ends, states: tuple[State, State], work: Work, clock: Floats, count: np.ndarray,
+        touch: Floats,
+    ) -> np.ndarray:  # fmt: skip
+        """The table of the kernel for a run; `call` has its address then.  touch: as Books.touch."""
         old, new = states
         self._job.bind(
             line=line, ends=ends, old=old, new=new, work=work, clock=clock, counts=count, call=self.call,
-            contact=self.contact,
+            contact=self.contact, touch=touch,
         )  # fmt: skip
-        self._table, self._work = self._job.numbers, work
+        self._table, self._work, self._touch = self._job.numbers, work, touch
         self.call[ADDRESS] = contact_task.address(self._table)
         return self._table

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
-from hybrid.store.envelope import NOTHING, has_envelope
+from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope
 from hybrid.store.hockling import formation_ratio, formation_tension
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
@@ -47,7 +47,7 @@ def facts_of(result: Result) -> list[Fact]:
     facts = [*_warnings(result)]
     if len(result.times):
         makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
-        facts += [make(result) for make in makers]
+        facts += [make(result) for make in makers + (_itself,) * (f"{GROUP}/self_contact_max" in result)]
     return [*facts, _status(result)]
 
 
@@ -359,6 +359,16 @@ def _seabed(result: Result) -> Fact:
     t = float(result.times[i])
     text += f". It bears at most {amount(float(force[i]), 'N')}{moment(result, t)}."
     return Fact("seabed", title, text, "plain", values, t)
+
+
+def _itself(result: Result) -> Fact:
+    force = np.nan_to_num(result[f"{GROUP}/self_contact_max"])
+    k = int(force.argmax())
+    if not force[k] > 0.0:
+        return Fact("itself", "On itself", "The cable never touches itself.", "plain", {"force": 0.0})
+    s, t = float(result[SCALE][k]), float(result[f"{GROUP}/self_contact_t_max"][k])
+    text = f"It presses on itself with at most {amount(force[k], 'N/m', 3)} {place(result, s)}{moment(result, t)}."
+    return Fact("itself", "On itself", text, "plain", {"force": float(force[k])}, t, s)
 
 
 def _errors(result: Result) -> Fact:

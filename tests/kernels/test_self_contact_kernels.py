@@ -53,7 +53,7 @@ class Tangle:
         ends = no_ends()
         ends.held[:] = 0
         clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
-        self.table = self.contact.attach(line, ends, states, self.work, clock, counts)
+        self.table = self.contact.attach(line, ends, states, self.work, clock, counts, np.zeros((3, n + 1)))
 
     def energy(self, u: np.ndarray) -> float:
         """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""

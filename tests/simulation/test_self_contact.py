@@ -15,6 +15,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.self_contact_pairs import ENERGY
 from hybrid.kernels.self_distance import LEAST_DISTANCE
 from hybrid.simulation.transient import Transient
+from hybrid.view.summary import facts_of
 
 WIDTH, STIFF = 0.02, 0.1
 
@@ -147,7 +148,14 @@ def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
     kinds = {event.kind for event in result.events}
     assert "line meets itself" not in kinds and "line touches itself" in kinds
     assert float(result["self_distance/distance"]) > 0.85 * WIDTH
-    assert (result["energy/self_contact"] > 0.0).any()
+    touches = result["energy/self_contact"] > 0.0
+    assert touches.any()
+    force = result["self_contact"]  # N/m; of strands that are 0.94 to 1.02 D apart
+    assert (force.max(axis=1)[touches] > 0.0).all() and not force[~touches].any() and (force >= -1e-12).all()
+    assert np.nanmax(result["envelope/self_contact_max"]) >= force.max()
+    assert np.nanmin(result["envelope/self_contact_min"]) == 0.0
+    found = {fact.key: fact for fact in facts_of(result)}["itself"]
+    assert found.values["force"] == np.nanmax(result["envelope/self_contact_max"])
     apart = np.linalg.norm(result["position"] - free["position"], axis=2).max()
     assert apart > WIDTH
     put_in = sum(

@@ -1,0 +1,25 @@
+"""Means over the lengths that output points stand for, so that nothing between the points is missed."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+
+
+def means_beside(s: Floats, nodes: Floats, values: Floats) -> Floats:
+    """Means (ns, nb) of values (nb, N+1) at nodes (N+1,) m, from halfway to the point before to halfway to the next.
+
+    s: (ns,) m, increasing, two at least.  The means times those lengths add up to the integral.
+    """
+    middles = 0.5 * (s[1:] + s[:-1])
+    first, last = 2.0 * s[0] - middles[0], 2.0 * s[-1] - middles[-1]
+    edges = np.concatenate([[max(first, nodes[0])], middles, [min(last, nodes[-1])]])
+    h = np.diff(nodes)
+    total = np.zeros_like(values)
+    np.cumsum(0.5 * h * (values[:, 1:] + values[:, :-1]), axis=1, out=total[:, 1:])
+    cell = np.clip(np.searchsorted(nodes, edges, side="right") - 1, 0, h.size - 1)
+    x = edges - nodes[cell]
+    slope = (values[:, cell + 1] - values[:, cell]) / h[cell]
+    upto = total[:, cell] + values[:, cell] * x + 0.5 * slope * x * x
+    return np.asarray((np.diff(upto, axis=1) / np.diff(edges)).T)
