@@ -29,14 +29,14 @@ class DrivenEnd:
         path = self.path
         if begin < path[TO]:  # on its way
             path[AT:SPEED], path[SPEED:THERE], frame, _ = self.at(begin)
+            path[FRAME:TURN] = np.ravel(frame)
         else:
             path[AT:THERE] = path[THERE:FRAME]
-            frame = path[FRAME:TURN].reshape(3, 3)
-            if path[TURN:PATH].any():
-                frame = frame @ rotation(path[TURN:PATH])
+            if any(path[TURN:PATH].tolist()):
+                path[FRAME:TURN] = np.ravel(path[FRAME:TURN].reshape(3, 3) @ rotation(path[TURN:PATH]))
         path[FROM], path[TO] = begin, end
         path[THERE:SPEED_THERE], path[SPEED_THERE:FRAME] = position, velocity
-        path[FRAME:TURN], path[TURN:PATH] = np.ravel(frame), turn
+        path[TURN:PATH] = turn
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats, Floats]:
         """Position (3,) m, velocity (3,) m/s, frame (3, 3), angular velocity (3,) 1/s at t (s); inertial."""

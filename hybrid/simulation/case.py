@@ -369,4 +369,5 @@ class Case:
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:
-        self.progress(run.t, run.steps, run.iterations, run.model.zones, finished)
+        if self.progress.heard:
+            self.progress(run.t, run.steps, run.iterations, run.model.zones, finished)

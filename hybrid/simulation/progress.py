@@ -75,6 +75,7 @@ class ProgressReporter:
 
     def __init__(self, listener: Listener | None, duration: float) -> None:
         self._listener, self._duration = listener, duration
+        self.heard = listener is not None
         self._expected: list[tuple[str, float]] = []  # name and cost of passes to come
         self._result: Resolution | None = None  # whose cost is 1
         self._name, self._run, self._begun = RESULT, 0, 0  # the present pass, its number, and passes that have begun

@@ -39,8 +39,10 @@ def overloaded(run: CompiledRun) -> dict[int, str]:
 
 def due(model: Model, t: float, step: float) -> list[int]:
     """The held ends whose time to be let go has come at t (s)."""
-    ends = model.ends
-    return [k for k in (0, 1) if ends.values.held[k] and ends.release_times[k] <= t + SAME_TIME * step]
+    ends, latest = model.ends, t + SAME_TIME * step
+    if min(ends.release_times) > latest:
+        return []
+    return [k for k, at in enumerate(ends.release_times) if at <= latest and ends.values.held[k]]
 
 
 def elastic(model: Model, t: float, state: State) -> float:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from functools import wraps
+from math import isfinite
 from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
@@ -76,7 +77,7 @@ class Saved(NamedTuple):
 
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:
     value = numbers(x, name)
-    if value.shape != (3,) or not np.isfinite(value).all():
+    if value.shape != (3,) or not all(map(isfinite, value.tolist())):
         raise ValueError(f"{name}: expected three finite numbers, found {x!r:.60}")
     return value
 

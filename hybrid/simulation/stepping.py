@@ -41,6 +41,7 @@ SLIVER = 1e-6
 # Of the largest component: what is out of a plane by no more is in it.
 IN_PLANE = 1e-9
 STILL: Floats = np.zeros(3)
+NUMBER = (int, float, np.integer, np.floating)
 
 
 class Simulation:
@@ -108,10 +109,11 @@ class Simulation:
         time = self.scene.require_time()
         if time.controlled or time.step is None:
             raise ValueError("steps follow the motion: use advance(until), or give time.step")
-        taken, until = round(self.t / time.step), self.t + time.step
-        if abs(taken * time.step - self.t) < SLIVER * time.step:
-            until = (taken + 1) * time.step  # a multiple of the step, without round-off that adds up
-        return self.advance(until if time.duration - until > SLIVER * time.step else time.duration)
+        now, step, duration = self.t, time.step, time.duration
+        taken, until = round(now / step), now + step
+        if abs(taken * step - now) < SLIVER * step:
+            until = (taken + 1) * step  # a multiple of the step, without round-off that adds up
+        return self.advance(until if duration - until > SLIVER * step else duration)
 
     @one_thread
     def advance(self, until: float) -> float:
@@ -123,7 +125,7 @@ class Simulation:
         if self._failed:
             reason = self._failed.splitlines()[0]
             raise ValueError(f"a step has failed ({reason}): restore() what save() returned, or close()")
-        if isinstance(until, bool) or not isinstance(until, int | float | np.integer | np.floating):
+        if isinstance(until, bool) or not isinstance(until, NUMBER):
             raise ValueError(f"until: expected a number, in s, found {until!r:.60}")
         now, duration = self.t, self.scene.require_time().duration
         sliver = SLIVER * self._loop.run.resolution.step

@@ -47,7 +47,7 @@ FORCE_COLUMNS = [LOG.index(name) for name in ("t", "end_force_start", "end_force
 def apart(stops: Iterable[float], t: float, step: float) -> list[float]:
     """Stops after t in their order; of those that are the same but for round-off the last."""
     out: list[float] = []
-    for stop in sorted(x for x in stops if x > t + SAME_STOP * step):
+    for stop in sorted([x for x in stops if x > t + SAME_STOP * step]):
         if out and stop - out[-1] <= SAME_STOP * step:
             out.pop()
         out.append(stop)
@@ -142,16 +142,16 @@ class TimeLoop:
         run = self.run
         self._release_due()
         breaks = run.model.ends.breaks
-        stops = {end, *(t for t in (*breaks, *run.model.ends.release_times) if t < end)}
+        stops = [t for t in (*breaks, *run.model.ends.release_times) if t < end]
         if run.controlled:
-            stops |= {t for t in ramp_ends(run.scene) if t < end}
+            stops += [t for t in ramp_ends(run.scene) if t < end]
         if exact:
-            stops |= {float(t) for t in run.run.books.outputs if t < end}
-        for stop in apart(stops, run.t, run.resolution.step):
+            stops += [float(t) for t in run.run.books.outputs if t < end]
+        for stop in apart([*stops, end], run.t, run.resolution.step):
             self.go_to(stop)
             if exact:
                 run.begin_leg()
-            if any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
+            if breaks and any(abs(t - stop) <= SAME_STOP * run.resolution.step for t in breaks):
                 run.restart()
                 self._settle()
             self._release_due()

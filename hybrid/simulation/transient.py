@@ -106,7 +106,7 @@ class Transient:
     @property
     def t(self) -> float:
         """Time of the state, s."""
-        return self.run.t
+        return float(self.run.clock[b.NOW])
 
     @property
     def state(self) -> State:
