@@ -84,7 +84,7 @@ class _Entry(_Kernel):
 
     @cached_property
     def part(self) -> Any:
-        return _for_kernels(self.py_func)
+        return Inner(self.py_func).made
 
     def address(self, *args: Any) -> int:
         """Where the machine code for arguments of the types of these is, for kernels.references.caller."""
@@ -109,15 +109,53 @@ class _Cache(FunctionCache):
         A compilation brings them itself.
         """
         with self._guard_against_spurious_io_errors():
-            return self._load_overload(sig, target_context)
+            loaded = self._load_overload(sig, _Loading(target_context))
+            return loaded and loaded._replace(target_context=target_context)
 
 
-class _Inner(_Kernel):
+class _Loading:
+    """A target whose code generator makes libraries of machine code alone."""
+
+    def __init__(self, target: Any) -> None:
+        self._target, self.magic_tuple = target, target.codegen().magic_tuple
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._target, name)
+
+    def codegen(self) -> Any:
+        return self
+
+    def unserialize_library(self, saved: Any) -> Any:
+        name, _, (code, _) = saved
+        return _LoadedCode(self._target.codegen(), name, code)
+
+
+class Inner:
+    """A function that only kernels call.  numba hears of it when a kernel that calls it is compiled: making hundreds of
+    its dispatchers takes as long as all kernels take to load."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        self.py_func, self._options = function, options
+        self.__module__, self.__name__, self.__doc__ = function.__module__, function.__name__, function.__doc__
+
+    @cached_property
+    def made(self) -> Any:
+        """numba's own of it."""
+        options = _OPTIONS | self._options
+        made = _njit(no_cpython_wrapper=True, pipeline_class=_InnerCompiler, **options)(self.py_func)
+        made.__class__ = _Kernel
+        return made
+
     def __call__(self, *args: Any, **named: Any) -> Any:
         """There is no entry for Python: numba would jump to address 0."""
         raise TypeError(
             f"{self.py_func.__qualname__} is compiled for kernels only; a @kernel can be called from Python"
         )
+
+
+@numba.extending.typeof_impl.register(Inner)
+def _type_of_inner(value: Inner, _: Any) -> Any:
+    return numba.types.Dispatcher(value.made)
 
 
 class _NoEnvironment:
@@ -154,6 +192,26 @@ class _EntryCode(JITCodeLibrary):
         _link(self, self._final_module)
         self._linking_libraries = []
         super().finalize()
+
+    def serialize_using_object_code(self) -> Any:
+        """Machine code alone: nothing is ever linked with an entry."""
+        self._ensure_finalized()
+        return self.name, "object", (self._get_compiled_object(), b"")
+
+
+class _LoadedCode(JITCodeLibrary):
+    """Machine code of an entry, from disk: numba would read its LLVM code as well, for the names in it."""
+
+    def __init__(self, codegen: Any, name: str, code: bytes) -> None:
+        super().__init__(codegen, name)
+        self.enable_object_caching()
+        self._set_compiled_object(code)
+        self._finalize_final_module()
+
+    def get_pointer_to_function(self, name: str) -> int:
+        """The address of the entry, or of its wrapper for Python; numba asks for no others."""
+        found: int = self._codegen._engine.get_function_address(name)
+        return found
 
 
 def _link(code: Any, module: Any) -> None:
@@ -217,10 +275,4 @@ def inner(function: Callable[..., Any]) -> Any:
 
     Without an entry for Python it takes two thirds of the time.
     """
-    return _for_kernels(function, forceinline=True)
-
-
-def _for_kernels(function: Callable[..., Any], **options: Any) -> Any:
-    made = _njit(no_cpython_wrapper=True, pipeline_class=_InnerCompiler, **_OPTIONS, **options)(function)
-    made.__class__ = _Inner
-    return made
+    return Inner(function, forceinline=True)
