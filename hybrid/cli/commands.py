@@ -6,7 +6,6 @@ Results and JSON go to the output stream; the progress line, notes and errors to
 
 from __future__ import annotations
 
-import gc
 import json
 import shlex
 import sys
@@ -61,11 +60,6 @@ if TYPE_CHECKING:
     from hybrid.cli.console import Console
     from hybrid.scene.schema import Scene
     from hybrid.store.reader import Result
-
-
-# Objects made between two searches for garbage.  What is imported stays: with Python's own 700 a command of 1.2 s
-# spends 0.1 s on looking through it.
-GARBAGE_AFTER = 200_000
 
 
 @app.command()
@@ -294,7 +288,6 @@ def _ended(
 def main(arguments: list[str] | None = None) -> None:
     """Run a command and leave with its exit code."""
     arguments = sys.argv[1:] if arguments is None else arguments
-    gc.set_threshold(GARBAGE_AFTER)
     guard_output()
     try:
         code = typer.main.get_command(app).main(arguments, prog_name="hybrid", standalone_mode=False, obj=arguments)

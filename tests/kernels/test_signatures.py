@@ -20,6 +20,7 @@ from hybrid.kernels.compile import inner
 SCRIPT = """
 import importlib, json, pkgutil
 import hybrid, hybrid.kernels
+from hybrid.kernels.compile import Inner
 from numba.core.dispatcher import Dispatcher
 
 cable = {"length": 20.0, "diameter": 0.05, "mass": 4.0, "axial_stiffness": 1e7, "bending_stiffness": 50.0,
@@ -50,6 +51,7 @@ found = {}
 rooms = [f"hybrid.kernels.{x.name}" for x in pkgutil.iter_modules(hybrid.kernels.__path__)] + ["hybrid.adapt.zone_rules"]
 for room in rooms:
     for name, f in vars(importlib.import_module(room)).items():
+        f = f.made if isinstance(f, Inner) else f
         if isinstance(f, Dispatcher) and f.__module__ == room:
             found[f"{room}.{name}"] = [str(x) for x in f.signatures]
 print(json.dumps(found))
