@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 from hybrid.errors import OMITTED, ZONE_EVENTS
 
+ANCHORED = 1.0  # m
+
 if TYPE_CHECKING:
     from hybrid.interop.moordyn import ImportedDeck
     from hybrid.store.reader import Result
@@ -88,7 +90,18 @@ def _on_the_seabed(result: Result) -> dict[str, Any]:
         return {}
     edges = [float(x) if x == x else None for x in result["touchdown"][-1]]
     grounded, force = float(result.grounded_length[-1]), float(result.contact_force[-1])
-    return {"touchdown": edges, "grounded_length": grounded, "contact_force": force}
+    found = {"touchdown": edges, "grounded_length": grounded, "contact_force": force}
+    lifts = {end: [float(x[-1]) for x in result.uplift(end)] for end in ("start", "end") if _is_anchor(result, end)}
+    return found | ({"uplift": {k: {"force": f, "angle": a} for k, (f, a) in lifts.items()}} if lifts else {})
+
+
+def _is_anchor(result: Result, end: str) -> bool:
+    """Whether an end is held on the seabed, at most ANCHORED above it."""
+    if f"reaction_{end}" not in result or not result[f"reaction_{end}"][-1].any():
+        return False
+    *normal, offset = result["seabed"].tolist()
+    place = result.position[-1, 0 if end == "start" else -1]
+    return float(place @ normal) - offset <= ANCHORED
 
 
 def equilibrium_table(facts: dict[str, Any]) -> Any:
@@ -112,6 +125,8 @@ def equilibrium_table(facts: dict[str, Any]) -> Any:
         table.add_row("contact force", f"{facts['contact_force']:.5g} N")
     elif "grounded_length" in facts:
         table.add_row("on the seabed", "nothing")
+    for end, lift in facts.get("uplift", {}).items():
+        table.add_row(f"uplift at {end}", f"{lift['force']:.5g} N, {lift['angle']:.3g} deg from the seabed")
     if len(facts["zones"]) > 1:
         table.add_row("zones", "\n".join(f"{z['kind']} {z['s_a']:.5g} to {z['s_b']:.5g} m" for z in facts["zones"]))
     table.add_row("lowest point", f"{vector(facts['lowest']['position'])} m at s = {facts['lowest']['s']:.5g} m")

@@ -194,12 +194,39 @@ def first_strains(line, ends, state, books):
         sharpest_in_space(line, ends, state.e, state.T, state.a1, books.strains)
 
 
+@inner
+def node_pressure(sea, normal, state, i):
+    """Pressure of the bed at a node, N/m."""
+    p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
+    return pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)[0]
+
+
+@kernel
+def note_contact(line, sea, state, books, t):
+    """Force per length that the nodes bear, each over its half cells, as outputs have it."""
+    n = line.h.shape[0]
+    normal = get3(sea.normal.reshape(1, 3), 0)
+    here = node_pressure(sea, normal, state, 0)
+    force = length = 0.0  # of the half cell before the node
+    for i in range(n + 1):
+        after = 0.0
+        if i < n:
+            after = node_pressure(sea, normal, state, i + 1)
+            force += line.h[i] * (2.0 * here + after) / 6.0
+            length += 0.5 * line.h[i]
+        widen_both(books.extremes, books.right, PRESSURE, i, force / length, t)
+        if i < n:
+            force, length = line.h[i] * (here + 2.0 * after) / 6.0, 0.5 * line.h[i]
+        here = after
+
+
 @kernel  # once, for lines in a plane and in space, and for both places it is called from: 3 s less of compilation
 def note_extremes(line, sea, ends, state, books, t):
     """Widen the extremes to the state at time t; books.strains: of its elements, books.report: of the state."""
     n = line.h.shape[0]
-    normal = get3(sea.normal.reshape(1, 3), 0)
     note_tension(line, ends, state, books, t)
+    if line.bits & SEABED:
+        note_contact(line, sea, state, books, t)
     zone, zones = 0, line.torsion.shape[0]
     for i in range(n + 1):
         passed = 0.0
@@ -215,10 +242,6 @@ def note_extremes(line, sea, ends, state, books, t):
             else:
                 widen_both(books.extremes, books.right, MOMENT, i, 0.0, t)
                 widen_both(books.extremes, books.right, TORQUE, i, passed, t)
-        if line.bits & SEABED:
-            p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
-            q, _, _ = pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)
-            widen_both(books.extremes, books.right, PRESSURE, i, q, t)
         if books.touch.shape[1] > 0:
             widen_both(books.extremes, books.right, SELF_PRESSURE, i, books.touch[0, i], t)
         x = sub(get3(state.r, i), get3(books.start, i))

@@ -22,7 +22,7 @@ from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.touchdown import Touchdown, along, contact_pressure, penetration, touchdown
+from hybrid.outputs.touchdown import Touchdown, along, carried, contact_pressure, penetration, touchdown
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -363,8 +363,8 @@ class Observation:
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
-        p = self.grid.chords @ self._depth
-        return contact_pressure(self.sea, p, self.grid.chords @ -along(self.sea.normal, self._plain.v))
+        q = contact_pressure(self.sea, self._depth, -along(self.sea.normal, self._plain.v))
+        return np.asarray(self.grid.chords @ carried(self.batch.h.T if self.batch.h.size else self.line.h, q))
 
     @property
     def self_contact(self) -> Floats:

@@ -62,6 +62,22 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
     return Touchdown(np.where(lies, edges, np.nan), np.where(lies, places, np.nan), grounded)
 
 
+def carried(h: Floats, q: Floats) -> Floats:
+    """Force per length N/m that the nodes bear of a pressure q (N+1, nb) N/m: of each node over its half cells.
+
+    It is what stands in the balance of the nodes, so that it has the weight of what lies still; q itself swings about
+    that by up to a quarter beside an anchor and at the touchdown, where cells are longer than sqrt(T/k), over which the
+    bed takes up the line.  h: (N,) or (N, nb) m, lengths of the cells.
+    """
+    h = h.reshape(len(h), -1)
+    force, length = np.zeros_like(q), np.zeros((len(q), h.shape[1]))
+    force[:-1] += h * (2.0 * q[:-1] + q[1:]) / 6.0
+    force[1:] += h * (q[:-1] + 2.0 * q[1:]) / 6.0
+    length[:-1] += 0.5 * h
+    length[1:] += 0.5 * h
+    return np.asarray(force / length)
+
+
 def contact_pressure(sea: Sea, p: Floats, v: Floats) -> Floats:
     """Force per length N/m of the seabed along its normal, at points of penetration p (m) with the rate v (m/s)."""
     o = sea.onset

@@ -264,6 +264,15 @@ class Result:
             return {name: found["left"], right: found["right"]}
         return {name: found[side or "left"]}
 
+    def uplift(self, end: str) -> tuple[np.ndarray, np.ndarray]:
+        """Force (nt,) N with which the line lifts what holds its `start` or `end` off the seabed, along the normal of
+        the bed, and the angle (nt,) deg of the pull to the bed; both 0 where the line lies on the bed there.
+        """
+        pull, normal = -self[f"reaction_{end}"], self["seabed"][:3]
+        up = np.maximum(pull @ normal, 0.0)
+        along = np.linalg.norm(pull - (pull @ normal)[:, None] * normal, axis=1)
+        return up, np.degrees(np.arctan2(up, along))
+
     def both_sides(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Arc lengths (n,), m, and a field (nt, n, ...) there; a place where it jumps comes twice, left value first."""
         s, values, right = self["s"].copy(), self[name], right_of(self._known(name))

@@ -47,13 +47,16 @@ def touchdown(line: Line, sea: Sea, state: State) -> Touchdown:
 
 
 def contact_pressure(line: Line, sea: Sea, state: State, s: Floats) -> Floats:
-    """Force per length (ns,) N/m of the seabed along its normal, at the points s of the chords."""
-    p = np.interp(s, line.s, penetration(sea, state.r))
-    v = np.interp(s, line.s, -state.v @ sea.normal)
+    """Force per length (ns,) N/m of the seabed along its normal: that of the nodes over their half cells, at s."""
+    p, v = penetration(sea, state.r), -state.v @ sea.normal
     o = sea.onset
     linear = sea.stiffness * (p - 0.5 * o) + sea.damping * v
     onset = 0.5 * sea.stiffness * p * p / o + sea.damping * v * p / o
-    return np.where(p <= 0.0, 0.0, np.maximum(np.where(p < o, onset, linear), 0.0))
+    q = np.where(p <= 0.0, 0.0, np.maximum(np.where(p < o, onset, linear), 0.0))
+    mass, h = np.zeros((len(q), len(q))), line.h
+    for j in range(len(h)):
+        mass[j : j + 2, j : j + 2] += h[j] / 6.0 * np.array([[2.0, 1.0], [1.0, 2.0]])
+    return np.interp(s, line.s, mass @ q / mass.sum(axis=1))
 
 
 class Plain:
