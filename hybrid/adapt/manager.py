@@ -21,7 +21,7 @@ from hybrid.kernels.binding import Packed, Table
 from hybrid.kernels.criteria import CRITERIA, GIVEN, SLACK, TORSION
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State
 from hybrid.kernels.stiffness_ramp import shares
-from hybrid.kernels.zone_step import REJECT_RATIO, blank_zone_job, blank_zones, evaluate_criteria
+from hybrid.kernels.zone_step import REJECT_RATIO, Zones, blank_zone_job, blank_zones, evaluate_criteria
 from hybrid.model.layout import Layout, edges
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, tension_floor
@@ -66,6 +66,7 @@ class Change(NamedTuple):
     reasons: tuple[Reason, ...]
     urgent: np.ndarray
     stiff: np.ndarray  # rods that get their full stiffness at once
+    same: bool = False  # whether cells change and nothing else
 
 
 def _number(k: int, text: str) -> Any:
@@ -190,12 +191,9 @@ class DomainManager:
 
     def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
-        self.layout = layout
         kinds = self._on_base.kinds(layout, self.free, self.scale)
-        self.s, self.EI, self.w, self.floor = layout.nodes, kinds.EI, kinds.w, kinds.floor
-        self.base_of_cell = layout.base_of_cell
         kept = {name: getattr(self.zones, name) for name in OF_BASE}
-        self.zones = all_zones(layout.base_of_cell.size, kinds=kinds, **kept)
+        self.take(layout, all_zones(layout.base_of_cell.size, kinds=kinds, **kept))
         self.zones.rod[:], self.zones.since[:] = layout.rod, -np.inf
         self.zones.place[:] = layout.places
         self.zones.here[:] = False
@@ -203,22 +201,33 @@ class DomainManager:
         clock, flags = self.zones.clock, self.zones.counts
         clock[z.AGE] = clock[z.RECENT_AGE] = 0.0
         flags[[z.KNOWN, z.RELAXING, z.STRAINED]], flags[z.ALL_ROD] = 0, layout.rod.all()
+
+    def take(self, layout: Layout, zones: Zones) -> None:
+        """Go on with other cells of the same base, of which `zones` knows all."""
+        kinds = zones.kinds
+        self.layout, self.zones = layout, zones
+        self.EI, self.w, self.floor, self.base_of_cell = kinds.EI, kinds.w, kinds.floor, kinds.base_of_cell
         self._update_ramping()
 
     def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
-        """Take over the layout of a change, at t: what is new begins to be blended in, faster where it is urgent.
+        """Take over the layout of a change, at t."""
+        self.adopt_rods(new.rod, change, t)
+        self.set_layout(new)
+
+    def adopt_rods(self, rod: np.ndarray, change: Change, t: float) -> None:
+        """Base cells (n,) that are rod from t on: what is new begins to be blended in, faster where it is urgent.
 
         What comes back soon after it was let go must be calm much longer from then on, and else half as long.
         """
-        fresh, gone, urgent = new.rod & ~self.layout.rod, self.layout.rod & ~new.rod, change.urgent
+        fresh, gone, urgent = rod & ~self.layout.rod, self.layout.rod & ~rod, change.urgent
         soon = t - self.released < RETURN_WINDOW * self.dwell * self.patience
         self.patience[fresh] = np.where(soon, LONGEST_WAIT, np.maximum(0.5 * self.patience, 1.0))[fresh]
         self.released[gone] = t
         self.grown[change.stiff], self.leaving[change.stiff] = 1.0, False
         self.grown[fresh], self.leaving[fresh], self.calm_since[fresh] = 0.0, False, np.inf
         self.zones.haste[fresh] = np.where(urgent[fresh], FAST_RAMP, 1.0)
-        self.grown[~new.rod], self.leaving[~new.rod] = 1.0, False
-        self.set_layout(new)
+        self.grown[~rod], self.leaving[~rod] = 1.0, False
+        self.zones.rod[:], self.zones.counts[z.ALL_ROD] = rod, rod.all()
 
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
@@ -270,7 +279,7 @@ class DomainManager:
     def ask_user(self, line: Line, state: State, t: float) -> None:
         """Raise the ratios to those of the user's criterion."""
         assert self.user is not None
-        nodes = NodeState(t, self.s, state.r, state.v, state.T, self.zones.kinds.turn / line.hn, self.EI)
+        nodes = NodeState(t, self.layout.nodes, state.r, state.v, state.T, self.zones.kinds.turn / line.hn, self.EI)
         cells = cell_ratios(self.user, nodes)
         np.maximum.at(self.ratios[GIVEN], self.base_of_cell, cells)
         quiet = self.layout.rod | (self.given < 0)
@@ -298,7 +307,7 @@ class DomainManager:
     def same_zones(self) -> Change:
         """A change of cells alone."""
         none = np.zeros_like(self.layout.rod)
-        return Change(self.layout.rod, (), none, none)
+        return Change(self.layout.rod, (), none, none, same=True)
 
     def review(self, t: float, state: State) -> Change | None:
         """The change that follows from the ratios since the last review; None: no change."""

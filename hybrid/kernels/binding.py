@@ -50,6 +50,11 @@ class Table:
                 _keep(value, self.numbers[at:end].copy())
             self._bound[name] = value
 
+    def part(self, name: str) -> slice:
+        """Where the numbers of a value are."""
+        begin, end, _ = self._places[name]
+        return slice(begin, end)
+
     def exchange(self, a: str, b: str) -> None:
         """Put what is bound under each of two names of one type under the other."""
         (i, j, _), (k, l, _) = self._places[a], self._places[b]
@@ -99,7 +104,7 @@ class _OfThread(threading.local):
         self.known: dict[int, tuple[Any, NDArray[np.int64]]] = {}
 
 
-_here, MOST_KNOWN = _OfThread(), 24
+_here, MOST_KNOWN = _OfThread(), 64
 
 
 def _known(value: Any) -> NDArray[np.int64] | None:
@@ -199,6 +204,46 @@ class Packed:
             numbers += [offset, *shape]
             offset += -(-math.prod(shape) * dtype.itemsize // 8) * 8
         return max(offset, 8) // 8, places, np.array(numbers, np.int64), np.array(addresses)
+
+
+class Room:
+    """Memory for one of the NamedTuples that a `Packed` makes, for a line of at most so many cells."""
+
+    def __init__(self, packed: Packed, most: int) -> None:
+        size, places, *_ = packed._plan(most)
+        self._make, self._block = packed._make, np.zeros(size)
+        at: int = self._block.__array_interface__["data"][0]
+        fixed: list[int] = []
+        slopes: list[int] = []
+        self._given: list[tuple[str, Any, int]] = []  # name, pattern, where its numbers begin
+        self._last: dict[str, Any] = {}  # given, of which `_fixed` has the numbers
+        self._fields: list[Any] = []  # name; type, offset, and what is fixed and what grows of shapes
+        for (name, dtype, dims, n), (*_, offset) in zip(packed._fields, places, strict=True):
+            self._fields.append((name, dtype, offset, dims))
+            if dtype is None:
+                self._given.append((name, dims, len(fixed)))
+                fixed, slopes = fixed + [0] * n, slopes + [0] * n
+            else:
+                fixed, slopes = [*fixed, at + offset, *(a for a, _ in dims)], [*slopes, 0, *(k for _, k in dims)]
+        self._fixed, self._slopes = np.array(fixed, np.int64), np.array(slopes, np.int64)
+
+    def view(self, cells: int, **given: Any) -> Any:
+        """One for so many cells, in this memory: whatever was there before is overwritten by what is put there."""
+        block, values = self._block, []
+        for name, dtype, offset, dims in self._fields:
+            if dtype is None:
+                values.append(given[name])
+            else:
+                values.append(np.ndarray([a + k * cells for a, k in dims], dtype, block, offset))
+        value, numbers = self._make(values), self._fixed + cells * self._slopes
+        for name, pattern, at in self._given:
+            value_given = given[name]
+            if self._last.get(name, self) is not value_given:
+                found = _numbers(value_given, pattern, name)
+                self._fixed[at : at + len(found)] = numbers[at : at + len(found)] = found
+                self._last[name] = value_given
+        _keep(value, numbers)
+        return value
 
 
 def _bits(value: float) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from hybrid.kernels.compile import kernel
+from hybrid.kernels.compile import inner, kernel
 
 
 @kernel
@@ -40,3 +40,79 @@ def is_definite(band):
             for m in range(k, last + 1):
                 band[m - k, j + k] -= band[m, j] * band[k, j]
     return True
+
+
+@inner
+def bracket(x, at, first, last):
+    """The two of x[first] .. x[last] that interpolation at a place uses, and the weight of the second."""
+    low, high = 0, x.shape[0]
+    while low < high:
+        middle = (low + high) // 2
+        if x[middle] < at:
+            low = middle + 1
+        else:
+            high = middle
+    left = max(min(low - 1, last - 1), first)
+    right = min(left + 1, last)
+    return left, right, (at - x[left]) / (x[right] - x[left]) if left < right else 0.0
+
+
+@inner
+def put_row(count, columns, weights, at, out_columns, out_weights):
+    """The first `count` weights of a row behind `at`, by column: those at the same one add up, and zeros go; the end."""
+    for i in range(1, count):
+        c, w, k = columns[i], weights[i], i
+        while k > 0 and columns[k - 1] > c:
+            columns[k], weights[k] = columns[k - 1], weights[k - 1]
+            k -= 1
+        columns[k], weights[k] = c, w
+    for i in range(count):
+        if i + 1 < count and columns[i + 1] == columns[i]:
+            weights[i + 1] += weights[i]
+        elif weights[i] != 0.0:
+            out_columns[at], out_weights[at] = columns[i], weights[i]
+            at += 1
+    return at
+
+
+@kernel
+def linear_rows(x, places, first, last, shift, work_columns, work_weights, begin, columns, weights):
+    """Rows (outputs.output_grid.Rows) of linear interpolation along x[first] .. x[last], and beyond, at places (ns,).
+
+    shift: (ns,) added to columns; work_columns, work_weights: (10,); begin: (ns+1,) and columns, weights (2 ns,) written.
+    """
+    at = 0
+    for g in range(places.shape[0]):
+        begin[g] = at
+        left, right, p = bracket(x, places[g], first[g], last[g])
+        work_columns[0], work_columns[1] = left + shift[g], right + shift[g]
+        work_weights[0], work_weights[1] = 1.0 - p, p
+        at = put_row(2, work_columns, work_weights, at, columns, weights)
+    begin[places.shape[0]] = at
+
+
+@kernel
+def cubic_rows(x, middles, places, first, last, work_columns, work_weights, begin, columns, weights):
+    """Rows of the Hermite interpolation along the nodes x[first] .. x[last], with the slopes of parabolas there.
+
+    middles: of the cells; columns, weights: (10 ns,); the rest as of linear_rows.
+    """
+    at = 0
+    for g in range(places.shape[0]):
+        begin[g] = at
+        left, right, p = bracket(x, places[g], first[g], last[g])
+        H, q = x[right] - x[left], 1.0 - p
+        work_columns[0], work_columns[1] = left, right
+        work_weights[0], work_weights[1] = q * q * (3.0 - 2.0 * q), p * p * (3.0 - 2.0 * p)
+        k = 2
+        for side in range(2):
+            node, part = (right, -(H * q * p * p)) if side else (left, H * q * p * q)
+            a, b, share = bracket(middles, x[node], first[g], last[g] - 1)
+            for end in range(2):
+                cell, w = (b, share) if end else (a, 1.0 - share)
+                w *= part / (x[cell + 1] - x[cell])
+                work_columns[k], work_weights[k] = cell, -w
+                work_columns[k + 1], work_weights[k + 1] = cell + 1, w
+                k += 2
+        at = put_row(10, work_columns, work_weights, at, columns, weights)
+    begin[places.shape[0]] = at

@@ -40,6 +40,11 @@ class LineOnBase:
         self._bits, self._of = -1, of
         self._holds_twist = bool(held.all())
 
+    @property
+    def cable(self) -> Cable:
+        """What lines are made of; its points are those of the forces that the last line had."""
+        return self._cable
+
     def line(self, layout: Layout, bits: int, plane: Floats = NO_PLANE) -> Line:
         """The line on a layout; bits: all forces that are on."""
         if bits != self._bits:

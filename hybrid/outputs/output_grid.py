@@ -6,15 +6,15 @@ Zone by zone: a joint, or a point load, may be a kink, and nothing is drawn acro
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from itertools import pairwise
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.kernels.sparse_rows import add_rows
+from hybrid.kernels.sparse_rows import add_rows, cubic_rows, linear_rows
 from hybrid.kernels.state import Floats
 from hybrid.model.mesh import Zone
 
@@ -34,47 +34,21 @@ class Rows(NamedTuple):
         return out.reshape(-1, *x.shape[1:])
 
 
-def _sparse(columns: np.ndarray, weights: Floats) -> Rows:
-    """One row per output point: its weights (ns, k) at their columns; those at the same column add up, and zeros go."""
-    order = np.argsort(columns, axis=1, kind="stable")
-    columns, weights = np.take_along_axis(columns, order, 1), np.take_along_axis(weights, order, 1)
-    for k in range(1, columns.shape[1]):
-        same = columns[:, k] == columns[:, k - 1]
-        weights[same, k] += weights[same, k - 1]
-        weights[same, k - 1] = 0.0
-    kept = weights != 0.0
-    return Rows(np.append(0, np.cumsum(kept.sum(axis=1))), columns[kept].astype(np.int64), weights[kept])
+def _rows(count: int, most: int, make: Callable[..., None], *given: Any) -> Rows:
+    """Rows for so many points with at most `most` weights each, from a kernel."""
+    begin, columns, weights = np.zeros(count + 1, np.int64), np.zeros(most * count, np.int64), np.zeros(most * count)
+    given = tuple(np.require(x, None, ("C", "W")) for x in given)  # one signature
+    make(*given, np.zeros(10, np.int64), np.zeros(10), begin, columns, weights)
+    return Rows(begin, columns[: begin[-1]], weights[: begin[-1]])
 
 
-def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
-    """Interpolation along x[first] .. x[last], and beyond: the two that count, (..., 2), and their weights at `at`.
+def _linear(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray, shift: np.ndarray | None = None) -> Rows:
+    """Interpolation along x[first] .. x[last], and beyond; where first = last, that one counts alone.
 
-    Where first = last, that one counts alone.
+    shift: (ns,) added to the columns of points.
     """
-    left = np.maximum(np.minimum(np.searchsorted(x, at) - 1, last - 1), first)
-    right = np.minimum(left + 1, last)
-    p = np.divide(at - x[left], x[right] - x[left], out=np.zeros(at.shape), where=left < right)
-    return np.stack([left, right], axis=-1), np.stack([1 - p, p], axis=-1)
-
-
-def _slopes(x: Floats, node: np.ndarray, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
-    """Weights (..., 4) of the derivative at a node from the parabola through the three nearest nodes of first .. last.
-
-    It is linear, and in the middle of a cell it is the slope of the secant; of one cell alone there is no other.
-    """
-    cell, share = _linear(0.5 * (x[:-1] + x[1:]), x[node], first, last - 1)
-    w = share / (x[cell + 1] - x[cell])
-    return np.concatenate([cell, cell + 1], axis=-1), np.concatenate([-w, w], axis=-1)
-
-
-def _cubic(x: Floats, at: Floats, first: np.ndarray, last: np.ndarray) -> tuple[np.ndarray, Floats]:
-    """Weights (ns, 10) of the Hermite interpolation along the nodes x[first] .. x[last]."""
-    node, p = _linear(x, at, first, last)
-    H = np.diff(x[node])
-    of_slope = H * p[:, :1] * p[:, 1:] * p * [1.0, -1.0]
-    near, slope = _slopes(x, node, first[:, None], last[:, None])
-    columns = np.hstack([node, near.reshape(-1, 8)])
-    return columns, np.hstack([p * p * (3 - 2 * p), (of_slope[:, :, None] * slope).reshape(-1, 8)])
+    shift = np.zeros(at.size, np.int64) if shift is None else shift
+    return _rows(at.size, 2, linear_rows, x, at, first, last, shift)
 
 
 def stretches(zones: Sequence[Zone], loads: Sequence[float] = ()) -> tuple[Zone, ...]:
@@ -135,16 +109,18 @@ class Grid:
 
     @cached_property
     def nodes(self) -> Rows:
-        return _sparse(*_cubic(self._x, self.s, self._first, self._last))
+        """Hermite, with slopes of parabolas through the three nearest nodes; of one cell alone there is no other."""
+        given = (self._x, self._middles, self.s, self._first, self._last)
+        return _rows(self.s.size, 10, cubic_rows, *given)
 
     @cached_property
     def cells(self) -> Rows:
-        return _sparse(*_linear(self._middles, self.s, self._first, self._last - 1))
+        return _linear(self._middles, self.s, self._first, self._last - 1)
 
     @cached_property
     def chords(self) -> Rows:
         n, first = self._x.size, np.zeros_like(self._first)
-        return _sparse(*_linear(self._x, self.s, first, np.full_like(first, n - 1)))
+        return _linear(self._x, self.s, first, np.full_like(first, n - 1))
 
     @cached_property
     def held(self) -> Rows:
@@ -152,9 +128,8 @@ class Grid:
         x, middles = self._x, self._middles
         start = np.where(self.s < middles[0], 0, self._first + 1)
         end = np.where(self.s > middles[-1], x.size, self._last)
-        return _sparse(*_linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end))
+        return _linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end)
 
     @cached_property
     def sides(self) -> Rows:
-        node, share = _linear(self._x, self.s, self._first, self._last)
-        return _sparse(node + self._stretch[:, None], share)
+        return _linear(self._x, self.s, self._first, self._last, self._stretch)

@@ -84,9 +84,9 @@ class Envelope:
         marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
-        self._start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
+        self.start: Floats = np.zeros((nodes.size, 3))  # m, from where displacements count
         self.begin = 0.0  # s
-        self._bounds = no_extremes(self.s.size)  # of meshes before that of now
+        self.bounds = no_extremes(self.s.size)  # of meshes before that of now
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
         has |= {"self_contact"} if moves and model.line.bits & SELF_CONTACT else set()
@@ -104,20 +104,20 @@ class Envelope:
 
     def count_from(self, model: Model, r: Floats) -> None:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
-        self._start = Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r
+        self.start[:] = Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r
 
     def start_of(self, nodes: Floats) -> Floats:
         """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""
-        return self._start[np.searchsorted(self._nodes, nodes)]
+        return self.start[np.searchsorted(self._nodes, nodes)]
 
     def fold(self, nodes: Floats, extremes: Floats) -> None:
         """Take in the extremes (4, EXTREMES, N+1+K) of a mesh that ends; of no rows, before the first mesh."""
         if extremes.shape[1]:
-            self._bounds = self._with(nodes, extremes)
+            self.bounds[:] = self._with(nodes, extremes)
 
     def _with(self, nodes: Floats, extremes: Floats) -> Floats:
         """All extremes (4, EXTREMES, n), with those (4, EXTREMES, N+1+K) of the mesh of now."""
-        out, places = self._bounds.copy(), _doubled(nodes, self._marked)
+        out, places = self.bounds.copy(), _doubled(nodes, self._marked)
         columns = np.arange(places.size) - np.cumsum(second := np.append(False, places[1:] == places[:-1]))
         columns[second] = nodes.size + np.arange(self._marked.size)
         if places.size < self.s.size:
@@ -140,8 +140,8 @@ class Envelope:
         """What was kept; now: extremes on the mesh of now."""
         return {
             "begin": self.begin,
-            "start": self._start,
-            "bounds": self._bounds,
+            "start": self.start,
+            "bounds": self.bounds.copy(),
             "now": now.copy(),
             "itself": self.itself.itself.found.copy(),
         }
@@ -150,7 +150,7 @@ class Envelope:
         """Go on as `checkpoint` has written, into `now`.  ValueError: it is that of another line."""
         mine = self.checkpoint(now)
         found = matched({"itself": mine["itself"]} | dict(saved), mine, "state/envelope")  # files of before have none
-        self.begin, self._start, self._bounds = found["begin"], found["start"], found["bounds"]
+        self.begin, self.start[:], self.bounds[:] = found["begin"], found["start"], found["bounds"]
         now[:], self.itself.itself.found[:] = found["now"], found["itself"]
 
     # --- for the file -------------------------------------------------------------------------------

@@ -64,6 +64,11 @@ class PlaneMonitor:
             push = on_nodes(run.push, self._s, line.s) if self._s.size else seed(line.s, self.speed)
             self._give(run, push, line.s)
 
+    def take(self, line: Line) -> None:
+        """Go on with other cells, to which the run has carried the push."""
+        if self.speed:
+            self._s = line.s
+
     def _give(self, run: CompiledRun, push: Floats, s: Floats) -> None:
         started = float(run.clock[PUSH_START]) if self._s.size else 0.0
         run.carry((push, np.zeros_like(push)))

@@ -89,6 +89,11 @@ class SelfWatch:
         self._address = UNBENT
         self._touches = False  # whether contact is computed
 
+    @property
+    def watching(self) -> bool:
+        """Whether every step looks how near the line comes to itself."""
+        return self._address != UNBENT
+
     def attach(self, model: Model, run: CompiledRun) -> None:
         """Go on with a (new) line of a run."""
         if not self.on:

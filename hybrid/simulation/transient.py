@@ -16,7 +16,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY
-from hybrid.kernels.state import State, blank_state
+from hybrid.kernels.state import State, Work, blank_state
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model
 from hybrid.model.plan import parts
@@ -25,6 +25,7 @@ from hybrid.model.scales import wave_step
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
+from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
@@ -72,13 +73,14 @@ class Transient:
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
-        self._marked = marked_places(scene, model)
+        self.marked = marked_places(scene, model)
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
         self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
+        self._cells: CellChanges | None = None  # of cells that change without Python
         self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
         self._leaves, self._rescues = False, (0, 0)  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
@@ -232,7 +234,7 @@ class Transient:
             clock[b.LEG_STEP] = step if abs(n * step - whole) <= WHOLE_STEPS * step else whole / n
         while True:
             self._choose_asks()
-            code = run.go()
+            code = self._go()
             if code == b.TRYING:
                 assert self.switching is not None
                 self.switching.prepare_step(float(clock[b.TRY_END]) - self.t, self.state)
@@ -256,6 +258,27 @@ class Transient:
                 yield code
                 if code == b.AT_STOP:
                     return
+
+    def _go(self) -> int:
+        """Let the compiled run go on, through changes of cells that need nothing else; a code of kernels.books."""
+        cells = self._changes_of_cells()
+        code = self.run.go()
+        if cells is not None:
+            while code == b.STEPPED and cells.alone():
+                cells.change()
+                code = self.run.go()
+            cells.sync()
+        return code
+
+    def _changes_of_cells(self) -> CellChanges | None:
+        """What changes cells, with the line of now; None: cells do not follow the curvature, or Python is asked."""
+        if not CellChanges.applies(self):
+            return None
+        if self._cells is None or not self._cells.still_fits():
+            self._cells = CellChanges(self)
+        if not self._cells.adopted:
+            self._cells.adopt()
+        return self._cells
 
     def begin_leg(self) -> None:
         """Count fixed steps from here."""
@@ -340,6 +363,8 @@ class Transient:
         """The line has become so bent that it could come near itself, or it meets itself: an event."""
         assert self.envelope is not None
         watch = self.envelope.itself
+        if self._cells is not None and not watch.watching:
+            watch.attach(self.model, self.run)  # the line has had other cells since it was attached
         if flags & b.MEETS_ITSELF or watch.look(self.run):
             watch.tell(self.t, float(self.run.clock[b.LAST_DT]), self.events.event)
 
@@ -377,10 +402,18 @@ class Transient:
     def _switch(self, change: Change) -> None:
         """Zones change: nothing moves, and what changes energy is booked."""
         assert self.switching is not None
-        run, trying = self.run, self.run.count[b.PHASE] == b.JUDGE
-        ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
-        model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
-        run.books.work[0, b.ZONES] += booked
+        run, trying, cells = self.run, self.run.count[b.PHASE] == b.JUDGE, self._changes_of_cells()
+        if cells is not None and change.same:
+            cells.change()
+            if self._leaves or self._overloaded:
+                cells.sync()
+            return
+        if cells is not None:
+            booked = cells.change_zones(change)
+        else:
+            ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
+            model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
+            run.books.work[0, b.ZONES] += booked
         base = self.switching.manager.layout.base
         for k, why in enumerate(change.reasons):
             energy = booked if k == 0 else 0.0  # of all that change now
@@ -388,8 +421,9 @@ class Transient:
                 self.t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
                 criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
             )  # fmt: skip
-        self.set_model(model, state)
-        self.evaluate_forces()
+        if cells is None:
+            self.set_model(model, state)
+            self.evaluate_forces()
         if trying:  # the step before is done with: its state was looked at as it was then
             run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.TRY, 0
 
@@ -398,6 +432,8 @@ class Transient:
         if self.envelope is not None:
             self.envelope.fold(self.model.line.s, self.run.books.extremes)
         self.model = model
+        if self._cells is not None:
+            self._cells.adopted = False
         if self.switching is not None:
             self.switching.model = model
         if self.correction is not None and self.correction.model is not model:
@@ -410,7 +446,7 @@ class Transient:
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
             self.stepper.limits, state, 1.0 + borne_strain(model), first,
-            marks_on(model.line.s, self._marked), self.correction.corrector if self.correction is not None else None,
+            marks_on(model.line.s, self.marked), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
             before, friction = self.run.contact, self.scene.contact.friction
@@ -425,6 +461,11 @@ class Transient:
         watch_forces(self.run, model)
         if self.switching is not None:
             self.switching.attach(self.run, self.resolution.every)
+
+    def take(self, model: Model, work: Work) -> None:
+        """Go on with the same line in other cells, which the run has changed to."""
+        self.model, self.stepper.line, self.stepper.work = model, model.line, work
+        self.plane_monitor.take(model.line)
 
     def _note(self, node: int, kind: str, text: str) -> None:
         s = float(self.model.line.s[node])

@@ -65,11 +65,17 @@ class ZoneSwitching:
         self.joints = Joints(model.line) if loaded else None
         self.table = Table(blank_zone_job())  # of the compiled run
         self._switch_table, self._plan_table = Table(blank_switch_job()), Table(blank_zone_job())
-        self._guided = np.array(model.cable.held_tangent, float)
+        self.guided = np.array(model.cable.held_tangent, float)
         base = manager.layout.base
-        self._kinks = np.zeros(base.size, bool)
-        self._kinks[model.cable.point_nodes(base)] = True
+        self.kinks = np.zeros(base.size, bool)
+        self.kinks[model.cable.point_nodes(base)] = True
         self._take_line(model.line, model.line.h)
+
+    def take(self, model: Model, zones: Zones) -> None:
+        """Go on with a model of the same zones in other cells, which have been changed to."""
+        assert model.layout is not None
+        self.model = model
+        self.manager.take(model.layout, zones)
 
     def _take_line(self, line: Line, lengths: Floats) -> None:
         """A line with all of its stiffness and its true lengths; lengths: (N,) m, that its cells have now."""
@@ -92,7 +98,7 @@ class ZoneSwitching:
         clock = self.zones.clock
         clock[z.RAMP_STEP], clock[z.CALM_STEP] = longest, longest * READY
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
-        run.clock[b.ALLOWED] = longest * (1.0 if manager.ramping else READY)
+        self.limit_steps(run)
         line, sea, ends = self.model.line, self.model.sea.values, self.model.ends.values
         if run.contact is not None:
             manager.near = run.contact.look_ahead(LOOKAHEAD * manager.pace)
@@ -101,6 +107,10 @@ class ZoneSwitching:
             work=run.books.work, zones=self.zones, near=manager.near,
         )  # fmt: skip
         run.follow(self.table, self.compiled)
+
+    def limit_steps(self, run: CompiledRun) -> None:
+        """Steps are as long as what is ramped allows."""
+        run.clock[b.ALLOWED] = self.zones.clock[z.RAMP_STEP if self.manager.ramping else z.CALM_STEP]
 
     def torque(self) -> float:
         """Torque, N m, of the whole line as far as its rods do not carry it, when the criteria were weighed last."""
@@ -217,7 +227,8 @@ class ZoneSwitching:
     def switch(self, change: Change, t: float, ends: Ends, state: State, sea: Sea) -> tuple[Model, State, float]:
         """The model and the state with other zones, and the energy (J) that the switch puts in."""
         old, manager, model = self.manager.layout, self.manager, self.model
-        new = old._replace(rod=change.rod, here=self._plan(change.rod, sea, ends, state))
+        here = self.zones.plan.copy() if change.same else self.plan(change.rod, sea, ends, state)
+        new = old._replace(rod=change.rod, here=here)
         line = model.line
         if self.joints is not None:
             self.joints.unload(line, np.zeros_like(state.r))
@@ -228,7 +239,7 @@ class ZoneSwitching:
         numbers[TIME], numbers[RELAXES] = t, before.counts[z.RELAXING]
         self._switch_table.bind(
             transfer=transfer, ends=ends, sea=sea, target_sea=changed.sea.values, zones=before, target_zones=before,
-            numbers=numbers, guided=self._guided,
+            numbers=numbers, guided=self.guided,
         )  # fmt: skip
         begin_switch(self._switch_table.numbers)
         if manager.twisted and not target.bits & PLANAR:
@@ -246,9 +257,9 @@ class ZoneSwitching:
         """End k (0 or 1) has been let go."""
         self.manager.release(k, model.cable)
         self.zones.stiff[-k] = model.line.kb[-k]
-        self.model, self._guided[k] = model, 0.0
+        self.model, self.guided[k] = model, 0.0
 
-    def _plan(self, rod: np.ndarray, sea: Sea, ends: Ends, state: State) -> np.ndarray | None:
+    def plan(self, rod: np.ndarray, sea: Sea, ends: Ends, state: State) -> np.ndarray | None:
         """Places of the finest mesh where nodes should be; None: cells do not follow the curvature."""
         zones = self.zones
         if not zones.clock[z.SHARE] > 0.0:
@@ -263,12 +274,15 @@ class ZoneSwitching:
         if self.joints is not None:
             self.joints.unload(self.model.line, np.zeros_like(state.r))
 
-    def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
-        """What carries the state to the new nodes."""
-        cable = self.model.cable
-        frames = ends.frame.reshape(2, 3, 3)
-        clamps: list[Clamp | None] = [
+    def clamps(self, ends: Ends) -> list[Clamp | None]:
+        """First director and tangent of what holds the twist of the two ends; None: nothing does."""
+        cable, frames = self.model.cable, ends.frame.reshape(2, 3, 3)
+        return [
             (frames[k][:, 0], frames[k][:, 2]) if cable.held_twist[k] and cable.held_tangent[k] else None
             for k in (0, 1)
         ]
-        return transfer_to(old, new, line, target, state, self._kinks, np.zeros(new.rod.size), clamps)
+
+    def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
+        """What carries the state to the new nodes."""
+        none = np.zeros(new.rod.size)
+        return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends))

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -203,6 +203,11 @@ class CompiledRun:
     def before(self) -> State:
         """The state before the last step; while a try is judged, the one that it led to."""
         return self.states[1 - self.count[b.PARITY]]
+
+    @property
+    def solver(self) -> Any:
+        """The kernel of the line's kind, for a task at the table."""
+        return self._solver
 
     @property
     def push(self) -> Floats:

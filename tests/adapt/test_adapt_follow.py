@@ -16,6 +16,7 @@ from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
+from hybrid.simulation.cell_changes import CellChanges
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -123,3 +124,18 @@ def test_a_run_whose_cells_follow_is_continued_to_the_last_bit(tmp_path: Path) -
         np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
     for a, b in zip(more.mesh, whole.mesh, strict=True):
         np.testing.assert_array_equal(a.s, b.s)
+
+
+@pytest.mark.parametrize("friction", ["", "environment.seabed.friction=0.4"])
+def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Cells and zones change alike to the last bit, whether the run's arrays are made once or anew at every change."""
+    sets = [*TOUCHDOWN, "time.duration=8", "model={kind: adaptive, curvature_error: 0.05}", "output.every=0.1"]
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*sets, friction] if friction else sets)
+    once = hybrid.run(scene)
+    monkeypatch.setattr(CellChanges, "applies", lambda owner: False)
+    anew = hybrid.run(scene)
+    assert len({mesh.s.size for mesh in once.mesh}) > 5 and {"retry", "shrink"} <= {e.kind for e in once.events}
+    assert [(e.t, e.kind, e.text) for e in once.events] == [(e.t, e.kind, e.text) for e in anew.events]
+    for name in ("position", "velocity", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max",
+                 "envelope/curvature_t_max", "envelope/displacement_max", "steps/iterations"):  # fmt: skip
+        assert np.array_equal(once[name], anew[name], equal_nan=True), name

@@ -1,0 +1,382 @@
+"""Cells that change between two steps of a run without Python's help: on arrays with room for the most there can be.
+
+Two sets of arrays take turns: a change goes from one to the other (kernels.cell_changes), and the tables of the run get
+the numbers of the other one.  What Python has of the line is made anew when the run comes back to it (`sync`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.adapt.manager import OF_BASE, Change
+from hybrid.kernels import books as b
+from hybrid.kernels import zone_step as z
+from hybrid.kernels.binding import Packed, Room, Table
+from hybrid.kernels.books import Books, sample_size
+from hybrid.kernels.cell_changes import (
+    after_forces,
+    before_forces,
+    blank_layout_job,
+    blank_renew_job,
+    clear_state,
+    lay_out,
+    renew,
+)
+from hybrid.kernels.entry import NO_PUSH
+from hybrid.kernels.forces import PLANAR
+from hybrid.kernels.newton import ASSEMBLY, RUN, Task
+from hybrid.kernels.run import blank_job
+from hybrid.kernels.sampling import SAME_TIME
+from hybrid.kernels.state import NO_TORSION, Floats, Line, Sea, State, Work
+from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
+from hybrid.kernels.zone_step import Zones, blank_zone_job
+from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME, begin_switch, blank_switch_job, end_switch
+from hybrid.kernels.zone_transfer import Match, Transfer
+from hybrid.model.material import LEAST_TENSION, TENSION_FLOOR
+from hybrid.model.sea import Surroundings
+from hybrid.simulation.cell_arrays import (
+    REST_OF_SEA,
+    Cells,
+    Kept,
+    Shaped,
+    Side,
+    blank_joined,
+    blank_kept,
+    blank_single,
+    seas,
+    works,
+)
+from hybrid.simulation.envelope import marks_on
+from hybrid.solve.run import MOST_SAMPLED, ROWS
+from hybrid.solve.stepper import HEAVY
+
+if TYPE_CHECKING:
+    from hybrid.simulation.transient import Transient
+
+# Of the tables of a run, what depends on the cells.
+IN_RUN = ("line", "sea", "old", "new", "was", "now", "work", "books")
+IN_ZONES = ("line", "sea", "old", "new", "zones")
+
+
+class CellChanges:
+    """Changes of the cells of a run (`Transient`) whose rods stay what they are."""
+
+    def __init__(self, owner: Transient) -> None:
+        """Room for all; `adopt` before the first change."""
+        assert owner.switching is not None and owner.model.layout is not None
+        self._owner, self._run, self._switching = owner, owner.run, owner.switching
+        self._fixed_to = self._key(owner)
+        model, manager, layout = owner.model, owner.switching.manager, owner.model.layout
+        self.most, self.base = int(layout.starts[-1]), int(layout.rod.size)
+        self._finest, self._piece = layout.finest.nodes, model.cable.piece(0.5 * (layout.base[1:] + layout.base[:-1]))
+        self._base = np.zeros(self.base + 1, np.int64)
+        self._sides = Side(self.most, self.base), Side(self.most, self.base)
+        self._marked = marks_on(layout.base, owner.marked)
+        extra, some = int((self._marked != 0).sum()), owner.envelope is not None
+        self._kept = Room(Packed(lambda n: blank_kept(n, extra, some)), self.most)
+        self._sea, self._work = Room(seas, self.most), Room(works, self.most)
+        size = sample_size(self.most, True)
+        self._rows = max(1, min(ROWS, MOST_SAMPLED // size))
+        self._samples = np.zeros(self._rows * size)
+        self._numbers, self._turn = np.zeros(NUMBERS), np.zeros((0, 3))
+        self._twist, self._clamps, self._held = np.zeros(self.base), np.zeros((2, 2, 3)), np.zeros(2, bool)
+        self._room_for_places = np.zeros(self.most + 1 + extra), np.zeros(self.most + 1 + extra, np.int64)
+        self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
+        self.side, self.cells, self.adopted, self._stale = 0, 0, False, False
+        self._views: dict[Any, Any] = {}  # while tables are bound
+        self._follows = bool(owner.switching.zones.clock[z.SHARE] > 0.0)
+        self._binding = self._bound = False
+        self._tension_floor = TENSION_FLOOR, LEAST_TENSION * manager.scale
+
+    @staticmethod
+    def _key(owner: Transient) -> tuple[Any, ...]:
+        """What the tables hold as it is."""
+        model = owner.model
+        return id(model.on_base), model.line.bits, id(model.line.plane), id(model.ends), bool(owner.run.push.size)
+
+    @staticmethod
+    def applies(owner: Transient) -> bool:
+        """Whether a run's cells can change so: nothing asks Python on the way."""
+        switching, model, run = owner.switching, owner.model, owner.run
+        if switching is None or not (switching.compiled and switching.zones.clock[z.SHARE] > 0.0):
+            return False
+        plain = owner.correction is None and run.contact is None and not model.line.torsion.size
+        watches = owner.envelope is not None and owner.envelope.itself.watching
+        return plain and not watches and bool(model.line.bits & PLANAR or not switching.manager.twisted)
+
+    def still_fits(self) -> bool:
+        """Whether the line is of the kind that the arrays were made for."""
+        return self._fixed_to == self._key(self._owner)
+
+    # --- arrays -------------------------------------------------------------------------------------
+
+    def _view(self, room: Room, cells: int, given: Callable[[], dict[str, Any]] = dict) -> Any:
+        """Of a room, for so many cells; while tables are bound, the same for the same."""
+        if not self._binding:
+            return room.view(cells, **given())
+        if (room, cells) not in self._views:
+            self._views[room, cells] = room.view(cells, **given())
+        return self._views[room, cells]
+
+    def _line(self, k: int, cells: int) -> Line:
+        line = self._owner.model.line
+        given = {"bits": line.bits, "plane": line.plane, "torsion": NO_TORSION}
+        found: Line = self._view(self._sides[k].line, cells, lambda: given)
+        return found
+
+    def _zones(self, k: int, cells: int) -> Zones:
+        zones = self._switching.zones
+
+        def given() -> dict[str, Any]:
+            kinds = self._view(self._sides[k].kinds, cells, lambda: {"free": zones.kinds.free})
+            return {"kinds": kinds, **{name: getattr(zones, name) for name in OF_BASE}}
+
+        found: Zones = self._view(self._sides[k].zones, cells, given)
+        return found
+
+    def _state(self, k: int, which: int, cells: int) -> State:
+        found: State = self._view(self._sides[k].states[which], cells, lambda: {"turn": self._turn})
+        return found
+
+    def _layout(self, k: int, cells: int) -> Cells:
+        found: Cells = self._view(self._sides[k].cells, cells)
+        return found
+
+    def _push(self, k: int, which: int, cells: int) -> Floats:
+        """Of a run that carries one, else none."""
+        if not self._run.push.size:
+            return NO_PUSH
+        layout = self._layout(k, cells)
+        return layout.next_push if which else layout.push
+
+    def _sea_on(self, cells: int) -> Sea:
+        values = self._owner.model.sea.values
+        found: Sea = self._view(self._sea, cells, lambda: {x: getattr(values, x) for x in REST_OF_SEA})
+        return found
+
+    def _work_on(self, cells: int) -> Work:
+        found: Work = self._view(self._work, cells, lambda: {"torsion": self._owner.stepper.work.torsion})
+        return found
+
+    def _books(self, cells: int) -> Books:
+        size = sample_size(cells, True)
+        samples = self._samples[: self._rows * size].reshape(self._rows, size)
+        kept = self._view(self._kept, cells)
+        if not self._binding:
+            return self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
+        if (size, cells) not in self._views:
+            found = self._run.books._replace(samples=samples, base=self._base, **kept._asdict())
+            self._views[size, cells] = found
+        return self._views[size, cells]
+
+    # --- tables -------------------------------------------------------------------------------------
+
+    def _bind_all(self) -> None:
+        """Tables of changes from either side to the other, and of runs on either."""
+        owner, sides, model = self._owner, self._sides, self._owner.model
+        assert model.on_base is not None and model.layout is not None
+        cable, zones, ends = model.on_base.cable, self._switching.zones, model.ends.values
+        floor_part, least = self._tension_floor
+        envelope, bounds = owner.envelope, np.zeros((4, b.EXTREMES, 1))
+        places, borne = np.zeros(1), 1.0 + model.cable.max_strain[self._piece]
+        start = np.zeros((self._finest.size, 3))
+        if envelope is not None:
+            bounds, places, start = envelope.bounds, envelope.s, envelope.start
+
+        def line_job(k: int, m: int) -> dict[str, Any]:
+            at = self._layout(k, m)
+            return {"cable": cable, "nodes": at.s, "base_of_cell": at.of, "rod": at.rods, "line": self._line(k, m)}
+
+        def kinds_job(k: int, m: int) -> dict[str, Any]:
+            of, kinds = self._layout(k, m).of, self._zones(k, m).kinds
+            return {"cable": cable, "base_of_cell": of, "kinds": kinds, "floor_part": floor_part, "least": least}
+
+        def switch_job(k: int, parity: int, n: int, m: int) -> dict[str, Any]:
+            to, at = 1 - k, self._layout(1 - k, m)
+            match = Match(**self._match[0].view(m)._asdict(), **self._match[1].view(n)._asdict())
+            transfer = Transfer(
+                self._line(k, n), self._line(to, m), self._state(k, parity, n), self._state(to, 0, m),
+                self._layout(k, n).place, at.place, at.of, sides[k].first, self._switching.kinks, self._twist,
+                self._clamps, self._held, match,
+            )  # fmt: skip
+            return {
+                "transfer": transfer, "ends": ends, "sea": self._sea_on(n), "target_sea": self._sea_on(m),
+                "zones": self._zones(k, n), "target_zones": self._zones(to, m), "numbers": self._numbers,
+                "guided": self._switching.guided,
+            }  # fmt: skip
+
+        def renew_job(k: int, parity: int, n: int, m: int) -> dict[str, Any]:
+            to, at = 1 - k, self._layout(1 - k, m)
+            return {
+                "s": self._layout(k, n).s, "line": self._line(to, m), "place": at.place, "of": at.of,
+                "first": sides[to].first, "start": start, "marked": self._marked,
+                "borne": borne, "state": self._state(to, 0, m),
+                "twin": self._state(to, 1, m), "sea": self._sea_on(m), "work": self._work_on(m),
+                "zones": self._zones(to, m), "before": self._books(n), "books": self._books(m),
+                "push": self._push(k, parity, n), "new_push": self._push(to, 0, m), "next_push": self._push(to, 1, m),
+                "envelope_s": places, "bounds": bounds, "places": self._room_for_places[0],
+                "columns": self._room_for_places[1], "scale": model.tension_scale,
+            }  # fmt: skip
+
+        def in_run(k: int, m: int) -> dict[str, Any]:
+            return {
+                "line": self._line(k, m), "sea": self._sea_on(m), "old": self._state(k, 0, m),
+                "new": self._state(k, 1, m), "was": self._push(k, 0, m), "now": self._push(k, 1, m),
+                "work": self._work_on(m), "books": self._books(m),
+            }  # fmt: skip
+
+        def in_zones(k: int, m: int) -> dict[str, Any]:
+            found = in_run(k, m)
+            return {name: found[name] for name in IN_ZONES if name in found} | {"zones": self._zones(k, m)}
+
+        both, pairs = (0, 1), ((0, 0), (0, 1), (1, 0), (1, 1))
+        self._lay_out = [Table(blank_layout_job()) for _ in both]
+        for k in both:
+            at = self._layout(k, self.most)
+            self._lay_out[k].bind(
+                plan=zones.plan, rod=zones.next_rod, parts=zones.parts, finest=self._finest, place=at.place, s=at.s,
+                of=at.of, rods=at.rods, first=sides[k].first,
+            )  # fmt: skip
+
+        def shaped(blank: Any, values: Any, *given: int) -> Shaped:
+            return Shaped(Table(blank), partial(values, *given))
+
+        def on_new(values: Any, k: int, n: int, m: int) -> dict[str, Any]:
+            found: dict[str, Any] = values(k, m)
+            return found
+
+        self._lines = [shaped(blank_line_job(), partial(on_new, line_job), k) for k in both]
+        self._kinds = [shaped(blank_kinds_job(), partial(on_new, kinds_job), k) for k in both]
+        self._switches = {(k, p): shaped(blank_switch_job(), switch_job, k, p) for k, p in pairs}
+        self._renews = {(k, p): shaped(blank_renew_job(), renew_job, k, p) for k, p in pairs}
+        self._in_run = [shaped(blank_job(), partial(on_new, in_run), k) for k in both]
+        self._in_zones = [shaped(blank_zone_job(), partial(on_new, in_zones), k) for k in both]
+
+    # --- changes ------------------------------------------------------------------------------------
+
+    def adopt(self) -> None:
+        """Go on with the line of the run as it is now, in these arrays."""
+        owner, run, switching, model = self._owner, self._run, self._switching, self._owner.model
+        layout, n, k = model.layout, model.cells, 0
+        assert layout is not None
+        if not self._bound:
+            self._binding = True
+            self._bind_all()
+            self._binding, self._bound = False, True
+            self._views.clear()
+        self.side, self.cells = k, n
+        parity, at = int(run.count[b.PARITY]), self._layout(k, n)
+        for which in (0, 1):
+            _copy(run.states[which], self._state(k, which, n))
+            if run.push.size:
+                self._push(k, which, n)[:] = run.pushes[which]
+        zones = self._zones(k, n)
+        _copy(switching.zones, zones, (*OF_BASE, "kinds"))
+        _copy(switching.zones.kinds, zones.kinds, ("free",))
+        _copy(model.line, self._line(k, n), ("bits", "plane", "torsion"))
+        _copy(model.sea.values, self._sea_on(n), REST_OF_SEA)
+        _copy(owner.stepper.work, self._work_on(n), ("W", "X", "x", "torsion", "gaps", "rows"))
+        _copy(run.books, self._books(n), tuple(x for x in Books._fields if x not in Kept._fields))
+        at.place[:], at.s[:], at.of[:], at.rods[:] = layout.places, model.line.s, layout.base_of_cell, layout.rod_cells
+        self._sides[k].first[:] = self._base[:] = layout.first
+        run.table.bind(task=Task(RUN, ca=HEAVY, limits=owner.stepper.limits))
+        self._put_numbers()
+        self.adopted, self._stale = True, True
+        run.count[b.PARITY] = parity
+        self.sync()
+
+    def _put_numbers(self) -> None:
+        self._in_run[self.side].put(self.cells, IN_RUN, self._run.table)
+        self._in_zones[self.side].put(self.cells, IN_ZONES, self._switching.table)
+
+    def alone(self) -> bool:
+        """After a step that Python is to look at: whether cells change, and nothing else is to be done."""
+        clock, count, zones = self._run.clock, self._run.count, self._switching.zones
+        if count[b.FLAGS] or count[b.ASKS] or count[b.SAMPLES] or not zones.counts[z.CELLS_DUE]:
+            return False
+        if zones.clock[z.LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[z.NEXT_REVIEW]:
+            return False
+        outputs, at = self._run.books.outputs, int(count[b.OUTPUT])
+        return at == outputs.size or bool(outputs[at] > clock[b.NOW] + SAME_TIME * clock[b.LAST_DT])
+
+    def change_zones(self, change: Change) -> float:
+        """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
+        owner, switching, t = self._owner, self._switching, self._run.t
+        ends, sea = owner.model.ends.at(t), owner.model.sea.at(t)
+        switching.zones.next_rod[:] = change.rod
+        if switching.plan(change.rod, sea, ends, self._run.state) is None:
+            switching.zones.plan[:] = True
+        for k, clamp in enumerate(switching.clamps(ends)):
+            self._held[k] = clamp is not None
+            if clamp is not None:
+                self._clamps[k] = clamp
+        booked = self.change(lambda: switching.manager.adopt_rods(change.rod, change, t))
+        self.sync()
+        switching.limit_steps(self._run)
+        return booked
+
+    def change(self, adopt: Callable[[], None] | None = None) -> float:
+        """To the cells that are planned: nothing moves, and the energy, J, is booked.
+
+        adopt: takes over other zones, where they are other ones.
+        """
+        run, k, n = self._run, self.side, self.cells
+        to, parity, zones = 1 - k, int(run.count[b.PARITY]), self._switching.zones
+        m = int(lay_out(self._lay_out[to].numbers))
+        renewing, switching = self._renews[k, parity](n, m), self._switches[k, parity](n, m)
+        self._numbers[TIME], self._numbers[RELAXES] = run.clock[b.NOW], zones.counts[z.RELAXING]
+        clear_state(renewing)
+        fill_line(self._lines[to](n, m))
+        begin_switch(switching)
+        if adopt is not None:
+            adopt()
+        fill_kinds(self._kinds[to](n, m))
+        end_switch(switching)
+        renew(renewing)
+        self.side, self.cells, self._stale = to, m, True
+        self._put_numbers()
+        table, what = run.table.numbers, run.table.part("task").start
+        before_forces(table)
+        table[what] = ASSEMBLY
+        run.solver(table)
+        table[what] = RUN
+        after_forces(table)
+        booked = float(self._numbers[AFTER] - self._numbers[BEFORE])
+        run.books.work[0, b.ZONES] += booked
+        return booked
+
+    def sync(self) -> None:
+        """What Python has of the line is that of now."""
+        if not self._stale:
+            return
+        self._stale = False
+        owner, run, k, n = self._owner, self._run, self.side, self.cells
+        model, switching, line = owner.model, self._switching, self._line(k, n)
+        assert model.layout is not None
+        zones, sea, work, books = self._zones(k, n), self._sea_on(n), self._work_on(n), self._books(n)
+        now = sea.now.copy()
+        layout = model.layout._replace(rod=zones.rod.copy(), here=zones.here.copy() if self._follows else None)
+        model = replace(model, line=line, layout=layout, zones=layout.zones, sea=Surroundings(sea))
+        sea.now[:] = now
+        run.books, run.states = books, (self._state(k, 0, n), self._state(k, 1, n))
+        if run.push.size:
+            at = self._layout(k, n)
+            run.pushes = at.push, at.next_push
+        run.table.bind(
+            line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
+            books=books,
+        )  # fmt: skip
+        switching.take(model, zones)
+        switching.table.bind(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
+        owner.take(model, work)
+
+
+def _copy(old: Any, new: Any, but: tuple[str, ...] = ()) -> None:
+    for name in old._fields:
+        if name not in but:
+            getattr(new, name)[:] = getattr(old, name)
