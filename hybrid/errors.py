@@ -100,6 +100,7 @@ EVENTS_BY_WEIGHT = (
     "error uncertain",
     "not converged",
     "largest force uncertain",
+    "windows uncertain",
     "irregular motion",
     "end force between outputs",
     "line meets itself",

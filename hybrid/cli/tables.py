@@ -150,7 +150,8 @@ def errors_facts(result: Result) -> dict[str, Any]:
     found: dict[str, Any] = {k[6:]: float(x) for k, x in result.attributes.items() if k.startswith("error_")}
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
-        known = not kinds & {"error uncertain", "largest force uncertain", "model error not estimated", "implausible"}
+        uncertain = "error uncertain", "largest force uncertain", "windows uncertain", "model error not estimated"
+        known = not kinds & {*uncertain, "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 

@@ -31,6 +31,7 @@ from hybrid.simulation.error_statistics import (
     estimates,
     snaps,
     statistics_of,
+    windows_uncertain,
 )
 from hybrid.simulation.refinement import MOST_OF_MODEL, Free, Verdict, judge, not_converged, refined
 from hybrid.simulation.restore import resolution_from, resolution_tree
@@ -134,6 +135,7 @@ class ErrorController:
                 f"{', at the '.join(each)}): it is not judged; the spread over seeds, or a longer run, says more"
             )
             notes.append(("largest force uncertain", text))
+        notes += windows_uncertain(self.statistics, self.asked)
         return notes
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:

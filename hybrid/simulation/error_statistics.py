@@ -9,12 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import Any, Self
 
 import numpy as np
 
+from hybrid.model.resolution import RequestedAccuracy
+from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import Estimate
 from hybrid.simulation.error_order import MOST_ORDER
 from hybrid.simulation.run_sample import END_FORCES, RunSample
+from hybrid.store.named_arrays import Tree, matched
 
 # Windows of a run, and the outputs of the result that one has at least.
 WINDOWS, LEAST = 50, 20
@@ -36,6 +40,26 @@ class StatisticEstimate(Estimate):
 
     orders = 1.5, MOST_ORDER  # runs of long steps overshoot snaps, and come back with order 3
     cancels = False
+
+    def __init__(
+        self, result: RunSample, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None
+    ) -> None:
+        super().__init__(result, coarse, rough, coarsest)
+        self.chance = _chance(result, coarse)  # N, of a mean over windows at start and end: zeros of what is no mean
+
+    def update(self, result: RunSample) -> None:
+        self.chance = _chance(result, self.run)
+        super().update(result)
+
+    def checkpoint(self) -> Tree:
+        return super().checkpoint() | {"chance": self.chance}
+
+    @classmethod
+    def restored(cls, tree: Any, scene: Scene, shape: tuple[int, int, int]) -> Self:
+        self = super().restored(tree, scene, shape)
+        self.chance = matched({"chance": np.zeros(2)} | {k: x for k, x in tree.items() if k == "chance"},
+                              {"chance": np.zeros(2)}, "statistics")["chance"]  # fmt: skip
+        return self
 
 
 def estimates(
@@ -60,14 +84,55 @@ def statistics_of(run: RunSample, every: int) -> dict[str, RunSample]:
         if name in found and len(run.forces) > windows:
             found[name] = _of_steps(run.forces[:, 0], run.forces[:, column], windows)
     errors = _model_errors(run, values, every, windows)
+    kept = {name: run.forces[:0] for name in STATISTICS}
+    if len(run.forces) > windows:
+        kept |= {"windows_largest": _of_windows(run.forces, windows, np.maximum)}
+        kept |= {"windows_smallest": _of_windows(run.forces, windows, np.minimum)}
     return {
         statistic: replace(
-            run, every=1, rows={}, forces=run.forces[:0], catenary=run.catenary[:0],
+            run, every=1, rows={}, forces=kept[statistic], catenary=run.catenary[:0],
             values={name: _as_vector(name, x[k]) for name, x in found.items()},
             model_error={name: x[k] for name, x in errors.items()},
         )
         for k, statistic in enumerate(STATISTICS)
     }  # fmt: skip
+
+
+def _chance(after: RunSample, before: RunSample) -> np.ndarray:
+    """By how much means over windows of the end forces may be off because runs snap at other instants: (2,) N.
+
+    Twice the standard error of the mean difference of two runs, from its scatter over the windows.
+    """
+    if not len(after.forces) or after.forces.shape != before.forces.shape:
+        return np.zeros(2)
+    differences = after.forces[:, 1:] - before.forces[:, 1:]
+    return np.asarray(2.0 * np.std(differences, axis=0) / np.sqrt(len(differences)))
+
+
+def _of_windows(forces: np.ndarray, windows: int, f: np.ufunc) -> np.ndarray:
+    """The largest, or smallest, forces (n, 3) of each window, with its number."""
+    begins = _begins(forces[:, 0], windows)
+    return np.column_stack([np.arange(float(len(begins))), f.reduceat(forces[:, 1:], begins, axis=0)])
+
+
+def windows_uncertain(found: Mapping[str, StatisticEstimate], asked: RequestedAccuracy) -> list[tuple[str, str]]:
+    """The event that says so where chance may take means over windows of an end force beyond what is asked."""
+    if asked.tension is None and asked.of_end_force is None:
+        return []
+    most, off = found[LARGEST].run.largest_end_force, 0.0
+    for estimate in found.values():
+        for chance, name in zip(estimate.chance, END_FORCES.values(), strict=True):
+            if chance > 0.0:
+                off = max(off, chance + estimate.errors.largest("total", name))
+    bounds = asked.tension, asked.of_end_force and asked.of_end_force * most
+    allowed = min(x for x in bounds if x is not None)
+    if off <= allowed:
+        return []
+    text = (
+        f"means of the windows' largest and smallest forces may be off by {off:.2g} N, because the line snaps at other "
+        f"instants in every run; {allowed:.2g} N are asked: a longer run, or several seeds, say more"
+    )
+    return [("windows uncertain", text)]
 
 
 def snaps(run: RunSample) -> bool:
@@ -106,10 +171,15 @@ def _of_steps(t: np.ndarray, x: np.ndarray, windows: int) -> np.ndarray:
     dt = np.diff(t, prepend=0.0)
     mean = np.average(x, weights=dt)
     deviation = np.sqrt(np.average((x - mean) ** 2, weights=dt))
-    begins = np.searchsorted(t, np.linspace(0.0, t[-1], windows + 1)[:-1], side="right")
-    begins = np.unique(np.minimum(begins, len(t) - 1))
+    begins = _begins(t, windows)
     largest, smallest = (float(np.mean(f.reduceat(x, begins))) for f in (np.maximum, np.minimum))
     return np.array([[x.max()], [deviation], [largest], [smallest]])
+
+
+def _begins(t: np.ndarray, windows: int) -> np.ndarray:
+    """Numbers of the first steps of windows of about the same length; t: (n,) s, when steps end."""
+    begins = np.searchsorted(t, np.linspace(0.0, t[-1], windows + 1)[:-1], side="right")
+    return np.unique(np.minimum(begins, len(t) - 1))
 
 
 def _model_errors(run: RunSample, values: Mapping[str, np.ndarray], every: int, windows: int) -> dict[str, np.ndarray]:

@@ -11,10 +11,15 @@ from bits import Stopping, differences, went_on
 import hybrid
 from hybrid.model.resolution import RequestedAccuracy, Resolution
 from hybrid.simulation.error_control import ErrorController
-from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, statistics_of
+from hybrid.simulation.error_statistics import STATISTICS, WINDOWS, StatisticEstimate, statistics_of
 from hybrid.simulation.refinement import Free
 from hybrid.simulation.run_sample import RunSample
+from hybrid.store.named_arrays import pack, unpack
 
+SCENE = hybrid.validate_scene({
+    "cable": {"sections": [{"length": 1.0, "mass": 1.0}]}, "model": "catenary", "time": {"duration": 1.0},
+    "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": "free"}, "initial": "equilibrium",
+})  # fmt: skip
 FINENESS = Resolution(1.0, 0.1, 1e-3, 1e-3)
 
 
@@ -153,8 +158,33 @@ def test_a_largest_force_by_chance_is_not_judged():
     control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
     control.start(FINENESS)
     assert control.scattered == ["end_force_end"]  # the only one there
-    assert [kind for kind, _ in control.notes] == ["irregular motion", "largest force uncertain"]
+    assert [kind for kind, _ in control.notes] == ["irregular motion", "largest force uncertain", "windows uncertain"]
     assert len(control.runs) == 4
+
+
+@pytest.mark.parametrize("scatter, uncertain", [(100.0, False), (1000.0, True)])
+def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, uncertain):
+    """Each snap comes out otherwise in every run: the mean over 50 of them scatters by 1/sqrt(50) of one, twice for
+    the difference of two runs."""
+    rng = np.random.default_rng(5)
+
+    def sample(resolution: Resolution) -> RunSample:
+        t, force = np.linspace(0.1, 400.0, 4001), noisy(1e3)
+        force[2000] = 20e3
+        force[40::80] += scatter * rng.normal(size=len(force[40::80])) + 2e3
+        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
+        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
+        return replace(found, resolution=resolution, forces=np.column_stack([t, force, force]))
+
+    asked = RequestedAccuracy(None, None, 0.01)  # 200 N
+    control = ErrorController(asked, Free(False, False, False), True, sample, sample, irregular=True)
+    control.start(FINENESS)
+    chance = control.statistics["windows_largest"].chance
+    assert chance == pytest.approx(2.0 * scatter * np.sqrt(2.0 / 50.0), rel=0.4)
+    assert ("windows uncertain" in {kind for kind, _ in control.notes}) == uncertain
+    saved = unpack(pack(control.statistics["windows_largest"].checkpoint()))
+    again = StatisticEstimate.restored(saved, SCENE, (1, 1, 0))
+    np.testing.assert_array_equal(again.chance, chance)
 
 
 SEA = {
