@@ -27,6 +27,7 @@ if TYPE_CHECKING:
     from hybrid.scene.system import System
     from hybrid.simulation.api import resume, run, static
     from hybrid.simulation.stepping import Simulation
+    from hybrid.simulation.system_stepping import SystemSimulation
     from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
@@ -45,6 +46,7 @@ _HOME = {
     "Scene": ("hybrid.scene.schema", "Scene"),
     "SceneError": ("hybrid.errors", "SceneError"),
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
+    "SystemSimulation": ("hybrid.simulation.system_stepping", "SystemSimulation"),
     "System": ("hybrid.scene.system", "System"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
     "export": ("hybrid.exports.api", "export"),
@@ -79,6 +81,7 @@ __all__ = [
     "SceneError",
     "Simulation",
     "System",
+    "SystemSimulation",
     "export",
     "export_fmu",
     "export_moordyn",

@@ -33,7 +33,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
     "studies": (*COMPUTING, "simulation", "view"),
-    "couple": (*COMPUTING, "simulation"),
+    "couple": (*COMPUTING, "simulation", "interop"),
     "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "__init__"),
     "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple"),
 }

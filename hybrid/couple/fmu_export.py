@@ -86,7 +86,7 @@ def _write_scene(scene: Scene, folder: Path) -> list[Path]:
     def walk(node: Any) -> None:
         pairs = node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ()
         for key, value in pairs:
-            if key == "file" and isinstance(value, str):
+            if key in ("file", "rao") and isinstance(value, str):
                 if value not in copies:
                     copies[value] = folder / f"file{len(copies) + 1}{Path(value).suffix}"
                     copies[value].write_bytes(Path(value).read_bytes())

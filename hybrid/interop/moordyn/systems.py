@@ -30,7 +30,7 @@ from hybrid.interop.moordyn.types import LineType
 from hybrid.scene.read import parse_either
 
 # Two lines are one only where a rod without length joins them: points are points.
-_JOINTS = ("rod",)
+JOINTS = ("rod",)
 _APART = "; or --separate, for each cable that can be as a scene of its own"
 
 
@@ -102,7 +102,7 @@ class _SystemMaker(Tables):
         for id in sorted(self.deck.lines):
             if id in done:
                 continue
-            chain = chain_of(self.deck, id, _JOINTS)
+            chain = chain_of(self.deck, id, JOINTS)
             done |= {line.id for line, _ in chain}
             name = "line" + "+".join(str(line.id) for line, _ in chain)
             self.chains[name] = chain
@@ -116,7 +116,7 @@ class _SystemMaker(Tables):
             if kind.trouble:
                 self._refuse(line.row, f"line type {kind.name}: {kind.trouble}", kind.instead)
         (first, back), (last, last_back) = chain[0], chain[-1]
-        if next_line(self.deck, first, 1 if back else 0, _JOINTS) is not None:
+        if next_line(self.deck, first, 1 if back else 0, JOINTS) is not None:
             for line in lines:
                 self._refuse(line.row, "it closes a ring of free rods; a line has two ends", "make one of them Fixed")
         start = self._point(first.ends[1 if back else 0], types[0].ei > 0.0)

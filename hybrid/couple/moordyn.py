@@ -1,0 +1,323 @@
+"""The functions of the Python package `moordyn`, computed by hybrid: `import hybrid.couple.moordyn as moordyn`.
+
+A script that creates a system from an input file of MoorDyn, steps it, and reads forces, positions and tensions runs
+after this one changed import.  What differs: the start is an equilibrium, not the end of a relaxation; a step is
+implicit, so that dtM means nothing and a coupling step is divided only above `SetDt` (0.05 s unless it is called);
+wrong uses raise ValueError in words.  Functions that have no meaning here are not there (docs/coupling.md lists them).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import inf
+
+import numpy as np
+
+from hybrid.interop.moordyn.cables import chain_of
+from hybrid.interop.moordyn.deck import Deck, read_deck
+from hybrid.interop.moordyn.rows import read_source
+from hybrid.interop.moordyn.systems import JOINTS, system_of
+from hybrid.kernels.state import Floats
+from hybrid.model.bodies import frame_of
+from hybrid.scene.read import parse_either
+from hybrid.scene.system import System
+from hybrid.simulation.system_stepping import SystemSimulation
+
+# s: the longest step, and how long a system may be stepped.
+LONGEST_STEP, DURATION = 0.05, 1e7
+POINT_TYPE_FREE, POINT_TYPE_FIXED, POINT_TYPE_COUPLED = 0, 1, -1
+_TYPES = {"free": POINT_TYPE_FREE, "coupled": POINT_TYPE_COUPLED}
+# Of a step: how far the clock of the caller may be from ours.
+CLOCK = 1e-6
+
+
+class MoorDynBody:
+    """A coupled body: moved by the caller, with the points on it."""
+
+    def __init__(self, id: int, place: Sequence[float], points: dict[str, Floats]) -> None:
+        """points: places (3,) m in axes of the body, by name in the scene."""
+        self.id, self.points = id, points
+        self.r, self.v = np.array(place, float), np.zeros(6)
+
+    def at(self, r: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
+        """Places and velocities of its points where the body is at r (m, rad) and moves with v (m/s, rad/s)."""
+        frame = frame_of(tuple(np.degrees(r[3:])))
+        arms = {name: frame @ place for name, place in self.points.items()}
+        return {name: (r[:3] + arm, v[:3] + np.cross(v[3:], arm)) for name, arm in arms.items()}
+
+
+class MoorDynPoint:
+    """A point of a system."""
+
+    def __init__(self, system: MoorDyn, id: int, name: str) -> None:
+        self.system, self.id, self.name = system, id, name
+
+
+class MoorDynLine:
+    """A line of a system: nodes `first` to `last` of a line of the scene, from its end A."""
+
+    def __init__(self, system: MoorDyn, id: int, name: str, first: int, last: int) -> None:
+        self.system, self.id, self.name, self.first, self.last = system, id, name, first, last
+
+    def node(self, i: int) -> int:
+        """Node of the scene's line for node i from end A."""
+        count = abs(self.last - self.first)
+        if not (isinstance(i, int) and 0 <= i <= count):
+            raise ValueError(f"i: expected a node from 0 to {count}, found {i!r}")
+        return self.first + i if self.last >= self.first else self.first - i
+
+
+class MoorDyn:
+    """A system, made by `Create`, ready after `Init`."""
+
+    def __init__(self, path: str) -> None:
+        self.deck: Deck = read_deck(read_source(path))
+        made = system_of(self.deck)
+        self.text, self.notes = made.text, made.notes
+        self.simulation: SystemSimulation | None = None
+        self.dt, self.origin = LONGEST_STEP, inf
+        names = {id: f"point{id}" for id in self.deck.points}
+        used = {name for kind, id, _ in (e for x in self.deck.lines.values() for e in x.ends) if kind == "point"
+                for name in [names[id]]}  # fmt: skip
+        self.points = [MoorDynPoint(self, id, names[id]) for id in sorted(self.deck.points)]
+        self.bodies = [
+            MoorDynBody(id, [*b.place, *np.radians(b.angles)], {
+                names[k]: np.array(p.place) for k, p in self.deck.points.items()
+                if p.kind == "body" and p.on == id and names[k] in used
+            }) for id, b in sorted(self.deck.bodies.items()) if b.kind == "coupled"
+        ]  # fmt: skip
+        self.coupled = [x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in used]
+        self.lines = [self._line(id) for id in sorted(self.deck.lines)]
+
+    def _line(self, id: int) -> MoorDynLine:
+        chain = chain_of(self.deck, id, JOINTS)
+        first = 0
+        for line, turned in chain:
+            last = first + line.segments
+            if line.id == id:
+                name = "line" + "+".join(str(x.id) for x, _ in chain)
+                return MoorDynLine(self, id, name, *((last, first) if turned else (first, last)))
+            first = last
+        raise AssertionError(id)
+
+    @property
+    def freedoms(self) -> int:
+        """Numbers of `x`: six of each coupled body, then three of each coupled point."""
+        return 6 * len(self.bodies) + 3 * len(self.coupled)
+
+    @property
+    def running(self) -> SystemSimulation:
+        """The simulation; ValueError before `Init` and after `Close`."""
+        if self.simulation is None:
+            raise ValueError("the system is not running: call Init first, and nothing after Close")
+        return self.simulation
+
+    def numbers(self, x: Sequence[float], name: str) -> Floats:
+        """A list of `freedoms` finite numbers."""
+        try:
+            found = np.array(x, float).ravel()
+        except (TypeError, ValueError):
+            raise ValueError(f"{name}: expected {self.freedoms} numbers, found {x!r:.60}") from None
+        if found.size != self.freedoms or not np.isfinite(found).all():
+            raise ValueError(f"{name}: expected {self.freedoms} finite numbers (NCoupledDOF), found {x!r:.60}")
+        return found
+
+    def places(self, x: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
+        """Places and velocities of all points that the caller moves."""
+        out: dict[str, tuple[Floats, Floats]] = {}
+        for k, body in enumerate(self.bodies):
+            out |= body.at(x[6 * k : 6 * k + 6], v[6 * k : 6 * k + 6])
+        first = 6 * len(self.bodies)
+        for k, name in enumerate(self.coupled):
+            at = slice(first + 3 * k, first + 3 * k + 3)
+            out[name] = x[at], v[at]
+        return out
+
+    def forces(self, x: Floats) -> list[float]:
+        """Forces (and moments about the origin of bodies) of the lines on what the caller moves."""
+        out: list[float] = []
+        for k, body in enumerate(self.bodies):
+            pulls = [self.running.point(name) for name in body.points]
+            force = sum((p.force for p in pulls), np.zeros(3))
+            moment = sum((np.cross(p.position - x[6 * k : 6 * k + 3], p.force) for p in pulls), np.zeros(3))
+            out += [*force.tolist(), *moment.tolist()]
+        for name in self.coupled:
+            out += self.running.point(name).force.tolist()
+        return out
+
+
+# --- the functions of the package ------------------------------------------------------------------
+
+
+def Create(filepath: str = "") -> MoorDyn:
+    """A system from an input file of MoorDyn; SceneError, in lines of the file, where it cannot be one scene."""
+    return MoorDyn(filepath or "Mooring/lines.txt")
+
+
+def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) -> int:
+    """Find the equilibrium with coupled points and bodies at x (m, rad); v: their velocities (m/s, rad/s)."""
+    if instance.simulation is not None:
+        raise ValueError("the system is running already: Close it, or Create another")
+    places = instance.places(instance.numbers(x, "x"), instance.numbers(v, "v"))
+    scene, _ = parse_either(instance.text)
+    assert isinstance(scene, System)
+    data = scene.model_dump(exclude_none=True)
+    for name, (place, _) in places.items():
+        data["points"][name]["position"] = place.tolist()
+    data["time"] = {"duration": DURATION, "step": instance.dt}
+    data["output"] = data.get("output", {}) | {"every": DURATION}
+    instance.simulation = SystemSimulation(data)
+    return 0
+
+
+def Step(instance: MoorDyn, x: Sequence[float], v: Sequence[float], t: float, dt: float) -> list[float]:
+    """From t to t + dt (s) with coupled points and bodies at x, which go on with v; the forces on them then.
+
+    x, v: as of `Init`, at the time t; the first t is where the clock begins.
+    """
+    running, begin, speed = instance.running, instance.numbers(x, "x"), instance.numbers(v, "v")
+    if not (np.isfinite(t) and np.isfinite(dt) and dt > 0.0):
+        raise ValueError(f"t, dt: expected a time and a step > 0, in s, found {t!r}, {dt!r}")
+    if instance.origin == inf:
+        instance.origin = t - running.t
+    if abs(t - instance.origin - running.t) > CLOCK * dt:
+        raise ValueError(f"t: expected {instance.origin + running.t:.9g} s, where the last step ended, found {t:.9g}")
+    end = begin + dt * speed
+    for name, (place, velocity) in instance.places(end, speed).items():
+        running.set_point(name, place, velocity)
+    running.advance(t - instance.origin + dt)
+    return instance.forces(end)
+
+
+def Close(instance: MoorDyn) -> int:
+    """The system is over."""
+    instance.running.close()
+    instance.simulation = None
+    return 0
+
+
+def NCoupledDOF(instance: MoorDyn) -> int:
+    """Numbers of `x` and `v`."""
+    return instance.freedoms
+
+
+def GetDt(instance: MoorDyn) -> float:
+    """The longest step, s."""
+    return instance.dt
+
+
+def SetDt(instance: MoorDyn, dt: float) -> None:
+    """The longest step, s; before `Init`."""
+    if instance.simulation is not None or not 0.0 < dt < inf:
+        raise ValueError(f"dt: expected a number > 0, in s, before Init; found {dt!r}")
+    instance.dt = float(dt)
+
+
+def GetNumberLines(instance: MoorDyn) -> int:
+    return len(instance.lines)
+
+
+def GetNumberPoints(instance: MoorDyn) -> int:
+    return len(instance.points)
+
+
+def GetLine(instance: MoorDyn, line: int) -> MoorDynLine:
+    """Line number `line`, from 1."""
+    return instance.lines[_number(line, len(instance.lines), "line")]
+
+
+def GetPoint(instance: MoorDyn, point: int) -> MoorDynPoint:
+    """Point number `point`, from 1."""
+    return instance.points[_number(point, len(instance.points), "point")]
+
+
+def GetLineID(instance: MoorDynLine) -> int:
+    return instance.id
+
+
+def GetPointID(instance: MoorDynPoint) -> int:
+    return instance.id
+
+
+def GetPointType(instance: MoorDynPoint) -> int:
+    """POINT_TYPE_FREE, _FIXED or _COUPLED; a point on a body is fixed."""
+    return _TYPES.get(instance.system.deck.points[instance.id].kind, POINT_TYPE_FIXED)
+
+
+def GetPointPos(instance: MoorDynPoint) -> tuple[float, ...]:
+    """Position, m."""
+    return tuple(instance.system.running.point(instance.name).position.tolist())
+
+
+def GetPointVel(instance: MoorDynPoint) -> tuple[float, ...]:
+    """Velocity, m/s."""
+    return tuple(instance.system.running.point(instance.name).velocity.tolist())
+
+
+def GetPointForce(instance: MoorDynPoint) -> tuple[float, ...]:
+    """Force of its lines on it, N."""
+    return tuple(instance.system.running.point(instance.name).force.tolist())
+
+
+def GetLineN(instance: MoorDynLine) -> int:
+    """Number of segments."""
+    return abs(instance.last - instance.first)
+
+
+def GetLineNumberNodes(instance: MoorDynLine) -> int:
+    return GetLineN(instance) + 1
+
+
+def GetLineUnstretchedLength(instance: MoorDynLine) -> float:
+    """Unstretched length, m."""
+    s = instance.system.running.line(instance.name).s
+    return float(abs(s[instance.last] - s[instance.first]))
+
+
+def GetLineNodePos(instance: MoorDynLine, i: int) -> tuple[float, ...]:
+    """Position of node i from end A, m."""
+    return tuple(instance.system.running.line(instance.name).position[instance.node(i)].tolist())
+
+
+def GetLineNodeVel(instance: MoorDynLine, i: int) -> tuple[float, ...]:
+    """Velocity of node i from end A, m/s."""
+    return tuple(instance.system.running.line(instance.name).velocity[instance.node(i)].tolist())
+
+
+def GetLineNodeTen(instance: MoorDynLine, i: int) -> tuple[float, ...]:
+    """Tension at node i from end A, as a vector towards end B, N: that of the segments beside it."""
+    state, node = instance.system.running.line(instance.name), instance.node(i)
+    chord = np.diff(state.position, axis=0)[max(node - 1, 0) : node + 1]
+    pull = (state.tension[max(node - 1, 0) : node + 1, None] * chord / np.linalg.norm(chord, axis=1)[:, None]).mean(
+        axis=0
+    )
+    return tuple((pull if instance.last >= instance.first else -pull).tolist())
+
+
+def GetLineFairTen(instance: MoorDynLine) -> float:
+    """Tension at end B, N."""
+    return float(np.linalg.norm(GetLineNodeTen(instance, GetLineN(instance))))
+
+
+def GetLineMaxTen(instance: MoorDynLine) -> float:
+    """Largest tension of the nodes of the line, N."""
+    return max(float(np.linalg.norm(GetLineNodeTen(instance, i))) for i in range(GetLineN(instance) + 1))
+
+
+def GetFASTtens(instance: MoorDyn, n_lines: int) -> tuple[list[float], ...]:
+    """Of each line the horizontal and the vertical tension at end B, then at end A, N."""
+    if n_lines != len(instance.lines):
+        raise ValueError(f"n_lines: expected {len(instance.lines)}, found {n_lines!r}")
+    out: tuple[list[float], ...] = ([], [], [], [])
+    for line in instance.lines:
+        for k, node in ((0, GetLineN(line)), (2, 0)):
+            x, y, z = GetLineNodeTen(line, node)
+            out[k].append(float(np.hypot(x, y)))
+            out[k + 1].append(abs(z))
+    return out
+
+
+def _number(k: int, count: int, name: str) -> int:
+    if not (isinstance(k, int) and 1 <= k <= count):
+        raise ValueError(f"{name}: expected a number from 1 to {count}, found {k!r}")
+    return k - 1

@@ -1,0 +1,199 @@
+"""Several lines that are stepped from outside: points are set, their forces read, step by step."""
+
+from __future__ import annotations
+
+import io
+import threading
+from collections.abc import Mapping, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from types import TracebackType
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ComputationError, SceneError
+from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.state import Floats
+from hybrid.model.driven_end import DrivenEnd
+from hybrid.scene.points import FreePoint
+from hybrid.scene.read import as_scene_or_system, scene_text
+from hybrid.scene.schema import missing_time
+from hybrid.scene.system import System
+from hybrid.simulation.stepped import CableState, one_thread, vector
+from hybrid.simulation.system_run import SystemRun
+from hybrid.solve.system_statics import LineFailed
+from hybrid.store.hdf5_file import check_target
+from hybrid.store.lock import locked
+from hybrid.store.reader import Result, open_result
+
+STILL: Floats = np.zeros(3)
+# Of a step: a step so short is round-off of the times of others.
+SLIVER = 1e-6
+
+
+class PointState(NamedTuple):
+    """Where a point is (3,) m, how fast (3,) m/s, and the force (3,) N of its lines on it; inertial."""
+
+    position: Floats
+    velocity: Floats
+    force: Floats
+
+
+class SystemSimulation:
+    """Several lines in motion that are stepped from outside; a context manager.
+
+    scene: several lines, as of `hybrid.run`; its time table gives the longest step and the duration, beyond which
+    nothing is computed.  output: the HDF5 file to write; None keeps the result in memory.  Constructing it finds the
+    equilibrium that the motion starts from.  One thread at a time.  Raises SceneError, ResultError and
+    ComputationError as `hybrid.run` does.
+    """
+
+    def __init__(self, scene: System | str | Path | Mapping[str, Any], output: str | Path | None = None, *,
+                 overwrite: bool = True) -> None:  # fmt: skip
+        found = as_scene_or_system(scene)
+        if not isinstance(found, System):
+            raise TypeError("scene: expected several lines; hybrid.Simulation steps one cable")
+        if found.time is None:
+            raise SceneError([missing_time(found)])
+        self.scene, self.lock, self._stack = found, threading.RLock(), ExitStack()
+        self._target: Path | io.BytesIO = io.BytesIO()
+        if output is not None:
+            self._target = Path(output).expanduser().resolve()
+            check_target(self._target, overwrite)
+            self._stack.enter_context(locked(self._target))
+        self._closed = False
+        try:
+            self._run = SystemRun(found, self._target, scene_text(found), moves=True)
+            self._run.begin_motion()
+        except LineFailed as failed:
+            raise self._fail(failed) from None
+        except BaseException:
+            self._stack.close()
+            raise
+        self._stops = self._run.stops()
+        self._driven: dict[str, list[DrivenEnd]] = {}
+        self._next: dict[str, tuple[Floats, Floats]] = {}
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return self._run.t
+
+    @one_thread
+    def set_point(
+        self, name: str, position: Sequence[float] | Floats, velocity: Sequence[float] | Floats | None = None
+    ) -> None:
+        """Where a fixed point is to be at the end of the next `advance`, which it reaches smoothly.
+
+        position: (3,) m, inertial; velocity: (3,) m/s there, None: at rest.  A point that is not set again stays where
+        it is.  ValueError: there is no such point, or it is free, on a body, or has a motion in the scene.
+        """
+        self._check_open()
+        if name not in self.scene.points:
+            raise ValueError(f"name: expected a point of the scene ({', '.join(self.scene.points)}), found {name!r}")
+        point = self.scene.points[name]
+        if isinstance(point, FreePoint) or self.scene.body_of(name) is not None:
+            raise ValueError(f"points.{name} is free or on a body: only fixed points are set")
+        if name not in self._driven:
+            if getattr(point, "motion", None) is not None:
+                raise ValueError(f"points.{name} has a motion in the scene: leave it out to set the point from outside")
+            model = self._run.model
+            self._driven[name] = [
+                model.models[model.names.index(line)].ends.drive(int(end == "end"))
+                for line, end in self.scene.lines_at(name)
+            ]
+        self._next[name] = vector(position, "position"), vector(STILL if velocity is None else velocity, "velocity")
+
+    @one_thread
+    def advance(self, until: float) -> float:
+        """Steps to a time `until` (s), where one ends; returns it.
+
+        ValueError: a time that has passed, or beyond the duration.  ComputationError: a step failed; the simulation is
+        over then, and its result is written.
+        """
+        self._check_open()
+        time, now = self.scene.require_time(), self.t
+        sliver = SLIVER * (time.step or time.duration)
+        number = isinstance(until, int | float | np.integer | np.floating) and not isinstance(until, bool)
+        if not number or not now + sliver < until <= time.duration + sliver:
+            raise ValueError(
+                f"until = {until!r:.60}: expected a time (s) after {now:.9g}, up to time.duration, {time.duration:g}"
+            )
+        until = min(float(until), time.duration)
+        for name, ends in self._driven.items():
+            position, velocity = self._next.pop(name, (ends[0].at(now)[0], STILL))
+            for end in ends:
+                end.set(now, until, position, velocity, STILL)
+        try:
+            while self._stops and self._stops[0] < until - sliver:
+                self._run.go_to(self._stops.pop(0))
+            if self._stops and self._stops[0] <= until + sliver:
+                self._stops.pop(0)
+            self._run.go_to(until)
+        except LineFailed as failed:
+            raise self._fail(failed) from None
+        return self.t
+
+    def _fail(self, failed: LineFailed) -> ComputationError:
+        self._closed = True
+        with self._stack:
+            return self._run.failed(failed)
+
+    @one_thread
+    def point(self, name: str) -> PointState:
+        """Where a point is, and the force of its lines on it; of a free point that force is what moves it."""
+        if name not in self.scene.points:
+            raise ValueError(f"name: expected a point of the scene ({', '.join(self.scene.points)}), found {name!r}")
+        force = np.zeros(3)
+        for line, end in self.scene.lines_at(name):
+            at_end = end == "end"
+            force += self.forces(line)[at_end]
+        state = self._run.state.lines[self._line(line)]
+        return PointState(state.r[-int(at_end)].copy(), state.v[-int(at_end)].copy(), force)
+
+    @one_thread
+    def line(self, name: str) -> CableState:
+        """Where a line is now; arrays of one's own."""
+        k = self._line(name)
+        model, x = self._run.model.models[k], self._run.state.lines[k]
+        return CableState(self.t, model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), model.zones)
+
+    @one_thread
+    def forces(self, name: str) -> tuple[Floats, Floats]:
+        """Forces (3,) N of a line on the points at its start and at its end, inertial."""
+        report = self._run.solver.work[self._line(name)].report
+        return report[FORCE_A : FORCE_A + 3].copy(), report[FORCE_A + 3 : FORCE_A + 6].copy()
+
+    def _line(self, name: str) -> int:
+        if name not in self._run.model.names:
+            raise ValueError(f"name: expected a line of the scene ({', '.join(self._run.model.names)}), found {name!r}")
+        return self._run.model.names.index(name)
+
+    def result(self) -> Result:
+        """What has been recorded until now; the simulation is over."""
+        self.close()
+        return open_result(self._target)
+
+    @one_thread
+    def close(self) -> None:
+        """Write what is left and close the file; a second call does nothing."""
+        if not self._closed:
+            self._closed = True
+            with self._stack:
+                self._run.finish("complete", f"{self._run.steps} steps, stepped from outside to t = {self.t:.6g} s")
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError("the simulation is over: its result has been written")
+
+    def __enter__(self) -> SystemSimulation:
+        return self
+
+    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, tb: TracebackType | None) -> None:
+        if kind is None:
+            self.close()
+        elif not self._closed:
+            self._closed = True
+            with self._stack:
+                self._run.finish("failed" if issubclass(kind, Exception) else "interrupted", str(error))

@@ -1,0 +1,174 @@
+"""A script for the package `moordyn` runs on hybrid: the same calls, forces on what the caller moves, wrong uses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from math import inf, nan
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.couple import moordyn
+
+DECK = Path(__file__).parents[1] / "data" / "moordyn" / "three_lines.txt"
+PLACES = [40.0, 0.0, -14.0, -20.0, 34.64, -14.0, -20.0, -34.64, -14.0]
+STILL = [0.0] * 9
+
+
+def surge(t: float) -> tuple[float, float]:
+    """Displacement (m) and velocity (m/s): from rest, without a jump of the acceleration."""
+    w, s, c = np.pi / 12.0, np.sin(np.pi * t / 12.0), np.cos(np.pi * t / 12.0)
+    return 2.0 * s**4, 8.0 * w * s**3 * c
+
+
+def on_a_body(path: Path) -> Path:
+    """The deck with its coupled points on one coupled body at (0, 0, -14)."""
+    text = DECK.read_text(encoding="utf-8")
+    for k, (x, y) in enumerate(((40, 0), (-20, 34.64), (-20, -34.64)), 4):
+        old = next(line for line in text.splitlines() if line.startswith(f"{k}    Coupled"))
+        text = text.replace(old, f"{k}  Body1  {x} {y} 0  0 0 0 0")
+    rows = [
+        "---------------------- BODIES ---", "ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG* I* Volume CdA* Ca*",
+        "(#) (word) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)",
+        "1 Coupled 0 0 -14 0 0 0 0 0 0 0 0 0",
+    ]  # fmt: skip
+    mark = "---------------------- POINTS"
+    path.write_text(text.replace(mark, "\n".join([*rows, mark])), encoding="utf-8")
+    return path
+
+
+def started(path: Path = DECK) -> moordyn.MoorDyn:
+    system = moordyn.Create(str(path))
+    x = PLACES if moordyn.NCoupledDOF(system) == 9 else [0.0, 0.0, -14.0, 0.0, 0.0, 0.0]
+    assert moordyn.Init(system, x, [0.0] * len(x)) == 0
+    return system
+
+
+def test_it_starts_from_the_equilibrium_of_the_imported_scene() -> None:
+    system = started()
+    result = hybrid.static(next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene)
+    for k in (1, 2, 3):
+        line = moordyn.GetLine(system, k)
+        end = result.lines[f"line{k}"].reaction_end[0]
+        point = moordyn.GetPoint(system, 3 + k)
+        assert moordyn.GetPointForce(point) == pytest.approx(-end, rel=1e-6, abs=1e-3)
+        assert moordyn.GetLineN(line) == moordyn.GetLineNumberNodes(line) - 1 == (20, 20, 10)[k - 1]
+        assert moordyn.GetLineNodePos(line, moordyn.GetLineN(line)) == pytest.approx(PLACES[3 * k - 3 : 3 * k])
+        assert moordyn.GetLineNodePos(line, 0) == moordyn.GetPointPos(moordyn.GetPoint(system, k))
+    assert moordyn.GetLineUnstretchedLength(moordyn.GetLine(system, 1)) == pytest.approx(815.0)
+    assert [moordyn.GetPointType(moordyn.GetPoint(system, k)) for k in (1, 4)] == [
+        moordyn.POINT_TYPE_FIXED, moordyn.POINT_TYPE_COUPLED,
+    ]  # fmt: skip
+    assert moordyn.Close(system) == 0
+
+
+def test_forces_of_a_motion_are_those_of_the_scene_that_has_it(tmp_path: Path) -> None:
+    """The caller's places and velocities at the begin of its steps; the scene's motion from a file of its own."""
+    dt, steps = 0.05, 80
+    system = moordyn.Create(str(DECK))
+    moordyn.SetDt(system, dt)
+    moordyn.Init(system, PLACES, STILL)
+    found = []
+    for k in range(steps):
+        (d0, _), (d1, _) = surge(k * dt), surge((k + 1) * dt)
+        x = [p + (d0 if i == 0 else 0.0) for i, p in enumerate(PLACES)]
+        v = [(d1 - d0) / dt if i == 0 else 0.0 for i in range(9)]
+        found.append(moordyn.Step(system, x, v, 3.0 + k * dt, dt))
+    moordyn.Close(system)
+
+    rows = "\n".join(f"{t:.4f},{40 + surge(t)[0]:.12f},0,-14" for t in np.arange(0.0, steps * dt + 0.3, 0.05))
+    (tmp_path / "surge.csv").write_text(f"t,x,y,z\n{rows}\n")
+    data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
+    data["points"]["point4"]["motion"] = {"file": str(tmp_path / "surge.csv")}
+    data |= {"time": {"duration": steps * dt, "step": dt}, "output": {"every": dt}}
+    result = hybrid.run(data)
+    pull = result["points/point4/force"][1:]
+    off = np.abs(np.array(found)[:, :3] - pull).max()
+    assert off < 0.01 * np.abs(pull).max()  # the velocities at the ends of steps differ
+    assert np.ptp(pull[:, 0]) > 0.05 * np.abs(pull[:, 0]).max()
+
+
+def test_a_coupled_body_is_its_points(tmp_path: Path) -> None:
+    body, points = started(on_a_body(tmp_path / "body.txt")), started()
+    assert moordyn.NCoupledDOF(body) == 6
+    yaw, dt = 0.002, 0.05
+    for k in range(20):
+        angle = yaw * k
+        # the caller's points go to where the body takes them, with the velocities that it gives them
+        c, s, rate = np.cos(angle + yaw), np.sin(angle + yaw), yaw / dt
+        there = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+        after = [there @ np.array([x, y, 0.0]) for x, y in ((40, 0), (-20, 34.64), (-20, -34.64))]
+        v = np.concatenate([np.cross([0, 0, rate], a) for a in after])
+        x = np.concatenate([a + np.array([0.0, 0.0, -14.0]) for a in after]) - dt * v
+        one = moordyn.Step(body, [0, 0, -14, 0, 0, angle], [0, 0, 0, 0, 0, rate], k * dt, dt)
+        three = np.array(moordyn.Step(points, x, v, k * dt, dt)).reshape(3, 3)
+        assert one[:3] == pytest.approx(three.sum(axis=0), rel=1e-6, abs=1.0)
+        moment = sum(np.cross(a, f) for a, f in zip(after, three, strict=True))
+        assert one[3:] == pytest.approx(moment, rel=1e-6, abs=1e-6 * np.abs(three).max() * 40.0)
+
+
+WRONG: list[Callable[[Any], Any]] = [
+    lambda s: moordyn.Init(s, PLACES, STILL),
+    lambda s: moordyn.Step(s, PLACES[:8], STILL, 0.0, 0.1),
+    lambda s: moordyn.Step(s, PLACES, [nan] * 9, 0.0, 0.1),
+    lambda s: moordyn.Step(s, PLACES, "abc", 0.0, 0.1),
+    lambda s: moordyn.Step(s, PLACES, STILL, 0.0, 0.0),
+    lambda s: moordyn.Step(s, PLACES, STILL, 0.0, -1.0),
+    lambda s: moordyn.Step(s, PLACES, STILL, nan, 0.1),
+    lambda s: moordyn.Step(s, PLACES, STILL, 0.0, inf),
+    lambda s: moordyn.GetLine(s, 0),
+    lambda s: moordyn.GetLine(s, 4),
+    lambda s: moordyn.GetLine(s, "1"),
+    lambda s: moordyn.GetPoint(s, 7),
+    lambda s: moordyn.GetLineNodePos(moordyn.GetLine(s, 1), 21),
+    lambda s: moordyn.GetLineNodeTen(moordyn.GetLine(s, 1), -1),
+    lambda s: moordyn.GetFASTtens(s, 2),
+    lambda s: moordyn.SetDt(s, 0.1),
+]
+
+
+def test_wrong_uses_are_errors_in_words_and_it_goes_on() -> None:
+    system = started()
+    for wrong in WRONG:
+        with pytest.raises(ValueError, match=r"\w+.*(expected|already).*"):
+            wrong(system)
+    assert len(moordyn.Step(system, PLACES, STILL, 0.0, 0.1)) == 9
+    with pytest.raises(ValueError, match="where the last step ended"):
+        moordyn.Step(system, PLACES, STILL, 0.0, 0.1)
+    assert moordyn.GetFASTtens(system, 3)[0][0] > moordyn.GetFASTtens(system, 3)[2][0] > 0.0
+    assert moordyn.GetLineFairTen(moordyn.GetLine(system, 1)) == moordyn.GetLineMaxTen(moordyn.GetLine(system, 1))
+    moordyn.Close(system)
+    for after in (lambda: moordyn.Step(system, PLACES, STILL, 0.1, 0.1), lambda: moordyn.Close(system)):
+        with pytest.raises(ValueError, match="not running"):
+            after()
+
+
+def test_a_deck_that_is_no_scene_is_refused_with_its_line() -> None:
+    with pytest.raises(hybrid.SceneError, match=r"rods_and_bodies\.txt:\d+"):
+        moordyn.Create(str(DECK.with_name("rods_and_bodies.txt")))
+
+
+def test_points_of_a_system_are_set_by_name() -> None:
+    data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
+    data |= {"time": {"duration": 1.0, "step": 0.05}}
+    with hybrid.SystemSimulation(data) as system:
+        before = system.point("point4").force
+        system.set_point("point4", [40.02, 0, -14])
+        for until in (0.3, 0.37, 1.0):
+            assert system.advance(until) == pytest.approx(until)
+        assert system.point("point4").position == pytest.approx([40.02, 0.0, -14.0])
+        assert system.point("point4").force[0] != before[0]
+        for wrong in (
+            lambda: system.set_point("anchor", [0, 0, 0]), lambda: system.set_point("point4", [0, nan, 0]),
+            lambda: system.advance(0.5), lambda: system.advance(2.0), lambda: system.line("x"),
+        ):  # fmt: skip
+            with pytest.raises(ValueError, match="expected"):
+                wrong()
+        result = system.result()
+    assert result.status == "complete"
+    assert result.lines["line1"].tension.shape[0] == result.times.size
+    with pytest.raises(ValueError, match="over"):
+        system.advance(1.0)
