@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.scene.schema import Scene, Table
+from hybrid.scene.system import System
 
 PAGE = Path(__file__).with_name("scene.md")
 
@@ -26,7 +27,8 @@ A scene is a YAML file, or the same tables in Python: `hybrid.validate_scene({..
 SI units; the inertial frame has z up; arc length s is unstretched and runs from `ends.start` to `ends.end`.
 Angles are in degrees, as people write them.
 A table that is left out is not there, and a key that does not exist is refused.
-`hybrid schema` prints the JSON schema, with which editors complete and check a scene as you type;
+`hybrid schema` (`--lines`: of several lines) prints the JSON schema, with which editors complete and check a scene as
+you type;
 `hybrid run scene.yaml --set time.step=0.005` changes a value without touching the file.
 
 This page is made from that schema by `python docs/make_scene_reference.py`.
@@ -307,9 +309,12 @@ def words(schema: dict[str, Any]) -> str:
     if "enum" in schema:
         return " or ".join(f"`{value}`" for value in schema["enum"])
     kind = schema.get("type")
+    if isinstance(schema.get("additionalProperties"), dict):
+        return f"by name: {words(schema['additionalProperties'])}"
     if kind == "array":
         if "prefixItems" in schema:
-            return f"{schema['minItems']} numbers{bounds(schema['prefixItems'][0])}"
+            first = schema["prefixItems"][0]
+            return f"{schema['minItems']} {'rows' if first.get('type') == 'array' else 'numbers'}{bounds(first)}"
         least = schema.get("minItems", 0)
         return f"list of {words(schema['items'])}" + (f", at least {least}" if least > 1 else "")
     if kind in ("number", "integer"):
@@ -381,21 +386,23 @@ def former_names() -> Iterator[str]:
 
 def page() -> str:
     """The whole page."""
-    schema = Scene.model_json_schema()
-    tables = schema.pop("$defs")
     order: list[str] = []
+    lines = [HEAD]
+    for title, schema in (("Scene", Scene.model_json_schema()), ("Several lines", System.model_json_schema())):
+        tables = schema.pop("$defs")
+        known = len(order)
 
-    def visit(name: str) -> None:
-        if name not in order:
-            order.append(name)
-            for inner in referred(tables[name]["properties"]):
-                visit(inner)
+        def visit(name: str) -> None:
+            if name not in order:
+                order.append(name)
+                for inner in referred(tables[name]["properties"]):  # noqa: B023  # called in this round only
+                    visit(inner)
 
-    for name in referred(schema["properties"]):
-        visit(name)
-    lines = [HEAD, "## Scene", "", schema["description"], "", *table(schema), ""]
-    for name in order:
-        lines += [f"### {name}", "", " ".join(tables[name]["description"].split()), "", *table(tables[name]), ""]
+        for name in referred(schema["properties"]):
+            visit(name)
+        lines += [f"## {title}", "", " ".join(schema["description"].split()), "", *table(schema), ""]
+        for name in order[known:]:
+            lines += [f"### {name}", "", " ".join(tables[name]["description"].split()), "", *table(tables[name]), ""]
     return "\n".join([*lines, *former_names(), TAIL])
 
 

@@ -245,10 +245,12 @@ def import_(
 
 
 @app.command()
-def schema() -> None:
+def schema(
+    lines: Annotated[bool, flag("--lines", help="Of a scene of several lines, with points and lines.")] = False,
+) -> None:
     """Print the JSON schema of a scene, for editors."""
     dialect = {"$schema": "https://json-schema.org/draft/2020-12/schema"}
-    print(json.dumps(dialect | hybrid.Scene.model_json_schema(), indent=2))
+    print(json.dumps(dialect | (hybrid.System if lines else hybrid.Scene).model_json_schema(), indent=2))
 
 
 def _count(n: int, what: str) -> str:

@@ -159,15 +159,18 @@ def solve_dense(A, m):
     """Solve m equations in the rows of A (m, m+1), the last column the right-hand side, where the solution is left.
 
     By elimination with row pivoting, of rows and columns scaled to a largest number of about 1; False: it is singular.
-    Columns 0 to m-1 of A's last row hold the scales of the columns; A has m+1 rows.
+    Most numbers of many lines are 0: a pivot row is subtracted where it has others, from rows that have one in its column.
+    A has m+3 rows; the last three hold the scales of the columns, and those columns and rows of a pivot.
     """
     for c in range(m):
-        big = 0.0
-        for r in range(m):
-            big = max(big, abs(A[r, c]))
-        if not 0.0 < big < math.inf:
+        A[m, c] = 0.0
+    for r in range(m):
+        for c in range(m):
+            A[m, c] = max(A[m, c], abs(A[r, c]))
+    for c in range(m):
+        if not 0.0 < A[m, c] < math.inf:
             return False
-        A[m, c] = 1.0 / big
+        A[m, c] = 1.0 / A[m, c]
     for r in range(m):
         big = 0.0
         for c in range(m):
@@ -178,20 +181,30 @@ def solve_dense(A, m):
         for c in range(m + 1):
             A[r, c] /= big
     for c in range(m):
-        best, where = abs(A[c, c]), c
+        best, where, rows, count = abs(A[c, c]), c, 0, 0
         for r in range(c + 1, m):
-            if abs(A[r, c]) > best:
-                best, where = abs(A[r, c]), r
+            size = abs(A[r, c])
+            if size > 0.0:
+                A[m + 2, rows] = r
+                rows += 1
+                if size > best:
+                    best, where = size, r
         if not best > 0.0:
             return False
         if where != c:
             for j in range(c, m + 1):
                 A[c, j], A[where, j] = A[where, j], A[c, j]
-        for r in range(c + 1, m):
+        if rows > 0:
+            for j in range(c + 1, m + 1):
+                if A[c, j] != 0.0:
+                    A[m + 1, count] = j
+                    count += 1
+        for i in range(rows):
+            r = int(A[m + 2, i])
             f = A[r, c] / A[c, c]
-            if f != 0.0:
-                for j in range(c + 1, m + 1):
-                    A[r, j] -= f * A[c, j]
+            for k in range(count):
+                j = int(A[m + 1, k])
+                A[r, j] -= f * A[c, j]
     for c in range(m - 1, -1, -1):
         y = A[c, m]
         for j in range(c + 1, m):

@@ -213,10 +213,10 @@ def solve_system(
     for a CORRECTION, else worked in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is
     slack; first: (L,) where columns (3, .., 5) of a line begin whose start is joined; bodies, old, new, work: rows of
     numbers of each body (kernels.bodies); functional: (3, FUNCTIONAL), net: (P, 3), S: (7, 8), G: (2, 3, 6) and
-    A: (m+1, m+1), m tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
+    A: (m+3, m+1), m tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
-    m, most, count, points = A.shape[0] - 1, task.limits.most, tables.shape[0], net.shape[0]
+    m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
         s = scheme(task.rho, task.before, task.dt)

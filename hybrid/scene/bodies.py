@@ -45,7 +45,7 @@ class _Diagonal:
         return core_schema.no_info_before_validator_function(self.expand, handler(source))
 
     def __get_pydantic_json_schema__(self, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
-        short = {"type": "array", "items": {"type": "number"}, "minItems": 6, "maxItems": 6}
+        short = {"type": "array", "prefixItems": [{"type": "number"}] * 6, "minItems": 6, "maxItems": 6}
         return {"anyOf": [handler(schema), short | {"description": "short for a diagonal matrix"}]}
 
     def expand(self, value: Any) -> Any:

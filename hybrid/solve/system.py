@@ -124,7 +124,7 @@ class SystemSolver:
         self._columns = np.zeros((3, max(sum(carried), 1), SIZE))
         self._functional, self.net = np.zeros((3, FUNCTIONAL)), np.zeros((points, 3))
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
-        self._matrix = np.zeros((unknowns + 1, unknowns + 1))
+        self._matrix = np.zeros((unknowns + 3, unknowns + 1))
         size = Table(blank_job()).numbers.size
         self._numbers = np.zeros((len(lines), size), np.int64)
         self._tables = [Table(blank_job(), room) for room in self._numbers]
@@ -272,7 +272,7 @@ class SystemSolver:
             work.u[:] = 0.0
             self._around(x, state, work)
         taken = self._solve(Task(JUNCTIONS, ca=ca, limits=Limits(1.0, 1.0, 1)), states, states)
-        m = self._matrix.shape[0] - 1
+        m = self._matrix.shape[1] - 1
         if taken.outcome != Outcome.OK:
             return None
         if m == 0:

@@ -55,10 +55,11 @@ def test_plan_computes_nothing_and_plot_needs_no_solver(tmp_path: Path, monkeypa
     assert "hanging.png" in out and not modules & {"numba", "scipy", "hybrid.simulation.api"}
 
 
-def test_schema_is_valid_json_schema() -> None:
-    schema = json.loads(call("schema")[0])
+@pytest.mark.parametrize("several", [False, True])
+def test_schema_is_valid_json_schema(several: bool) -> None:
+    schema = json.loads(call("schema", *["--lines"] * several)[0])
     assert schema["$schema"].startswith("https://json-schema.org/")
-    assert {"cable", "ends", "initial"} <= set(schema["required"])
+    assert ({"points", "lines"} if several else {"cable", "ends", "initial"}) <= set(schema["required"])
     assert schema["additionalProperties"] is False
 
     def check(part: object) -> None:
