@@ -1,0 +1,111 @@
+"""Give every key of a scene of several lines nonsense: it is refused in words or read, and nothing else is raised."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+
+from hybrid.errors import SceneError
+from hybrid.scene.base import dotted
+from hybrid.scene.read import as_scene_or_system
+
+SECTION = {"length": 185.0, "mass": 10.0, "diameter": 0.05, "axial_stiffness": 1e7, "bending_stiffness": 40.0}
+MOTION = {"heave": {"amplitude": 1.0, "period": 9.0}, "roll": {"amplitude": 2.0, "period": 9.0}, "ramp": 9.0}
+SCENE: dict[str, Any] = {
+    "title": "all keys",
+    "environment": {"fluid": {"density": 1025.0, "surface": 30.0}, "seabed": {"z": -101.0, "stiffness": 1e4}},
+    "points": {
+        "west": {"position": [-150.0, 0.0, -100.0]},
+        "east": {"kind": "fixed", "position": [150.0, 0.0, -100.0], "motion": {"travel": {"by": [1.0, 0.0, 0.0], "over": 9.0}}},
+        "buoy": {"kind": "free", "initial_guess": [0.0, 0.0, 5.0], "mass": 900.0, "volume": 9.0, "height": 2.0,
+                 "shape": "cylinder", "drag_area": 1.0, "added_mass": 5.0, "force": [1.0, 0.0, 0.0]},
+        "lead": {"body": "float", "place": [1.0, 0.0, -1.0]},
+        "hangoff": {"kind": "fairlead", "body": "ship", "place": [0.0, 5.0, -1.0]},
+    },
+    "bodies": {
+        "float": {"initial_guess": [60.0, 0.0, 20.0], "initial_rotation": [1.0, 2.0, 3.0], "mass": 4e3,
+                  "centre": [0.1, 0.0, -0.2], "inertia": [2e4, 3e4, 2e4], "added_mass": [1.0, 2.0, 3.0, 4.0, 5.0, 6.0],
+                  "damping": [[2.0 * (i == j) for j in range(6)] for i in range(6)], "volume": 5.0,
+                  "centre_of_buoyancy": [0.0, 0.0, 0.3], "force": {"value": [1.0, 0.0, 0.0], "until": 4.0},
+                  "moment": [0.0, 0.0, 2.0]},
+        "ship": {"position": [-60.0, 0.0, 32.0], "rotation": [0.0, 0.0, 30.0], "motion": MOTION},
+        "spar": {"initial_guess": [0.0, 80.0, 30.0], "mass": 4e3, "inertia": [2e4, 3e4, 2e4],
+                 "hydrostatics": {"level": 30.0, "heave": 1e4, "roll": 2e4, "pitch": 2e4}},
+    },
+    "lines": {
+        "one": {"start": "west", "end": "buoy", "sections": [SECTION], "model": "rod", "mesh": {"cells": 20}},
+        "two": {"start": "buoy", "end": "east", "sections": [SECTION], "attachments": [{"kind": "clump", "at": 5.0, "mass": 3.0, "volume": 0.001}]},
+        "three": {"start": "buoy", "end": "lead", "sections": [SECTION | {"length": 80.0}]},
+        "four": {"start": "lead", "end": "hangoff", "sections": [SECTION | {"length": 150.0}]},
+        "five": {"start": "buoy", "end": "mast", "sections": [SECTION | {"length": 110.0}]},
+    },
+    "time": {"duration": 10.0, "step": 0.05},
+    "output": {"every": 1.0, "points": 11},
+}  # fmt: skip
+SCENE["points"]["mast"] = {"body": "spar", "place": [0.0, 0.0, -2.0]}
+NONSENSE = (
+    "nonsense",
+    "",
+    -1.0,
+    0.0,
+    1e30,
+    1e-40,
+    float("nan"),
+    float("inf"),
+    True,
+    None,
+    [],
+    {},
+    [1.0],
+    {"kind": "x"},
+    [[]],
+)
+
+
+def places(node: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[str | int, ...]]:
+    if path:
+        yield path
+    for key, value in node.items() if isinstance(node, dict) else enumerate(node) if isinstance(node, list) else ():
+        if isinstance(key, str) or key == 1:  # one entry of a vector speaks for the others
+            yield from places(value, (*path, key))
+
+
+def changed(path: tuple[str | int, ...], value: Any) -> dict[str, Any]:
+    scene = copy.deepcopy(SCENE)
+    node: Any = scene
+    for key in path[:-1]:
+        node = node[key]
+    node[path[-1]] = value
+    return scene
+
+
+def test_the_scene_itself_is_read() -> None:
+    assert as_scene_or_system(SCENE)
+
+
+@pytest.mark.parametrize("path", list(places(SCENE)), ids=dotted)
+def test_nonsense_is_refused_in_words_or_read(path: tuple[str | int, ...]) -> None:
+    refused = 0
+    for nonsense in NONSENSE:
+        try:
+            as_scene_or_system(changed(path, nonsense))
+        except SceneError as error:
+            refused += 1
+            assert all(x.expected and x.where for x in error.complaints), str(error)
+    assert refused >= len(NONSENSE) // 3
+
+
+@pytest.mark.parametrize("path", [p for p in places(SCENE) if isinstance(p[-1], str)], ids=dotted)
+def test_a_key_that_is_left_out_is_refused_or_not_needed(path: tuple[str | int, ...]) -> None:
+    scene = copy.deepcopy(SCENE)
+    node: Any = scene
+    for key in path[:-1]:
+        node = node[key]
+    del node[path[-1]]
+    try:
+        as_scene_or_system(scene)
+    except SceneError as error:
+        assert all(x.expected and x.where for x in error.complaints), str(error)
