@@ -47,3 +47,19 @@ def test_torque_of_zones_that_move(tmp_path, turns, swing):
     assert len(mixed.events) >= 2
     assert "torque neglected" not in {event.kind for event in mixed.events}
     np.testing.assert_allclose(mixed["torque"][:].mean(axis=1), torque, atol=1e-3 * np.abs(torque).max())
+
+
+@pytest.mark.slow
+def test_no_turn_is_lost_in_sixty_motions(tmp_path):
+    """Turns and swings at random: what the clamp turns by is the link of the line, in rods, zones and between them."""
+    adaptive, random = {"kind": "adaptive", "tolerance": 0.004, "hold_time": 0.5}, np.random.default_rng(60)
+    changes = 0
+    for _ in range(60):
+        turns, swing = random.uniform(-3.0, 3.0), random.uniform(0.0, 5.0)
+        result = line(tmp_path, turns, adaptive, swing)
+        kinds = {event.kind for event in result.events}
+        changes += len(kinds & {"split", "grow", "merge", "shrink"}) > 0
+        lost = turns - result["turns/link"][result.times > 7.5]  # two at a time where it passes through itself
+        through = 2.0 * np.round(0.5 * lost) if "line meets itself" in kinds else 0.0
+        np.testing.assert_allclose(lost, through, atol=1e-6, err_msg=f"{turns} turns, swing {swing} m")
+    assert changes >= 50
