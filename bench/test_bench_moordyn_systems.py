@@ -20,6 +20,7 @@ from peers.moordyn_deck import march, options, segments
 from peers.moordyn_systems import DECKS
 
 import hybrid
+from hybrid.interop.moordyn.bodies import rotation_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
 from hybrid.scene.ends import Motion
@@ -42,11 +43,9 @@ MEAN, PEAK = 0.5, 2.0  # per cent: figures that are asked for
 
 
 def moved(deck: Deck, name: str) -> bool:
-    """Whether a point of the scene is one that the program that calls MoorDyn moves."""
-    point = deck.points[int(name.removeprefix("point"))] if name.startswith("point") else None
-    if point is None:
-        return False
-    return point.kind == "coupled" or (point.kind == "body" and deck.bodies[point.on].kind == "coupled")
+    """Whether a point or body of the scene is one that the program that calls MoorDyn moves."""
+    things: dict[int, Any] = deck.bodies if name.startswith("body") else deck.points
+    return things[int(name.removeprefix("body").removeprefix("point"))].kind == "coupled"
 
 
 def ours(path: Path, deck: Deck, points: tuple[int, ...], factor: int) -> tuple[Vector, Vector]:
@@ -63,9 +62,9 @@ def ours(path: Path, deck: Deck, points: tuple[int, ...], factor: int) -> tuple[
             }
     still = hybrid.static(dict(data))
     rest = np.array([np.linalg.norm(still[f"points/point{k}/force"][-1]) for k in points])
-    for name, point in data["points"].items():
-        if moved(deck, name):
-            point["motion"] = MOTION
+    for name, thing in (data["points"] | data["bodies"]).items():
+        if thing["kind"] == "fixed" and moved(deck, name):
+            thing["motion"] = MOTION
     data |= {"time": {"duration": DURATION, "step": 0.05}, "output": {"every": EVERY}}
     result = hybrid.run(data)
     return rest, np.array([np.linalg.norm(result[f"points/point{k}/force"], axis=1) for k in points])
@@ -93,6 +92,68 @@ def theirs(
     seen = march(text, motion(False), DURATION, EVERY, 2 * step)
     pull = np.array([np.linalg.norm(seen.forces[k], axis=1) for k in points])
     return here, pull
+
+
+# A submerged buoy, turned at first, its centre of mass below its origin, on three lines of unequal length.
+BUOY = """\
+--- LINE TYPES ---
+TypeName Diam Mass/m EA BA EI Cd Ca CdAx CaAx
+(-) (m) (kg/m) (N) (N-s) (N-m^2) (-) (-) (-) (-)
+chain 0.08 30 5.0e7 -0.8 0 1.2 1.0 0.1 0.0
+--- BODIES ---
+ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG I Volume CdA Ca
+(#) (-) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)
+1 Free 3 -2 -40 8 -5 12 3.0e4 0.1|0.2|-0.8 2.0e5|3.0e5|2.5e5 60 30|300000 1.0
+--- POINTS ---
+ID Attachment X Y Z M V CdA Ca
+(#) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)
+1 Coupled 80 0 -100 0 0 0 0
+2 Coupled -50 75 -100 0 0 0 0
+3 Coupled -40 -70 -100 0 0 0 0
+4 Body1 3 0 -0.5 0 0 0 0
+5 Body1 -1.5 2.6 -0.5 0 0 0 0
+6 Body1 -1.5 -2.6 -0.5 0 0 0 0
+--- LINES ---
+ID LineType AttachA AttachB UnstrLen NumSegs Outputs
+(#) (-) (-) (-) (m) (-) (-)
+1 chain 1 4 98 20 -
+2 chain 2 5 104 20 -
+3 chain 3 6 100 20 -
+--- OPTIONS ---
+100 WtrDpth
+--- need this line ---
+"""
+
+
+def test_a_free_body_comes_to_rest_as_in_moordyn(tmp_path: Path) -> None:
+    """Place, turning and pull on the anchors."""
+    moordyn = pytest.importorskip("moordyn")
+    path = tmp_path / "buoy.txt"
+    path.write_text(BUOY)
+    (made,) = hybrid.import_moordyn(path).scenes.values()
+    result = hybrid.static(made.scene)
+    text = options(BUOY, dtM=1e-3, tScheme="RK4", disableOutput=1, disableOutTime=1, writeLog=0, TmaxIC=120)
+    path.write_text(text)
+    held = [80.0, 0.0, -100.0, -50.0, 75.0, -100.0, -40.0, -70.0, -100.0]
+    place, pulls = np.zeros(6), np.zeros(3)  # means of the last 100 s
+    system = moordyn.Create(str(path))
+    try:
+        assert moordyn.Init(system, held, [0.0] * 9) == 0
+        for i in range(4000):
+            moordyn.Step(system, held, [0.0] * 9, 0.05 * i, 0.05)
+            if i >= 2000:
+                place += np.array(moordyn.GetBodyState(moordyn.GetBody(system, 1))[0][:6]) / 2000
+                pulls += [np.linalg.norm(moordyn.GetPointForce(moordyn.GetPoint(system, k))) / 2000 for k in (1, 2, 3)]
+    finally:
+        moordyn.Close(system)
+    ours = np.concatenate([result["bodies/body1/position"][-1], result["bodies/body1/rotation"][-1]])
+    turned = rotation_of(tuple(np.degrees(place[3:])))
+    print(f"\nplace and turning: {ours.round(3)}, MoorDyn {place[:3].round(3)} {np.round(turned, 3)}")
+    for k, there in enumerate(pulls, 1):
+        here = np.linalg.norm(result[f"points/point{k}/force"][-1])
+        print(f"| buoy point {k} | {here:.1f} | {100 * (there / here - 1):+.3f} % |")
+        assert abs(there / here - 1) <= 0.005
+    assert np.abs(ours[:3] - place[:3]).max() <= 0.02 and np.abs(ours[3:] - turned).max() <= 0.02
 
 
 # A scene, the points and ends whose pull is compared, and the time it takes MoorDyn to come to rest, s.

@@ -10,6 +10,9 @@ from moordyn_decks import DECKS, FOLDER, one_scene, text_of
 
 import hybrid
 from hybrid.interop.moordyn import import_moordyn
+from hybrid.interop.moordyn.bodies import angles_of, rotation_of
+from hybrid.interop.moordyn.cables import _rotated
+from hybrid.scene.bodies import turned
 from hybrid.scene.points import FixedPoint, FreePoint
 from hybrid.scene.read import parse_either
 from hybrid.scene.system import System
@@ -121,8 +124,9 @@ def test_a_force_on_a_point_of_version_1(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("old", "new", "line", "says"),
     [
-        ("3 Body1 0 0 0 0", "3 Body1 1 0 0 0", 10, "a rigid body that lines move"),
-        ("29.5 0 0.1", "29.5 0|0|1 0.1", 10, "a rigid body that lines move"),
+        ("29.5 0 0.1", "29.5 0|0|1 0", 10, "without mass or moments of inertia"),
+        ("29.5 0 0.1", "29.5 0|0|1 any", 10, "are not all numbers"),
+        ("1 Free 450", "1 Pinned 450", 10, "that a deck pins"),
         ("290 0 -215 0 -", "291 0 -215 3 -", 15, "a rigid rod that moves"),
         ("4 Coupled", "4 Turbine1", 22, "FAST.Farm"),
         ("rope 0.12 25 5.0e5", "rope 0.12 25 stretch.dat", 26, "EA is not one number"),
@@ -156,3 +160,23 @@ def test_a_point_that_has_a_volume_and_no_mass_lifts_its_line(tmp_path: Path) ->
     wet = (line.mass - rho * math.pi / 4 * line.diameter**2) * g * line.length
     lift = found["points/point1/force"][-1]
     assert lift[2] == pytest.approx(rho * g * 0.5 - wet, rel=1e-9)
+
+
+def test_a_free_body_has_its_mass_inertia_and_buoyancy(tmp_path: Path) -> None:
+    """Its centre of buoyancy is its centre of mass, as measured with MoorDyn 2.7."""
+    text = RISER.replace("3 Body1 0 0 0 0", "3 Body1 1 0 0.5 0").replace("29.5 0 0.1", "29.5 -2 0.1|0.2|0.3")
+    made = one_scene(text, tmp_path)
+    body, point = made.scene.bodies["body1"], made.scene.points["point3"]
+    assert (body.mass, body.centre, body.inertia) == (29.5, (0.0, 0.0, -2.0), (0.1, 0.2, 0.3))
+    assert (body.volume, body.centre_of_buoyancy) == (0.014, (0.0, 0.0, -2.0))
+    assert body.initial_rotation == pytest.approx((0.0, 0.0, 30.0))
+    assert [body.added_mass[i][i] for i in range(6)] == pytest.approx([1025.0 * 0.014] * 3 + [0.0] * 3)
+    assert (point.body, point.place) == ("body1", (1.0, 0.0, 0.5))
+    assert [n.line for n in made.notes if "CdA" in n.why] == [10]
+
+
+@pytest.mark.parametrize("angles", [(30.0, 40.0, 50.0), (-8.0, 3.0, 170.0), (0.0, 90.0, 20.0)])
+def test_angles_of_a_deck_are_rotations_of_a_scene_and_back(angles: tuple[float, float, float]) -> None:
+    for v in ((1.0, 2.0, 3.0), (-1.0, 0.0, 0.5)):
+        assert turned(rotation_of(angles), v) == pytest.approx(_rotated(angles, v))
+        assert _rotated(angles_of(rotation_of(angles)), v) == pytest.approx(_rotated(angles, v))

@@ -13,7 +13,7 @@ from test_moordyn_systems import RISER
 import hybrid
 from hybrid.interop.moordyn import export_moordyn, import_moordyn
 from hybrid.interop.moordyn.writer import deck_of
-from hybrid.scene.read import scene_text
+from hybrid.scene.read import parse_either, scene_text
 from hybrid.scene.system import System
 
 
@@ -25,6 +25,14 @@ class Straight:
         self.lines: dict[str, Any] = {}
         if isinstance(scene, System):
             self.lines = {name: Straight(scene.scene_of(name)) for name in scene.lines}
+            self._arrays = {}
+            for name, body in scene.bodies.items():
+                place = body.position if body.kind == "fixed" else body.initial_guess
+                rotation = body.rotation if body.kind == "fixed" else body.initial_rotation
+                self._arrays |= {
+                    f"bodies/{name}/position": np.array([place]),
+                    f"bodies/{name}/rotation": np.array([rotation]),
+                }
             return
         mesh, length = scene.mesh, scene.cable.length
         places = [*(scene.ends.held() | scene.ends.initial_guesses()).values()]
@@ -76,6 +84,22 @@ def test_a_riser_with_joints_comes_back(tmp_path: Path) -> None:
     assert (point.mass, point.volume, point.drag_area) == (body.mass, body.volume, body.drag_area)
     assert point.added_mass == pytest.approx(body.added_mass)
     assert again.environment == scene.environment
+
+
+def test_bodies_come_back(tmp_path: Path) -> None:
+    text = RISER.replace("3 Body1 0 0 0 0", "3 Body1 1 0 0.5 0").replace("29.5 0 0.1", "29.5 -2 0.1|0.2|0.3")
+    scene = one_scene(text.replace("0 0 30 29.5", "10 -20 30 29.5"), tmp_path).scene
+    again = back(scene, tmp_path)
+    a, b = scene.bodies["body1"], again.bodies["body1"]
+    assert (a.mass, a.centre, a.inertia, a.volume) == (b.mass, b.centre, b.inertia, b.volume)
+    assert b.initial_guess == a.initial_guess and b.initial_rotation == pytest.approx(a.initial_rotation)
+    assert b.centre_of_buoyancy == a.centre_of_buoyancy and b.added_mass[1] == pytest.approx(a.added_mass[1])
+    given = scene.model_dump(mode="json", exclude_none=True)
+    given["bodies"]["body1"]["hydrostatics"] = {"heave": 10}
+    del given["bodies"]["body1"]["volume"], given["bodies"]["body1"]["centre_of_buoyancy"]
+    other, _ = parse_either(scene_text(System.model_validate(given)))
+    with pytest.raises(hybrid.SceneError, match=r"bodies.body1.hydrostatics"):
+        deck_of(Straight(other))
 
 
 def test_a_cable_with_a_clump_comes_back(tmp_path: Path) -> None:

@@ -3,7 +3,7 @@
 MoorDyn                              hybrid                because
 Fixed, Coupled points                fixed points          held; a deck does not say how a vessel moves
 Free points; M, V, CdA, Ca rho V     free points           as they are; initial_guess is their place in the deck
-points and rods on bodies            fixed points          where the deck puts the body, which is not free
+points and rods on bodies            fairleads             bodies as in bodies.py
 points on a Free body, all at its    one free point        the body's moments of inertia then do nothing
 reference point, its centre there
 free rods without length             sections of one line  the rod hands on the moment of one line to the other
@@ -20,9 +20,10 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.bodies import body_table
 from hybrid.interop.moordyn.cables import chain_of, end_of, next_line
 from hybrid.interop.moordyn.deck import Body, Deck, Line, Point
-from hybrid.interop.moordyn.notes import TAKEN, Note, in_order, note
+from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, in_order, note
 from hybrid.interop.moordyn.rows import Row, number, show
 from hybrid.interop.moordyn.scenes import ImportedScene
 from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
@@ -53,6 +54,7 @@ class _SystemMaker(Tables):
     def __init__(self, deck: Deck) -> None:
         super().__init__(deck, [deck.types[line.type] for line in deck.lines.values()])
         self.points: dict[str, tuple[dict[str, Any], Row]] = {}  # by name, with its row
+        self.bodies: dict[str, tuple[dict[str, Any], Row]] = {}
         self.chains: dict[str, list[tuple[Line, bool]]] = {}
         self.complaints: list[Complaint] = []
 
@@ -60,6 +62,7 @@ class _SystemMaker(Tables):
         name = show(Path(self.deck.file).name) or "deck"
         lines = self._lines()
         points = [f"  {key}: {flow(data)}{lines_of([row.line])}" for key, (data, row) in self.points.items()]
+        bodies = [f"  {key}: {flow(data)}{lines_of([row.line])}" for key, (data, row) in self.bodies.items()]
         bends = [kind.ei > 0.0 for kind in self.types]
         parts = [
             f"# From the MoorDyn deck {name}, by `hybrid import`.",
@@ -68,6 +71,7 @@ class _SystemMaker(Tables):
             *self._environment(),
             "points:",
             *points,
+            *(["bodies:", *bodies] if bodies else []),
             "lines:",
             *lines,
             "# A deck gives neither the motion of the points nor the duration: add points.*.motion and, for motion,",
@@ -79,9 +83,11 @@ class _SystemMaker(Tables):
     def of_deck(self, complaint: Complaint) -> Complaint:
         """A complaint about the scene, as one about the row of the deck that it is of."""
         line = min(x.row.line for x in self.deck.lines.values())
-        for kind, name in re.findall(r"(points|lines)\.([\w+]+)", complaint.where):
+        for kind, name in re.findall(r"(points|bodies|lines)\.([\w+]+)", complaint.where):
             if kind == "points" and name in self.points:
                 line = self.points[name][1].line
+            elif kind == "bodies" and name in self.bodies:
+                line = self.bodies[name][1].line
             elif kind == "lines" and name in self.chains:
                 line = self.chains[name][0][0].row.line
         return replace(complaint, where=f"as a scene: {complaint.where}", line=line, column=None)
@@ -159,15 +165,38 @@ class _SystemMaker(Tables):
         thing = self.deck.points[id] if kind == "point" else self.deck.rods[id]
         if isinstance(thing, Point) and thing.kind == "free":
             return self._free(thing)
+        if thing.kind == "body":
+            return self._fairlead(self.deck.bodies[thing.on], end)
         held = end_of(self.deck, end)
-        body = self.deck.bodies.get(thing.on) if thing.kind.startswith("body") else None
         if held.lost is not None:
             self._refuse(row, f"{held.lost.text}: {held.lost.why}", held.lost.instead)
-        elif body is not None and (body.kind == "free" or "pinned" in body.kind):
-            self._refuse(body.row, "a rigid body that lines move", "write Fixed or Coupled and its place at rest")
         else:
             self.notes += [replace(n, instead=n.instead.replace("ends.{end}", f"points.{name}")) for n in held.notes]
         return {"position": held.place}
+
+    def _fairlead(self, body: Body, end: tuple[str, int, str]) -> dict[str, Any]:
+        kind, id, letter = end
+        name = f"body{body.id}"
+        if name not in self.bodies:
+            self.bodies[name] = (self._body(body, name), body.row)
+        if kind == "point":
+            return {"kind": "fairlead", "body": name, "place": self.deck.points[id].place}
+        rod = self.deck.rods[id]
+        return {"kind": "fairlead", "body": name, "place": rod.a if letter == "A" or rod.segments == 0 else rod.b}
+
+    def _body(self, body: Body, name: str) -> dict[str, Any]:
+        made = body_table(body, self.options.density)
+        if isinstance(made, str) or (body.kind == "free" and any(rod.on == body.id for rod in self.deck.rods.values())):
+            why = made if isinstance(made, str) else "a free rigid body with rods, whose mass and drag it has"
+            self._refuse(body.row, why, "write Fixed or Coupled and its place at rest")
+            return {}
+        found, lost = made
+        if body.kind == "coupled":
+            why = "the calling program of MoorDyn moves this body; a deck does not say how, and the scene holds it"
+            instead = f"give bodies.{name}.motion: harmonics, a file, or a vessel with its RAOs"
+            self.notes.append(note(TAKEN, body.row, why, instead))
+        self.notes += [note(LEFT_OUT, body.row, why, "give `damping`, about its mean motion") for why in lost]
+        return found
 
     def _free(self, point: Point) -> dict[str, Any]:
         found: dict[str, Any] = {"initial_guess": point.place}

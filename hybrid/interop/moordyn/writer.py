@@ -5,6 +5,7 @@ section                                 line type; BA = damping.stiffness EA
 where sections of a line meet           Free point; Free rod without length where both bend
 clump, float, free point, body          Free point with M, V, CdA, Ca = added_mass / (rho V)
 fixed point, pinned end                 Fixed point, Coupled if it moves
+body, fairlead                          body, point on it
 clamped end of a line that bends        Fixed or Coupled rod without length, along the tangent
 surface                                 z = 0: all heights are shifted
 seabed.stiffness, .damping              kBot, cBot, per diameter of the thickest line
@@ -19,6 +20,7 @@ from itertools import accumulate, pairwise
 from typing import Any, Protocol
 
 from hybrid.errors import Complaint, SceneError
+from hybrid.interop.moordyn.bodies import body_row
 from hybrid.interop.moordyn.tables import NEAR
 from hybrid.scene.cable import Section
 from hybrid.scene.read import parse_either
@@ -39,6 +41,10 @@ _RODS = (
     "--- ROD TYPES ---\nTypeName Diam Mass/m Cd Ca CdEnd CaEnd\n(-) (m) (kg/m) (-) (-) (-) (-)\njoint 0.01 1 0 0 0 0\n"
     "--- RODS ---\nID RodType Attachment Xa Ya Za Xb Yb Zb NumSegs Outputs\n"
     "(#) (-) (-) (m) (m) (m) (m) (m) (m) (-) (-)\n"
+)
+_BODIES = (
+    "--- BODIES ---\nID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG I Volume CdA Ca\n"
+    "(#) (-) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)\n"
 )
 _POINTS = "--- POINTS ---\nID Attachment X Y Z M V CdA Ca\n(#) (-) (m) (m) (m) (kg) (m^3) (m^2) (-)\n"
 _LINES = "--- LINES ---\nID LineType AttachA AttachB UnstrLen NumSegs Outputs\n(#) (-) (-) (-) (m) (-) (-)\n"
@@ -94,6 +100,10 @@ def deck_of(result: Computed) -> WrittenDeck:
     scene, _ = parse_either(result.scene_text)
     shapes = {name: _shape(line) for name, line in result.lines.items()} or {"": _shape(result)}
     writer = _Writer(scene, shapes)
+    if not isinstance(scene, Scene):
+        for name in scene.bodies:
+            place, turned = (result[f"bodies/{name}/{key}"][0].tolist() for key in ("position", "rotation"))
+            writer.add_body(name, place, turned)
     text = writer.text()
     if writer.complaints:
         raise SceneError(list(dict.fromkeys(writer.complaints)), scene.title)
@@ -127,6 +137,7 @@ class _Writer:
     scene: Any
     shapes: dict[str, _Shape]
     types: dict[tuple[float, ...], str] = field(default_factory=dict)
+    bodies: dict[str, str] = field(default_factory=dict)  # rows by name
     rods: list[str] = field(default_factory=list)
     points: list[str] = field(default_factory=list)
     lines: list[str] = field(default_factory=list)
@@ -153,12 +164,15 @@ class _Writer:
         else:
             self._system()
         types = "".join(f"{name} {' '.join(map(_number, values))}\n" for values, name in self.types.items())
+        numbered = "".join(f"{i} {row}\n" for i, row in enumerate(self.bodies.values(), 1))
+        bodies = _BODIES + numbered if self.bodies else ""
         rods = _RODS + "".join(f"{i} {row}\n" for i, row in enumerate(self.rods, 1)) if self.rods else ""
         points = _POINTS + "".join(f"{i} {row}\n" for i, row in enumerate(self.points, 1))
         lines = _LINES + "".join(f"{i} {row} -\n" for i, row in enumerate(self.lines, 1))
         options = "--- OPTIONS ---\n" + "".join(f"{_number(v)} {k}\n" for k, v in self._options()) + "RK4 tScheme\n"
         title = f"{' '.join(self.scene.title.split()) or 'a scene of hybrid'}\n".replace("---", "-")
-        return f"{title}{'; '.join(self.names)}\n{_TOP}{types}{rods}{points}{lines}{options}--- need this line ---\n"
+        tables = f"{_TOP}{types}{bodies}{rods}{points}{lines}{options}"
+        return f"{title}{'; '.join(self.names)}\n{tables}--- need this line ---\n"
 
     # --- what surrounds ------------------------------------------------------------------------
 
@@ -296,6 +310,15 @@ class _Writer:
         if section.damping is not None and section.damping.stiffness:
             self.steps.append(DAMPED * section.mass * l * l / (section.damping.stiffness * section.axial_stiffness))
 
+    def add_body(self, name: str, place: Triple, rotation: Triple) -> None:
+        """A body of the scene, at its place (m) and rotation (deg)."""
+        row, wrong = body_row(self.scene.bodies[name], place, rotation, self.density, self.surface)
+        self.bodies[name] = row
+        self.names.append(f"body {len(self.bodies)}: {name}")
+        for key in wrong:
+            expected = "nothing that a body of MoorDyn has not"
+            self._refuse(f"bodies.{name}.{key}", key, expected, "leave it out, for a comparison")
+
     # --- points --------------------------------------------------------------------------------
 
     def _moved(self, place: Iterable[float]) -> Triple:
@@ -320,8 +343,9 @@ class _Writer:
         elif point.kind == "free":
             made = self._loose(f"points.{name}", point.end, shape.at(0.0 if end == "start" else shape.s[-1]))
         else:
-            self._refuse(f"points.{name}", point.kind, "a fixed or a free point", "write it as one of these")
-            return "0"
+            row = (*point.place, 0.0, 0.0, 0.0, 0.0)
+            self.points.append(f"Body{1 + list(self.bodies).index(point.body)} {' '.join(map(_number, row))}")
+            made = str(len(self.points))
         self.names.append(f"point {made}: {name}")
         return made
 
