@@ -98,6 +98,7 @@ EVENTS_BY_WEIGHT = (
     "accuracy missed",
     "no error figure",
     "error uncertain",
+    "several equilibria",
     "not converged",
     "largest force uncertain",
     "windows uncertain",

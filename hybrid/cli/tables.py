@@ -151,7 +151,7 @@ def errors_facts(result: Result) -> dict[str, Any]:
     if found and "accuracy_asked" in result.attributes:
         kinds = {event.kind for event in result.events}
         uncertain = "error uncertain", "largest force uncertain", "windows uncertain", "model error not estimated"
-        known = not kinds & {*uncertain, "implausible"}
+        known = not kinds & {*uncertain, "several equilibria", "implausible"}
         found["met"] = "accuracy missed" not in kinds and (known or None)
     return found
 

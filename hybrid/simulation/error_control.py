@@ -112,7 +112,7 @@ class ErrorController:
         regular = found is not None and not self.irregular  # the other is judged otherwise
         own = [*self.choice.notes, *self._notes, *self._irregular_note()]
         own += not_converged(found.not_converged, self.asked) if found is not None and regular else []
-        return (*own, *((*found.run.notes, *found.notes) if found is not None else ()))
+        return (*own, *((*found.several_equilibria, *found.run.notes, *found.notes) if found is not None else ()))
 
     def _irregular_note(self) -> list[tuple[str, str]]:
         """What is judged of an irregular motion, and how far the result may be off in what is not."""

@@ -24,6 +24,7 @@ from hybrid.simulation.error_order import (
     magnitude,
     order,
     squares,
+    start_change,
 )
 from hybrid.simulation.run_sample import (
     END_FORCES,
@@ -42,6 +43,9 @@ from hybrid.store.named_arrays import Tree, matched
 # Errors by mesh and time step add with their signs, as in the difference of two runs that they follow from; the sum is
 # this much larger, and this part of it is that of their sizes.  docs/accuracy.md has what it has been worth.
 SAFETY, OF_SIZES = 1.2, 0.2
+# Equilibria whose positions differ by more than this part of what those of coarser cells differed by, and of the
+# largest coordinate, are different solutions; and the event that says so.
+OTHER_SOLUTION, VISIBLE, SEVERAL = 0.75, 2e-3, "several equilibria"
 # A quantity that finer runs change by more than this part of what coarser ones did does not converge; unless it is by
 # less than a part of its largest value that nobody asks for.
 NOT_CONVERGED, NOTHING = 0.9, 0.005
@@ -124,6 +128,7 @@ class Estimate:
         self.order = {name: order(max(found.mean, found.largest), self.orders) for name, found in fall.items()}
         # Root mean square of the last change of each output, and of that before.
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
+        self.start = start_change(result, coarse), start_change(coarse, coarsest)
         self.set_model_errors(coarse)
         slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
         self._coarse, self._rough = coarse, rough if slower else None
@@ -201,6 +206,7 @@ class Estimate:
         """A finer run has become the result."""
         by_step, by_mesh = self._keep()
         before, self.run = self.run, result
+        self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         other_zones = result.resolution.zones != before.resolution.zones
         for name, p in self.order.items():
@@ -229,6 +235,19 @@ class Estimate:
                 if last > NOTHING * most:
                     found[END_FORCES.get(name, name)] = last / before
         return found
+
+    @property
+    def several_equilibria(self) -> Notes:
+        """The event that says so where equilibria of other meshes are other solutions: finer cells change no less."""
+        last, before = self.start
+        size = float(np.abs(np.asarray(self.run.values["position"][:1])).max()) if last > 0.0 else 0.0
+        if not (last > OTHER_SOLUTION * before and last > VISIBLE * size):
+            return ()
+        text = (
+            f"equilibria of two meshes are {last:.3g} m apart, those of coarser cells {before:.3g} m: they are "
+            "different solutions, and which is found depends on the mesh; initial.points near one of them choose it"
+        )
+        return ((SEVERAL, text),)
 
     def _model_error(self, quantity: str, a: int, b: int) -> np.ndarray | None:
         """Errors of neglecting bending: what a corrected run says of itself, else those of a coarser run."""
@@ -295,6 +314,7 @@ class Estimate:
             "order": self.order,
             "falls": self.falls,
             "changes": changes,
+            "start": np.array(self.start),
             "late": by_step,
             "cells": by_mesh,
             "model": model,
@@ -309,6 +329,9 @@ class Estimate:
         self.run, self.notes = restored_sample(tree["run"], scene, shape), restored_notes(tree["notes"])
         self.order = matched(tree["order"], dict.fromkeys(tree["order"], 1.0), "order")
         self.falls = matched(tree["falls"], dict.fromkeys(tree["order"], np.nan), "falls")
+        unseen = np.full(2, np.nan)  # of checkpoints that do not have it
+        start = matched([tree.get("start", unseen)], [unseen], "start")[0]
+        self.start = float(start[0]), float(start[1])
         unknown = dict.fromkeys(tree["order"], np.full(2, np.nan))  # of checkpoints that do not have them
         changes = matched(tree.get("changes", unknown), unknown, "changes")
         self.changes = {name: (float(x[0]), float(x[1])) for name, x in changes.items()}

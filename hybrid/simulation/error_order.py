@@ -50,6 +50,13 @@ def order(found: float, bounds: tuple[float, float]) -> float:
     return ORDER if np.isnan(found) else float(np.clip(-np.log(found) / np.log(COARSER), *bounds))
 
 
+def start_change(fine: RunSample, coarse: RunSample | None) -> float:
+    """Largest distance, m, of positions at the first output of two runs, which an equilibrium most often is."""
+    if coarse is None or "position" not in fine.values or "position" not in coarse.values:
+        return np.nan
+    return float(magnitude(np.asarray(fine.values["position"][:1]) - coarse.values["position"][:1], "position").max())
+
+
 def squares(x: np.ndarray) -> float:
     """Sum of all squares; numpy's norm wakes the threads of BLAS, which takes a hundred times as long."""
     return float((x * x).sum())
