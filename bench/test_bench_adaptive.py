@@ -395,6 +395,7 @@ def crane() -> Text:
 def snapping(tolerance: float) -> Text:
     """An elastic tether that goes slack within a fraction of a dwell time, again and again."""
     section = {"length": 60, "mass": 1.5, "bending_stiffness": 50, "axial_stiffness": 1e5, "diameter": 0.03} | WET
+    section |= {"max_strain": 0.2}  # it snaps
     surge = {"surge": {"amplitude": 5, "period": 6}, "ramp": 6}
     one, two = ({"kind": "pinned", "position": x} for x in ([0, 0, 0], [56, 0, -3]))
     return limit(section, one, two | {"motion": surge}, tolerance, 20, 0.02, environment=WATER)

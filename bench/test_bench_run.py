@@ -15,10 +15,15 @@ from pathlib import Path
 from statistics import median
 from typing import Any
 
+import numpy as np
 import pytest
 
 import hybrid
+from hybrid.model.build import build
+from hybrid.model.plane import planar, untwist
 from hybrid.solve.run import CompiledRun
+from hybrid.solve.statics import solve_statics
+from hybrid.solve.stepper import Stepper
 
 pytestmark = pytest.mark.bench
 EXAMPLES = Path(__file__).parents[1] / "examples"
@@ -110,6 +115,52 @@ def test_part_inside_kernels(cells: int, tmp_path: Path, kernel_time: list[float
     print(f"{cells} cells: {100 * median(parts):.0f} % inside the compiled run")
 
 
+def test_ten_thousand_cells(tmp_path: Path) -> None:
+    """A cell and iteration of a run, outputs, extremes and file included, against the bare solver's on the same line."""
+
+    def of_duration(duration: float) -> hybrid.Scene:
+        return touchdown("catenary", 0.2, "mesh={cells: 10000}", f"time={{duration: {duration}, step: 0.1}}")
+
+    def spent(scene: hybrid.Scene) -> tuple[float, int]:
+        begin = time.process_time()
+        with hybrid.run(scene, tmp_path / "run.h5") as result:
+            iterations = int(result.steps["iterations"].sum())
+        return time.process_time() - begin, iterations
+
+    def bare(steps: int) -> tuple[float, int]:
+        new, old, iterations = start.copy(), start.copy(), 0
+        begin = time.process_time()
+        for k in range(1, steps + 1):
+            taken = stepper.step(model.sea.at(0.1 * k), model.ends.at(0.1 * k), old, new, 0.1, 0.1, 0.1 * k)
+            assert taken.outcome == hybrid.Outcome.OK, taken
+            iterations += taken.iterations
+            old, new = new, old
+        return time.process_time() - begin, iterations
+
+    scenes = of_duration(4.0), of_duration(12.0)
+    model = build(scenes[1])
+    sea, ends = model.sea.at(0.0), model.ends.at(0.0)
+    start = solve_statics(
+        model.line, sea, ends, model.start, model.length, model.tension_scale, others=model.other_starts
+    ).state
+    assert model.plane is not None
+    line = planar(model.line, model.plane)
+    untwist(line, ends, model.cable.held_tangent, start)
+    stepper = Stepper(line, model.length, model.tension_scale)
+    stepper.consistent_accelerations(sea, ends, np.zeros((2, 3)), start)
+    spent(scenes[0])
+    each: dict[str, list[float]] = {"run": [], "bare": []}
+    for _ in range(RUNS):
+        (short, few), (long, many) = spent(scenes[0]), spent(scenes[1])
+        each["run"].append((long - short) / (many - few))
+        (short, few), (long, many) = bare(40), bare(120)
+        each["bare"].append((long - short) / (many - few))
+    run, alone = (median(x) / 10_000 for x in each.values())
+    print(
+        f"10 000 cells: {1e6 * run:.4f} us a cell and iteration of a run, {1e6 * alone:.4f} us bare: {run / alone:.2f}"
+    )
+
+
 def test_cost_of_an_output(tmp_path: Path) -> None:
     """By two numbers of outputs of the same steps."""
     for model in ("catenary", "rod"):
@@ -120,12 +171,24 @@ def test_cost_of_an_output(tmp_path: Path) -> None:
 
 
 def test_before_the_first_step(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Model, equilibrium, file and first output of `hybrid.run` in a warm process."""
+    """Scene, model, equilibrium, file and first output of `hybrid.run` in a warm process; and all that is not steps."""
     from hybrid.simulation.time_loop import TimeLoop
 
-    monkeypatch.setattr(TimeLoop, "to_the_end", lambda self, *_: None)
+    begin, before = 0.0, list[float]()
+    monkeypatch.setattr(TimeLoop, "to_the_end", lambda self, *_: before.append(time.process_time() - begin))
+
+    def run(model: str) -> None:
+        nonlocal begin
+        scene = touchdown(model)
+        begin = time.process_time()
+        hybrid.run(scene, tmp_path / "r.h5").close()
+
     for model in ("catenary", "rod"):
-        print(f"{model}: {1e3 * cpu(lambda m=model: hybrid.run(touchdown(m), tmp_path / 'r.h5').close()):.1f} ms")
+        before.clear()
+        whole = cpu(lambda m=model: run(m))
+        first = median(before[1:])
+        print(f"{model}: {1e3 * first:.1f} ms before the first step; {1e3 * whole:.1f} ms with reading the scene,")
+        print("    closing the file and opening its result")
 
 
 def test_stepping_from_outside() -> None:

@@ -12,10 +12,15 @@ three periods against what MoorDyn with 800 and CableDyn with 400 elements agree
 from __future__ import annotations
 
 import functools
+import time
+from pathlib import Path
 from statistics import median
 
 import pytest
+from peers.hybrid_touchdown import answered, described
 from peers.measure import FINE, HEAD, LEAN, LOOSE, LOW, PEERS, elsewhere, row
+
+import hybrid
 
 pytestmark = pytest.mark.bench
 ROUNDS = 3
@@ -86,3 +91,46 @@ def test_speed(ours, theirs, times):
     ]
     print(f"\n{ours} against {theirs}: {b['loop'] / a['loop']:.1f} times faster; {', '.join(words)}")
     assert b["loop"] / a["loop"] >= times
+
+
+# EI, cells and step of ours; how many times faster than CableDyn's loop the run shall be, without and with errors.
+RUNS_ASKED = {
+    "catenary": (0.0, 60, 0.25, (), 12.0, 6.0),
+    "catenary, same mesh and step": (0.0, 100, 0.1, (), 12.0, 6.0),
+    "rod": (2e3, 100, 0.25, (), 20.0, 10.0),
+    "rod, fewer cells": (2e3, 75, 0.25, (), 20.0, 10.0),
+    "lean zones": (2e3, 32, 0.4, LEAN, 20.0, 10.0),
+}
+
+
+@pytest.mark.parametrize("name", RUNS_ASKED)
+def test_whole_runs_against_the_loop_of_cabledyn(name: str, tmp_path: Path) -> None:
+    """From the scene to the closed file with 501 outputs, statics included; of CableDyn the time of its loop alone."""
+    if not PEERS["CableDyn"].available():
+        pytest.skip("cabledyn is not installed: pip install -e '.[bench]'")
+    EI, cells, step, zones, plain, estimated = RUNS_ASKED[name]
+    theirs: list[float] = []
+    ours: dict[bool, list[float]] = {False: [], True: []}
+    for _ in range(ROUNDS):
+        found = elsewhere(("CableDyn", 100, EI, {}))
+        theirs.append(found["loop"])
+        for errors, times in ours.items():
+            scene = hybrid.validate_scene(
+                described(cells, EI, step, zones) | {"output": {"every": 0.2, "errors": errors}}
+            )
+            for _ in range(2):
+                begin = time.process_time()
+                result = hybrid.run(scene, tmp_path / "run.h5")
+                result.close()
+                times.append(time.process_time() - begin)
+    with hybrid.open(tmp_path / "run.h5") as result:
+        own = answered(result).errors()
+    loop = median(theirs)
+    for errors, asked in ((False, plain), (True, estimated)):
+        spent = sorted(ours[errors])[:-1]  # the first loads what is needed
+        words = ", with the error figure" if errors else ""
+        print(
+            f"\n{name}: EI {EI:g}, {cells} cells, step {step:g} s{words}: {median(spent):.3f} s, CableDyn {loop:.2f} s, "
+            f"{loop / median(spent):.1f} times (asked: {asked:g}); mean, peak, minimum "
+            + ", ".join(f"{x:+.2f} / {y:+.2f} %" for x, y in zip(own, found["errors"][1:], strict=True))
+        )

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+import hybrid
 from peers import scene
 from peers.answer import Answer
 
@@ -55,8 +56,6 @@ def run(elements: int, EI: float, dt: float = 0.1, zones: Zones = ()) -> Answer:
 
     The loop's time is that of all steps, scaled from those after the first, whose time holds the start of the file.
     """
-    import hybrid
-
     asked = hybrid.validate_scene(described(elements, EI, dt, tuple(tuple(z) for z in zones)))
     begin = time.process_time()
     result = hybrid.run(asked)
@@ -65,6 +64,11 @@ def run(elements: int, EI: float, dt: float = 0.1, zones: Zones = ()) -> Answer:
     n = len(steps["t"])
     loop = float(steps["cpu"][-1] - steps["cpu"][0]) * n / (n - 1)
     words = f"dt {dt:g} s" + "".join(f", {kind} {s:g} m {c} cells (ratio {q:g})" for kind, s, c, q in zones)
-    times = np.concatenate([[0.0], steps["t"]])
+    return answered(result, loop, whole - loop, words)
+
+
+def answered(result: hybrid.Result, loop: float = 0.0, start: float = 0.0, words: str = "") -> Answer:
+    """The tension at the fairlead of a result; loop, start: what it cost, s."""
+    times = np.concatenate([[0.0], result.steps["t"]])
     first = float(np.linalg.norm(result.reaction_end[0]))
-    return Answer(times, np.concatenate([[first], steps["end_force_end"]]), loop, whole - loop, words)
+    return Answer(times, np.concatenate([[first], result.steps["end_force_end"]]), loop, start, words)
