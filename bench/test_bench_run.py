@@ -19,8 +19,12 @@ import numpy as np
 import pytest
 
 import hybrid
+from hybrid.kernels import entry, observed_outputs
+from hybrid.kernels.entry import NO_PUSH
 from hybrid.model.build import build
 from hybrid.model.plane import planar, untwist
+from hybrid.outputs import output_grid
+from hybrid.solve.plane_stability import seed
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.statics import solve_statics
 from hybrid.solve.stepper import Stepper
@@ -47,17 +51,24 @@ def cpu(call: Callable[[], Any]) -> float:
 
 
 @pytest.fixture
-def kernel_time(monkeypatch: pytest.MonkeyPatch) -> list[float]:
-    """Processor times, s, of all calls of the compiled run."""
-    go, times = CompiledRun.go, []
+def kernel_time(monkeypatch: pytest.MonkeyPatch) -> dict[str, list[float]]:
+    """Processor times, s, of calls of the compiled run, and of the other kernels: statics, what outputs mean."""
+    times: dict[str, list[float]] = {"run": [], "other": []}
 
-    def timed(self: CompiledRun) -> int:
-        begin = time.process_time()
-        code = go(self)
-        times.append(time.process_time() - begin)
-        return code
+    def timed(call: Callable[..., Any], key: str) -> Callable[..., Any]:
+        def inside(*given: Any) -> Any:
+            begin = time.process_time()
+            out = call(*given)
+            times[key].append(time.process_time() - begin)
+            return out
 
-    monkeypatch.setattr(CompiledRun, "go", timed)
+        return inside
+
+    monkeypatch.setattr(CompiledRun, "go", timed(CompiledRun.go, "run"))
+    for room, name in (
+        (entry, "in_plane"), (entry, "in_space"), (observed_outputs, "observe_outputs"), (output_grid, "add_rows"),
+    ):  # fmt: skip
+        monkeypatch.setattr(room, name, timed(getattr(room, name), "other"))
     return times
 
 
@@ -103,16 +114,20 @@ def test_variants_in_two_threads(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cells", [100, 1000])
-def test_part_inside_kernels(cells: int, tmp_path: Path, kernel_time: list[float]) -> None:
+def test_part_inside_kernels(cells: int, tmp_path: Path, kernel_time: dict[str, list[float]]) -> None:
     scene = touchdown("catenary", 0.2, f"mesh={{cells: {cells}}}")
     hybrid.run(scene, tmp_path / "run.h5").close()
-    parts = []
+    parts: dict[str, list[float]] = {"run": [], "other": []}
     for _ in range(RUNS):
-        kernel_time.clear()
+        for times in kernel_time.values():
+            times.clear()
         begin = time.process_time()
         hybrid.run(scene, tmp_path / "run.h5").close()
-        parts.append(sum(kernel_time) / (time.process_time() - begin))
-    print(f"{cells} cells: {100 * median(parts):.0f} % inside the compiled run")
+        total = time.process_time() - begin
+        for key, each in parts.items():
+            each.append(sum(kernel_time[key]) / total)
+    run, other = (100 * median(x) for x in parts.values())
+    print(f"{cells} cells: {run + other:.0f} % inside kernels: {run:.0f} % the compiled run, {other:.0f} % others")
 
 
 def test_ten_thousand_cells(tmp_path: Path) -> None:
@@ -127,15 +142,19 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
             iterations = int(result.steps["iterations"].sum())
         return time.process_time() - begin, iterations
 
-    def bare(steps: int) -> tuple[float, int]:
-        new, old, iterations = start.copy(), start.copy(), 0
+    def bare(steps: int, watched: bool) -> tuple[float, int]:
+        new, old, total = start.copy(), start.copy(), 0
+        now = seed(line.s, model.length / model.time_scale) if watched else NO_PUSH
+        was = np.zeros_like(now)
         begin = time.process_time()
         for k in range(1, steps + 1):
-            taken = stepper.step(model.sea.at(0.1 * k), model.ends.at(0.1 * k), old, new, 0.1, 0.1, 0.1 * k)
-            assert taken.outcome == hybrid.Outcome.OK, taken
-            iterations += taken.iterations
-            old, new = new, old
-        return time.process_time() - begin, iterations
+            sea, ends, old, new, was, now = model.sea.at(0.1 * k), model.ends.at(0.1 * k), new, old, now, was
+            outcome, iterations, *_ = entry.step(
+                line, sea, ends, old, new, 0.1, 0.1 * (k > 1), 0.5, stepper.limits, was, now, stepper.work
+            )
+            assert outcome == hybrid.Outcome.OK
+            total += iterations
+        return time.process_time() - begin, total
 
     scenes = of_duration(4.0), of_duration(12.0)
     model = build(scenes[1])
@@ -149,15 +168,17 @@ def test_ten_thousand_cells(tmp_path: Path) -> None:
     stepper = Stepper(line, model.length, model.tension_scale)
     stepper.consistent_accelerations(sea, ends, np.zeros((2, 3)), start)
     spent(scenes[0])
-    each: dict[str, list[float]] = {"run": [], "bare": []}
+    each: dict[str, list[float]] = {"run": [], "solver": [], "watched": []}
     for _ in range(RUNS):
         (short, few), (long, many) = spent(scenes[0]), spent(scenes[1])
         each["run"].append((long - short) / (many - few))
-        (short, few), (long, many) = bare(40), bare(120)
-        each["bare"].append((long - short) / (many - few))
-    run, alone = (median(x) / 10_000 for x in each.values())
+        for name in ("solver", "watched"):
+            (short, few), (long, many) = (bare(steps, name == "watched") for steps in (40, 120))
+            each[name].append((long - short) / (many - few))
+    run, alone, watched = (median(x) / 10_000 for x in each.values())
     print(
-        f"10 000 cells: {1e6 * run:.4f} us a cell and iteration of a run, {1e6 * alone:.4f} us bare: {run / alone:.2f}"
+        f"10 000 cells: {1e6 * run:.4f} us a cell and iteration of a run; of the bare solver {1e6 * alone:.4f} us, "
+        f"{run / alone:.2f} times; with its watch on what leaves the plane {1e6 * watched:.4f} us, {run / watched:.2f}"
     )
 
 
