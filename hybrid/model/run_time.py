@@ -21,7 +21,7 @@ MORE = {
     FRICTION: (0.01e-6, 0.005e-6),
 }  # fmt: skip
 # s per node, step and wave: sines and exponentials.
-COST_WAVE = 12e-9
+COST_WAVE = 30e-9
 # s of a run, a step, a step of zones that move, an output.
 COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 60e-6, 0.1e-3
 USUAL_ITERATIONS = 2.1
