@@ -23,6 +23,8 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     LOCAL_ERROR, ..._NODE     local error of position that the step makes, and its node        m, -
     SELF_CONTACT_ENERGY       energy of the contact of the line with itself                    J
     SELF_FRICTION_WORK        work of its friction in the step, and what that has stored more  J
+    LENGTH_OUT, PAYOUT_RATE   unstretched length of a line that is paid out, and its rate      m, m/s
+    PAYOUT_POWER              power of the winch on the line                                   W
 """
 
 from __future__ import annotations
@@ -39,4 +41,5 @@ SEABED_ENERGY = 28
 PUSH_ENERGY, WRONG_PIVOTS = 29, 30
 LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
 SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
-REPORT_SIZE = 35
+LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
+REPORT_SIZE = 38

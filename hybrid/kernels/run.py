@@ -116,9 +116,11 @@ class Job(NamedTuple):
         np.int64
     ]  # (3,) of kernels.self_contact: address, 0: no contact; what is asked; whether it is near
     contact_table: NDArray[np.int64]  # of a kernels.self_contact.ContactJob
+    reel_table: NDArray[np.int64]  # of a kernels.payout.ReelJob, of a line that is paid out
     zones: int = 0  # address of kernels.zone_step.follow_zones; 0: zones stay, or Python follows them
     itself: int = 0  # address of kernels.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
+    reel: int = 0  # address of kernels.payout.pay_out; 0: the length of the line stays
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
 
@@ -143,11 +145,13 @@ def blank_job() -> Job:
     return Job(
         task, blank_line(1), no_sea(1), no_ends(), no_moves(), state, state, none, none, no_work(), blank_books(),
         np.zeros(1, np.int64), np.zeros(0, np.int64), np.zeros(0, np.int64), np.zeros(3, np.int64), np.zeros(0, np.int64),
+        np.zeros(0, np.int64),
     )  # fmt: skip
 
 
 read = reader(blank_job())
 call_solver, call_follower, call_zones, call_itself = caller((0, 0, 0.0, 0)), caller(0), caller(0), caller(0)
+call_reel = caller(0)
 
 
 @inner
@@ -185,6 +189,8 @@ def conclude(job, old, new):
             note_extremes(line, sea, ends, new, books, clock[NOW])
         if job.zones != 0:
             asks |= call_zones(job.zones, job.zone_table)
+        if job.reel != 0:
+            asks |= call_reel(job.reel, job.reel_table)
         if count[FLAGS] != 0 or asks:
             return STEPPED
     return -1
@@ -277,10 +283,14 @@ def run(table):
             sea_at(clock[TRY_END], sea)
             if job.zones != 0:
                 call_zones(job.zones, job.zone_table)
+            if job.reel != 0:
+                call_reel(job.reel, job.reel_table)
             clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
             outcome, it, left, where = call_solver(job.solver, table)
             note_try(clock, count, report, outcome, it, left, where)
             count[PHASE] = JUDGE
+            if job.reel != 0:
+                call_reel(job.reel, job.reel_table)
             if job.zones != 0 and (count[OUTCOME] != OK or call_zones(job.zones, job.zone_table) != 0):
                 return TRIED
             if count[ASKS] & ASK_TRIES:

@@ -25,6 +25,7 @@ from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
+from hybrid.model.payout import PayoutPlan, payout_plan
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
@@ -73,10 +74,13 @@ class Model:
     plane: Floats | None = None  # (3, 3) rows p, q, normal: what the scene lies in, if it does
     follows_error: bool = False  # whether the error of leaving bending out is followed
     corrected: bool = False  # whether results are corrected for it
+    payout: PayoutPlan | None = None  # of a line that is paid out or taken in
 
     @property
     def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:
         """What `build` makes a model of the same mesh from."""
+        if self.payout is not None:
+            return self.payout.nodes[: self.payout.count(self.payout.first) + 1], self.payout.zones
         if self.layout is None:
             return self.line.s, self.zones
         return self.layout.finest
@@ -84,6 +88,18 @@ class Model:
     @property
     def cells(self) -> int:
         return int(self.line.h.size)
+
+    @property
+    def nodes(self) -> Floats:
+        """(N+1,) m, nodes by which extremes are kept: the fairlead of a line that is paid out is the next one."""
+        return self.line.s if self.payout is None else self.payout.nodes[: self.cells + 1]
+
+    @property
+    def always(self) -> np.ndarray:
+        """Numbers of nodes that there always are: those of base cells, or that cannot be taken in."""
+        if self.payout is not None:
+            return np.flatnonzero(self.payout.nodes <= self.payout.shortest)
+        return np.arange(self.line.s.size) if self.layout is None else self.layout.first
 
     @property
     def loaded_ends(self) -> tuple[bool, bool]:
@@ -194,6 +210,7 @@ def build(
         attached=tuple(cable.at.tolist()), cable=cable, layout=layout,
         on_base=LineOnBase(cable, layout.base) if layout is not None else None,
         plane=plane, corrected=corrected, follows_error=follows,
+        payout=payout_plan(scene, line, zones),
     )  # fmt: skip
 
 

@@ -23,13 +23,14 @@ class OutputPoints(NamedTuple):
     jumps: Floats
 
 
-def output_points(scene: Scene) -> OutputPoints:
+def output_points(scene: Scene, longest: float | None = None) -> OutputPoints:
     """The points that `output.points` asks for, those of the history, and all jumps.
 
+    longest: m, of a line that is paid out, how much may be out; its points are in material, from the start on.
     Of points that round-off alone tells apart there is one: a jump before one of the history, that before another.
     """
     asked, length, jumps = scene.output.points, scene.length, jump_points(scene)
-    usual = np.linspace(0.0, length, asked) if isinstance(asked, int) else np.array(asked, float)
+    usual = np.linspace(0.0, longest or length, asked) if isinstance(asked, int) else np.array(asked, float)
     followed = (x for x in scene.output.history or () if all(abs(x - at) > NEAR * length for at in jumps))
     more = [*jumps, *distinct(followed, length)]
     if more:

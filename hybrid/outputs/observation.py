@@ -17,7 +17,7 @@ import numpy as np
 
 from hybrid.kernels.link import link_of
 from hybrid.kernels.observed_outputs import observed
-from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SEABED_ENERGY, SELF_CONTACT_ENERGY
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, LENGTH_OUT, PAYOUT_POWER, SEABED_ENERGY, SELF_CONTACT_ENERGY
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside
@@ -373,6 +373,11 @@ class Observation:
         if not touch.size:
             return np.zeros((self.grid.s.size, self.batch.t.size))
         return means_beside(self.grid.s, self.line.s, touch) if self.grid.s.size > 1 else self.grid.chords @ touch.T
+
+    @property
+    def payout(self) -> Floats:
+        """(3, nb) of a line that is paid out: its length, m, the rate of that, m/s, power of the winch on it, W."""
+        return self.batch.report[:, LENGTH_OUT : PAYOUT_POWER + 1].T
 
     @property
     def contact_force(self) -> Floats:

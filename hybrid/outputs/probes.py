@@ -13,6 +13,7 @@ from hybrid.kernels.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
+from hybrid.model.output_points import NEAR
 from hybrid.outputs.observation import Observation, size
 from hybrid.outputs.output_grid import Grid
 from hybrid.solve.bending_corrector import Shift
@@ -78,6 +79,15 @@ PROBES: dict[str, Probe] = {
     "turns/crossings": Probe(
         "", "signed crossings as seen from the side: right-handed loops", (), lambda v: v.link[CROSSINGS], "link"
     ),
+    "payout/length": Probe("m", "unstretched length that is out", (), lambda v: v.payout[0], "payout"),
+    "payout/rate": Probe("m/s", "rate of that; negative: line is taken in", (), lambda v: v.payout[1], "payout"),
+    "payout/power": Probe(
+        "W",
+        "power of the winch on the line, tension times rate; negative: it brakes",
+        (),
+        lambda v: v.payout[2],
+        "payout",
+    ),
     "energy/kinetic": Probe("J", "kinetic energy, with rotary inertia", (), lambda v: v.energies["kinetic"]),
     "energy/potential": Probe(
         "J", "potential energy of weight and buoyancy, zero at z = 0", (), lambda v: v.energies["potential"]
@@ -104,7 +114,8 @@ WORK = {
     "waves": "work of the pressure of waves, and of buoyancy at the surface",
     "contact": "work of the damping of the seabed",
     "friction": "work of friction on the seabed, and of the line on itself",
-    "zones": "energy that zones put in or take out when they change, and of torque where a catenary bends without it",
+    "zones": "energy that zones, and cells at a winch, put in or take out when they change, and of torque where a "
+    "catenary bends without it",
     "scheme": "energy change that no work accounts for: the time scheme's own (negative: dissipated)",
 }
 
@@ -167,6 +178,7 @@ class Observer:
         changes: Sequence[float] = (),
         finest: Floats | None = None,
         gauges: Sequence[tuple[float, float]] = (),
+        payout: bool = False,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -176,6 +188,7 @@ class Observer:
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
+        payout: whether the line is paid out.
         """
         self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
@@ -184,6 +197,7 @@ class Observer:
         has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
         has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
+        has |= {"payout"} if payout else set()
         has |= {"self_contact"} if line.bits & SELF_CONTACT else set()
         self._probes = {
             name: p
@@ -242,13 +256,16 @@ class Observer:
     def on(self, line: Line, sea: Sea, zones: Sequence[Zone]) -> Observer:
         """The same fields of a line whose zones have changed."""
         other = copy(self)
-        other._place(line, sea, zones, self.grid.s)
+        other._place(line, sea, zones, self.s)
         return other
 
     def _place(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats) -> None:
         self.line, self.sea, self.zones = line, sea, tuple(zones)
+        self.s, jumps, length = s, self.jumps, line.s[-1]
+        if s[-1] > length * (1.0 + NEAR):  # what is on the reel has the values of the fairlead
+            s, jumps = np.minimum(s, length), np.minimum(jumps, length)
         self.grid = Grid(line.s, zones, s, self._cuts, self._changes)
-        self._after = Grid(line.s, zones, self.jumps, self._cuts, self._changes, after=True)
+        self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, after=True)
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:

@@ -10,7 +10,7 @@ import inspect
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
-from hybrid.scene import attachment_checks, sea_checks, start_checks
+from hybrid.scene import attachment_checks, payout_checks, sea_checks, start_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -368,4 +368,7 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,
+    payout_checks.payout_at_the_end,
+    payout_checks.payout_stands_alone,
+    payout_checks.payout_has_fixed_steps,
 )

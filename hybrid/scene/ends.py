@@ -29,6 +29,7 @@ from hybrid.scene.base import (
     table_or_list,
 )
 from hybrid.scene.end_loads import GivenLoad, Load, Loading, Triple
+from hybrid.scene.payout import Payout
 
 SHIFTS = ("surge", "sway", "heave")
 TURNS = ("roll", "pitch", "yaw")
@@ -301,6 +302,10 @@ class Pinned(EndTable):
     )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
+    payout: Payout | None = Field(
+        default=None,
+        description="line is paid out here, or taken in, by a winch; at `end` alone; absent: its length stays",
+    )
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @model_validator(mode="after")
@@ -447,4 +452,5 @@ class Ends(Table):
         motions += [x.prescribed_motion.vessel.rao for x in self.both
                     if x.prescribed_motion is not None and x.prescribed_motion.vessel is not None]  # fmt: skip
         loads = [given.load.file for end in self.both for given in end.loads]
-        return sorted({path for path in (*motions, *loads) if path is not None})
+        winches = [end.payout.file for end in self.both if isinstance(end, Pinned) and end.payout is not None]
+        return sorted({path for path in (*motions, *loads, *winches) if path is not None})

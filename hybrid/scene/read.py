@@ -244,7 +244,7 @@ def _system() -> type[System]:
 def _resolve_motion_files(data: Any, folder: Path) -> None:
     """Make the paths of files of motions and loads absolute, so that the scene can be used from anywhere."""
     points = data.get("points") if isinstance(data, dict) else None
-    files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust"))]
+    files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
     for path in files:
         here = data

@@ -74,7 +74,9 @@ def span(cable: Cable, ends: Ends) -> Iterator[Finding]:
 
 
 def span_in_motion(cable: Cable, ends: Ends, time: Time | None) -> Iterator[Finding]:
-    """Two held ends that travel apart farther than the cable joins them."""
+    """Two held ends that travel apart farther than the cable joins them, unless line is paid out."""
+    if getattr(ends.end, "payout", None) is not None:
+        return
     held = ends.held()
     motions = {name: ends.named()[name].prescribed_motion for name in held}
     carriers = {name: m for name, m in motions.items() if m is not None and (m.travel or m.velocity)}

@@ -19,6 +19,7 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
+from hybrid.model.payout import longest_out
 from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
@@ -89,7 +90,7 @@ class Case:
         points: of the result that is continued; None: those of the scene.
         """
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
-        self.points = points if points is not None else output_points(scene)
+        self.points = points if points is not None else output_points(scene, longest_out(scene))
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
@@ -366,6 +367,7 @@ class Case:
             model.corrected, self.points.jumps, section_changes(self.scene),
             model.layout.finest.nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
+            model.payout is not None,
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

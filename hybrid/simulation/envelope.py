@@ -19,6 +19,7 @@ from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
+from hybrid.model.payout import whole_scene
 from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
 from hybrid.outputs.output_grid import Grid
 from hybrid.scene.schema import Scene
@@ -80,7 +81,9 @@ class Envelope:
     def __init__(self, scene: Scene, model: Model, moves: bool) -> None:
         """moves: whether there are steps; of an equilibrium the nodes are those of its line."""
         layout = model.layout if moves else None
-        nodes = model.line.s if layout is None else layout.finest.nodes
+        nodes = model.line.s.copy() if layout is None else layout.finest.nodes
+        if moves and model.payout is not None:
+            nodes = model.payout.nodes
         marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
@@ -97,14 +100,15 @@ class Envelope:
         beside = self.s.copy()
         beside[first] -= side
         beside[second] += side
-        self._limits = limits_along(scene, beside)
+        self._limits = limits_along(whole_scene(scene), beside)
         self.itself = SelfWatch(model)
 
     # --- what is kept -------------------------------------------------------------------------------
 
     def count_from(self, model: Model, r: Floats) -> None:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
-        self.start[:] = Grid(model.line.s, model.zones, self._nodes, model.attached).nodes @ r
+        s, at = model.line.s, np.minimum(self._nodes, model.line.s[-1])
+        self.start[:] = Grid(s, model.zones, at, model.attached).nodes @ r
 
     def start_of(self, nodes: Floats) -> Floats:
         """Positions (N+1, 3) m from which displacements of nodes (N+1,) m count."""
@@ -120,15 +124,16 @@ class Envelope:
         out, places = self.bounds.copy(), _doubled(nodes, self._marked)
         columns = np.arange(places.size) - np.cumsum(second := np.append(False, places[1:] == places[:-1]))
         columns[second] = nodes.size + np.arange(self._marked.size)
-        if places.size < self.s.size:
+        if places.size < self.s.size and places[-1] == self.s[-1]:
             fold_extremes(places, self.s, columns, extremes, out)
             return out
         now = extremes[:, :, columns]
+        some = out[:, :, : places.size]  # of a line that is paid out there may be more
         for row in self._rows:
             if np.isfinite(now[:, row]).all():  # else no state was computed yet
                 for bound, better in ((0, np.less), (1, np.greater)):
-                    found = better(now[bound, row], out[bound, row])
-                    out[bound, row][found], out[2 + bound, row][found] = (
+                    found = better(now[bound, row], some[bound, row])
+                    some[bound, row][found], some[2 + bound, row][found] = (
                         now[bound, row][found],
                         now[2 + bound, row][found],
                     )

@@ -15,6 +15,7 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
 from hybrid.model.output_points import OutputPoints
+from hybrid.model.payout import longest_out, payout_of
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.scene.motion_checks import check_motions
@@ -107,7 +108,7 @@ def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkp
             scene = parse_scene(result.scene_text)
             status = result.status
             with refused(path):
-                points = restored_points(result, scene.length)
+                points = restored_points(result, longest_out(scene))
             try:
                 told = json.loads(result.changes_text or "[]")
                 changes = tuple(LoadChange(float(x["t"]), parse_scene(x["scene"])) for x in told)
@@ -136,7 +137,12 @@ def _longer(
         data.setdefault("output", {})["every"] = every
         return parse_scene(scene_text(Scene.model_validate(data)))
 
-    return other(scene), tuple(LoadChange(x.t, other(x.scene)) for x in changes)
+    out, longest = other(scene), longest_out(scene)
+    if longest_out(out) > longest * (1.0 + SAME_PLACE):
+        expected = f"a time up to which at most {longest:.6g} m are out, for which the result has points"
+        fix = "run the scene again with ends.end.payout.longest"
+        raise _refused("until", f"{until:g} s, when {longest_out(out):.6g} m are out", expected, fix)
+    return out, tuple(LoadChange(x.t, other(x.scene)) for x in changes)
 
 
 def _check(last: LoadChange, changed: Scene, resolution: Resolution, begin: float, end: float) -> None:
@@ -148,6 +154,9 @@ def _check(last: LoadChange, changed: Scene, resolution: Resolution, begin: floa
         if not any(where == x or where.startswith((f"{x}.", f"{x}[")) for x in MAY_CHANGE):
             fix = "run the changed scene from its start"
             raise _refused(where, value, f"one of {', '.join(MAY_CHANGE)}: a run in progress keeps the rest", fix)
+    if payout_of(changed) is not None:
+        expected = "nothing to change, because the line is paid out"
+        raise _refused("settings", "a change in mid-run", expected, "run the changed scene from its start")
     check_motions(changed)
     model = build(changed, resolution)
     before, after = build(last.scene, resolution).ends, model.ends

@@ -126,7 +126,9 @@ def mesh_tree(model: Model) -> Tree:
     """Where the nodes of a model are, and its zones, for a checkpoint."""
     if model.layout is not None:
         return model.layout._asdict()
-    return {"s": model.line.s, "zones": [[x.kind, x.s_a, x.s_b] for x in model.zones]}
+    assert not isinstance(model.mesh, Layout)
+    s, zones = model.mesh
+    return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}
 
 
 def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any]) -> tuple[Model, Model]:

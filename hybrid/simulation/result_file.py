@@ -13,6 +13,7 @@ from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
+from hybrid.model.payout import whole_scene
 from hybrid.model.sections import SECTION_LIMITS, limits_along, outer_diameter, weakest_bending
 from hybrid.outputs.probes import Observer
 from hybrid.scene.schema import Scene
@@ -75,7 +76,7 @@ def result_recorder(
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
     recorder = Recorder(
-        target, grid_s=observer.grid.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
+        target, grid_s=observer.s, fields=observer.fields, step_fields=STEP_FIELDS if outputs else (),
         attributes=attributes, texts=texts, fixed=fixed, outputs=outputs + 1, overwrite=True, before=before,
         templates=cache_folder().parent,
     )  # fmt: skip
@@ -128,7 +129,8 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
     """
     beside = 3.0 * NEAR * scene.length
     jumps = observer.jumps
-    left = observer.grid.s - beside * np.isin(observer.grid.s, jumps)
+    left = observer.s - beside * np.isin(observer.s, jumps)
+    scene = whole_scene(scene)
     places = [("s", "", left), ("right/s", "right/", jumps + beside)][: 1 + bool(jumps.size)]
     out: list[tuple[Field, np.ndarray]] = []
     for dim, prefix, s in places:
@@ -150,6 +152,9 @@ def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
     if model.layout is not None:
         nodes = model.layout.finest.nodes
         always = np.isin(nodes, model.layout.base).astype(np.int64)
+    if model.payout is not None:
+        nodes = model.payout.nodes[model.payout.nodes < model.payout.longest]
+        always = (nodes <= model.payout.shortest).astype(np.int64)
     text = "1 where the node is always there, 0 where only while it lies in a rod zone"
     return [
         (Field("mesh/s", "m", "arc lengths of all nodes that there may be", nodes.shape, ("mesh/s",)), nodes),

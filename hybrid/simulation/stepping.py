@@ -6,6 +6,7 @@
 from __future__ import annotations
 
 import io
+import math
 import threading
 from collections.abc import Sequence
 from contextlib import ExitStack
@@ -28,6 +29,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.payout import length_asked
 from hybrid.simulation.stepped import CableState, EndForces, Saved, in_space, numbers, one_thread, vector
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
@@ -86,6 +88,7 @@ class Simulation:
             raise
         self._loop.recorder = self._recorder = DeferredRecorder(recorder)
         self._driven: dict[int, DrivenEnd] = {}
+        self._wound: tuple[float | None, float] | None = None  # length and rate that are set for the next step
         self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
         self._loop.patient = self._plain
         try:
@@ -133,6 +136,9 @@ class Simulation:
             raise ValueError(
                 f"until = {until:.9g} s, expected a time after {now:.9g} s, up to time.duration, {duration:g} s"
             )
+        if self._loop.run.payout is not None:
+            self._loop.run.payout.go_on(now, until, self._wound)
+            self._wound = None
         for k, end in self._driven.items():
             wanted = self._next.pop(k, None)
             position, velocity, turn = wanted or (end.at(now)[0], STILL, None)
@@ -194,6 +200,30 @@ class Simulation:
                 raise ValueError("frame: expected a rotation matrix (3, 3), right-handed")
             turn = rotation_vector(now.T @ wanted)
         self._next[k] = there, speed, turn
+
+    @property
+    def length(self) -> float:
+        """Unstretched length that is out now, m."""
+        return float(self._loop.run.model.line.s[-1])
+
+    @one_thread
+    def set_length(self, length: float, rate: float = 0.0) -> None:
+        """How long the line is to be at the end of the next `step` or `advance`, m, and its rate there, m/s.
+
+        It reaches that smoothly, and keeps the rate until it is set again.  ValueError: the scene has no
+        ``ends.end.payout``, or that gives the length itself; a length that cannot be.
+        """
+        self._check_open()
+        self._wound = length_asked(self.scene, self._loop.run.payout, math.nan if length is None else length, rate)
+
+    @one_thread
+    def set_payout(self, rate: float) -> None:
+        """At which rate, m/s, line is to be paid out at the end of the next `step` or `advance`; negative: taken in.
+
+        The rate changes evenly until then, and stays until it is set again.  ValueError: as of `set_length`.
+        """
+        self._check_open()
+        self._wound = length_asked(self.scene, self._loop.run.payout, None, rate)
 
     @one_thread
     def set_force(
@@ -338,6 +368,7 @@ class Simulation:
             run.run.move(run.model.ends.moves())
         self._loop.remember(saved.watch)
         self._next.clear()
+        self._wound = None
         self._failed = ""
 
     def _drive_again(self, model: Model, saved: Saved) -> None:
@@ -349,7 +380,8 @@ class Simulation:
     @property
     def _plain(self) -> bool:
         """Whether nothing but the compiled run changes in a step."""
-        return self._loop.run.switching is None and self._loop.run.correction is None
+        run = self._loop.run
+        return run.switching is None and run.correction is None and run.payout is None
 
     # --- the end ----------------------------------------------------------------------------------
 

@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
+from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.deferred_recorder import DeferredRecorder
@@ -235,20 +236,29 @@ class TimeLoop:
 
     def _record(self, batch: Batch, errors: np.ndarray) -> None:
         """Record outputs, and look at them; errors: of the model, as sampled with them."""
-        run, diagnostics = self.run, self.diagnostics
-        model, switching = run.model, run.switching
+        run, model = self.run, self.run.model
         if model is not self._observed:
             self.observer, self._observed = self.observer.on(model.line, model.sea.values, model.zones), model
         observer, ratios, count = self.observer, None, batch.t.size
         if observer.writes_criteria:
             self._keep_ratios(count)
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
+        if run.payout is not None:
+            for there, seen in run.payout.looks(observer, model, batch):
+                self._save(there, seen, there.values_of(seen))
+                observer.first_energy = there.first_energy
+            return
         shift = run.correction.corrector.shift(errors, batch) if run.correction is not None else None
         seen = observer.look(batch)
-        values = observer.values_of(seen, ratios, shift)
-        self.recorder.save_batch(batch.t.copy(), values, observer.zone_rows)
+        self._save(observer, seen, observer.values_of(seen, ratios, shift))
+
+    def _save(self, observer: Observer, seen: Observation, values: dict[str, np.ndarray]) -> None:
+        """Record the values of outputs, and look at them."""
+        self.recorder.save_batch(seen.batch.t.copy(), values, observer.zone_rows)
         if self.target is None:
             return
+        run, diagnostics = self.run, self.diagnostics
+        model, switching = run.model, run.switching
         diagnostics.follow(model)
         stop = diagnostics.outputs(seen, values)
         if switching is not None and not model.line.torsion.size:

@@ -29,6 +29,7 @@ from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
+from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import diameters, least_bending, refuse_start_in_itself
@@ -74,6 +75,9 @@ class Transient:
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
         self.marked = marked_places(scene, model)
+        self.payout = PayingOut(model) if model.payout is not None else None
+        if self.payout is not None:
+            model = self.payout.on(model, model.length)
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.changes = 0  # of the scene, so far
@@ -143,13 +147,16 @@ class Transient:
     def unchanging(self) -> bool:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
         joints = self.switching is not None and self.switching.joints is not None
-        return not (self._pending is not None or self._leaves or self._overloaded or joints)
+        paid = self.payout is not None and self.payout.due
+        return not (self._pending is not None or self._leaves or self._overloaded or joints or paid)
 
     # --- the start ------------------------------------------------------------------------------
 
     def begin(self, equilibrium: Equilibrium | None) -> None:
         """From an equilibrium, or from the shape that the scene gives.  StepFailed: no accelerations are consistent."""
         model = self.model
+        if self.payout is not None:
+            model = self.payout.on(model, model.length)
         if self.envelope is not None:
             note_blended(self.scene, self.events)
         if equilibrium is None:
@@ -172,8 +179,7 @@ class Transient:
         if self.correction is not None:
             with_friction = equilibrium is not None and equilibrium.with_friction
             self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
-        first = slice(None) if model.layout is None else model.layout.first
-        self.run.place(state.r[first].copy())
+        self.run.place(state.r[model.always].copy())
         if self.envelope is not None:
             self.envelope.itself.look_at_start(self.run, self.events.event)
 
@@ -182,8 +188,12 @@ class Transient:
         ends, run = self.model.ends, self.run
         acceleration = ends.acceleration(self.t, 1e-3 * self.resolution.step)
         force = run.contact.force(self.state) if run.contact is not None else None
+        lengthening: np.ndarray | float = 0.0
+        if self.payout is not None:
+            self.payout.stand_still()
+            lengthening = self.payout.lengthening
         taken = self.stepper.consistent_accelerations(
-            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state, force
+            self.model.sea.at(self.t), ends.at(self.t), acceleration, self.state, force, lengthening
         )
         if taken.outcome != Outcome.OK:
             raise StepFailed(Tried(taken.outcome, taken.iterations, taken.correction, taken.where), 0.0)
@@ -196,9 +206,11 @@ class Transient:
     def _restart_books(self) -> None:
         """The report of the state has been made anew: powers follow from it, and what the seabed stores."""
         run = self.run
+        run.books.velocity[:] = self.model.ends.velocity
+        if self.payout is not None:
+            self.payout.stand_still()
         run.books.report[0] = self.stepper.work.report
         run.clock[b.STORED] = self.stepper.told[SEABED_ENERGY]
-        run.books.velocity[:] = self.model.ends.velocity
         run.clock[b.PREVIOUS] = run.clock[b.NOW]
         run.count[b.PHASE], run.count[b.AFTER_START], run.count[b.NEW_STATE] = b.START, b.SAMPLE, 1
 
@@ -289,7 +301,8 @@ class Transient:
         count, switching, asks = self.run.count, self.switching, 0
         if self._leaves:
             asks |= b.ASK_STEPS
-        if self._leaves or self._overloaded or self._pending is not None or self.asks_samples:
+        changes = self._leaves or self._overloaded or self._pending is not None
+        if changes or self.asks_samples or (self.payout is not None and self.payout.due):
             asks |= b.ASK_SAMPLES
         if switching is not None and not switching.compiled:
             asks |= b.ASK_BEFORE | b.ASK_TRIES | b.ASK_STEPS
@@ -338,6 +351,7 @@ class Transient:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
         changes = self._pending is not None or self._leaves or bool(self._overloaded)
+        changes |= self.payout is not None and self.payout.due
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
         outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
@@ -382,6 +396,11 @@ class Transient:
         self.run.count[b.INSIDE] = 0
         if change is not None:
             self._switch(change)
+        if self.payout is not None and self.payout.due:
+            model, state, booked = self.payout.change(self.run, self.model)
+            self.run.books.work[0, b.ZONES] += booked
+            self.set_model(model, state)
+            self.evaluate_forces()
         if self._leaves:
             self._leaves = False
             state = self.state.copy()
@@ -430,7 +449,7 @@ class Transient:
     def set_model(self, model: Model, state: State) -> None:
         """Go on with another line: other zones, or out of the plane."""
         if self.envelope is not None:
-            self.envelope.fold(self.model.line.s, self.run.books.extremes)
+            self.envelope.fold(self.model.nodes, self.run.books.extremes)
         self.model = model
         if self._cells is not None:
             self._cells.adopted = False
@@ -441,11 +460,10 @@ class Transient:
         touches = bool(model.line.bits & SELF_CONTACT)
         keep = touches or self.correction is not None
         self.stepper = Stepper(model.line, model.length, model.tension_scale, keep=keep)
-        first = np.arange(model.line.s.size) if model.layout is None else model.layout.first
         self.run.clock[b.WAVE_STEP] = wave_step(model.line, model.tension_scale)
         self.run.attach(
             model.line, model.sea.values, model.ends.values, model.ends.moves(), self.stepper.work,
-            self.stepper.limits, state, 1.0 + borne_strain(model), first,
+            self.stepper.limits, state, 1.0 + borne_strain(model), model.always,
             marks_on(model.line.s, self.marked), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
@@ -455,8 +473,10 @@ class Transient:
                 contact.restore(before.checkpoint(self.t))
             self.run.touch_itself(contact, model.line, model.ends.values, self.stepper.work)
         if self.envelope is not None:
-            self.run.books.start[:] = self.envelope.start_of(model.line.s)
+            self.run.books.start[:] = self.envelope.start_of(model.nodes)
             self.envelope.itself.attach(model, self.run)
+        if self.payout is not None:
+            self.payout.attach(self.run, model, self.stepper)
         self.plane_monitor.attach(self.run, model.line)
         watch_forces(self.run, model)
         if self.switching is not None:
@@ -475,4 +495,4 @@ class Transient:
         """Values of the envelope in the file, up to now; none where no extremes are kept."""
         if self.envelope is None:
             return {}
-        return self.envelope.values(self.model.line.s, self.run.books.extremes, self.t)
+        return self.envelope.values(self.model.nodes, self.run.books.extremes, self.t)

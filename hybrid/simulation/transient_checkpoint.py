@@ -16,6 +16,7 @@ from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.transient import Transient
 from hybrid.store.named_arrays import matched
 
+FIRST_REPORT = 34  # numbers that a report had once; later ones have more behind these
 SAME_PLACE = 1e-9  # of the length: ends that are so near to where they were have not been moved
 
 
@@ -25,7 +26,9 @@ def checkpoint(run: Transient) -> dict[str, Any]:
     control = {
         "next": float(clock[b.NEXT_DT]), "before": float(clock[b.ERROR_RATIO]), "wary": int(count[b.WARY])
     }  # fmt: skip
-    parts_: dict[str, Any] = {"ends": model.ends, "zoning": run.switching, "correction": run.correction}
+    parts_: dict[str, Any] = {
+        "ends": model.ends, "zoning": run.switching, "correction": run.correction, "payout": run.payout,
+    }  # fmt: skip
     return {name: x.checkpoint() if x is not None else None for name, x in parts_.items()} | {
         "t": run.t, "dt": float(clock[b.LAST_DT]), "steps": run.steps, "iterations": int(count[b.ITERATIONS]),
         "changes": run.changes, "_turned": run.turned, "_slackened": run.slackened, "_beyond": run.beyond,
@@ -49,13 +52,18 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     model, monitor, compiled = run.model, run.plane_monitor, run.run
     if saved["push"] is not None and model.plane is not None:
         monitor.speed = model.length / model.time_scale
+    if run.payout is not None:
+        model = run.payout.restore(saved["payout"], model)
     state = blank_state(model.cells, len(model.line.torsion))
     run.set_model(model, state)
     complete = "report" in saved  # not in a checkpoint of 0.6
-    free = dict.fromkeys(("mesh", "plane", "envelope"))
+    free = dict.fromkeys(("mesh", "plane", "envelope", "payout"))
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
-    older |= {"envelope": None, "_slackened": False, "self_contact": None}
+    older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None}
+    report = saved.get("report")
+    if isinstance(report, np.ndarray) and report.ndim == 2 and FIRST_REPORT <= report.shape[1] < REPORT_SIZE:
+        saved = {**saved, "report": np.pad(report, ((0, 0), (0, REPORT_SIZE - report.shape[1])))}
     if run.correction is not None and isinstance(saved.get("correction"), dict):
         older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
@@ -86,6 +94,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         moved = f"an end is {apart:.3g} m from where it was at t = {run.t:.6g} s: has its motion file changed?"
         raise ValueError(moved)
     compiled.move(model.ends.moves())
+    if run.payout is not None:
+        run.payout.lengthen()
     books.velocity[:] = model.ends.velocity
     ends = model.ends.values  # outputs within the next step lie between these and those at its end
     books.imposed[0] = np.hstack([ends.position, ends.frame, ends.spin, ends.force, ends.moment])
@@ -108,7 +118,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
 
 def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:
     """Extremes up to here; where the checkpoint has none they begin here, and an event says so."""
-    envelope, books, nodes = run.envelope, run.run.books, run.model.line.s
+    envelope, books, nodes = run.envelope, run.run.books, run.model.nodes
     if envelope is None:
         return
     if saved is None:

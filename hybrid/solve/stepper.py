@@ -112,21 +112,23 @@ class Stepper:
         state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
 
     def consistent_accelerations(
-        self, sea: Sea, ends: Ends, acceleration: Floats, state: State, force: Floats | None = None
-    ) -> Taken:
+        self, sea: Sea, ends: Ends, acceleration: Floats, state: State, force: Floats | None = None,
+        lengthening: Floats | float = 0.0,
+    ) -> Taken:  # fmt: skip
         """Give `state` the accelerations and tensions that its positions, velocities and loads imply.
 
         One linear solve: with ca = HEAVY inertia outweighs every stiffness, so that ca times
         the correction is the acceleration; an inextensible cell asks for the change of
         length that keeps it so, d.(a_{c+1} - a_c) = -|n part of v_{c+1} - v_c|^2 / l.
-        acceleration: (2, 3) m/s2 of the held ends; force: (N+1, 3) N, of contact of the line with itself.
+        acceleration: (2, 3) m/s2 of the held ends; force: (N+1, 3) N, of contact of the line with itself;
+        lengthening: (N,) m/s2, second rates of the lengths of cells.
         """
         state.a[:], state.vd[:], state.wa[:], state.wd[:] = 0.0, 0.0, 0.0, 0.0
         l = np.linalg.norm(state.e, axis=1)
         d = state.e / l[:, None]
         e1 = np.diff(state.v, axis=0)
         across = e1 - np.einsum("ij,ij->i", d, e1)[:, None] * d
-        gaps = -np.einsum("ij,ij->i", across, across) / (l * HEAVY)
+        gaps = (lengthening - np.einsum("ij,ij->i", across, across) / l) / HEAVY
         work = self.work
         work.u[:], work.X[:] = 0.0, 0.0
         work.u[[0, -1]] = -acceleration / HEAVY  # what a held end has still to go is position - r - u

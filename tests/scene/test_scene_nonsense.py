@@ -60,17 +60,36 @@ initial: {kind: equilibrium}
 model: {kind: catenary}
 time: {duration: 10.0, step: 0.05}
 """
-TEXTS = {
-    "loaded": LOADED,
-    "adaptive": ADAPTIVE,
-    "everything": EVERYTHING,
-    "everything else": EVERYTHING_ELSE,
-    "ocean": OCEAN,
-    "at rest": AT_REST,
-    "corrected": CORRECTED,
-    "touching": TOUCHING,
-    "twisted": TWISTED,
-} | SEAS
+WOUND = """\
+cable: {sections: [{length: 40.0, mass: 1.0}]}
+ends:
+  start: {kind: free}
+  end: {kind: pinned, position: [0.0, 0.0, 0.0], payout: {PAYOUT}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+mesh: {cells: 20}
+time: {duration: 10.0, step: 0.05}
+"""
+PAYOUTS = {
+    "rate": "rate: 0.5, begin: 1.0, ramp: 2.0, until: 8.0, longest: 60.0, reel: [{length: 30.0, mass: 2.0}]",
+    "rates": "rates: [[0.0, 0.0], [5.0, 1.0], [9.0, -0.5]]",
+    "lengths": "lengths: [[0.0, 40.0], [5.0, 44.0], [9.0, 41.0]]",
+}
+TEXTS = (
+    {name: WOUND.replace("PAYOUT", payout) for name, payout in PAYOUTS.items()}
+    | {
+        "loaded": LOADED,
+        "adaptive": ADAPTIVE,
+        "everything": EVERYTHING,
+        "everything else": EVERYTHING_ELSE,
+        "ocean": OCEAN,
+        "at rest": AT_REST,
+        "corrected": CORRECTED,
+        "touching": TOUCHING,
+        "twisted": TWISTED,
+    }
+    | SEAS
+)
 
 
 def _values(node: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], Any]]:
@@ -211,6 +230,8 @@ SIGNED |= {
     "turns",
     "history",
     "elevation",
+    "rate",
+    "rates",
 }
 
 

@@ -1,0 +1,284 @@
+"""A line that is paid out: how long it is when, the nodes that it may have, and its arrays for any length."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import NoReturn
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.kernels.payout import PER_LENGTH
+from hybrid.kernels.state import Floats, Line
+from hybrid.model.line import line_on
+from hybrid.model.material import Material, material
+from hybrid.model.mesh import Zone
+from hybrid.scene.payout import Payout
+from hybrid.scene.schema import Scene, Section
+
+# Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
+ENTERS, LEAVES = 0.85, 0.35
+# The fewest cells that may be left.
+FEWEST_CELLS = 4
+WHERE = "ends.end.payout"
+
+
+def payout_of(scene: Scene) -> Payout | None:
+    """How a line is paid out at its end, if it is."""
+    found: Payout | None = getattr(scene.ends.end, "payout", None)
+    return found
+
+
+@dataclass(frozen=True)
+class PayoutPlan:
+    """What a line that is paid out consists of, whatever is out."""
+
+    law: Floats  # (K, 8) as of kernels.payout.Reel
+    nodes: Floats  # (M,) m, nodes that there may be; that of the fairlead is none of them
+    first: float  # m, length at t = 0
+    longest: float  # m, that may be out
+    shortest: float  # m, below which nothing can be taken in
+    zones: tuple[Zone, ...]  # at t = 0
+    cable: Material  # what is out and what is on the reel
+    pieces: Floats  # (P, 1 + PER_LENGTH) as of kernels.payout.Reel
+    from_outside: bool  # whether the length is set from Python
+
+    def count(self, length: float) -> int:
+        """Material nodes of a line of that length, m, that has been paid out monotonically: the last cell is between
+
+        its limits.
+        """
+        n = int(np.searchsorted(self.nodes, length))
+        return n if length - self.nodes[n - 1] > LEAVES * self.cell(n - 1) else n - 1
+
+    def cell(self, node: int) -> float:
+        """Length, m, of the cell after a material node."""
+        return float(self.nodes[node + 1] - self.nodes[node])
+
+    def limits(self, count: int) -> tuple[float, float]:
+        """Lengths, m, of the last cell of a line of `count` material nodes beyond which a node enters or leaves."""
+        return self.cell(count - 1) + ENTERS * self.cell(count), LEAVES * self.cell(count - 1)
+
+    def line(self, count: int, length: float, like: Line) -> Line:
+        """The line of `count` material nodes and a length, m; like: another one, with the same forces."""
+        s = np.append(self.nodes[:count], length)
+        middle = 0.5 * (s[:-1] + s[1:])
+        ends = [zone.s_b for zone in self.zones]
+        rod = np.array([x.kind == "rod" for x in self.zones])
+        rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
+        line = line_on(self.cable, s, rods)
+        return line._replace(bits=like.bits, plane=like.plane, footing=_footing(like, s.size))
+
+    def zones_of(self, length: float) -> tuple[Zone, ...]:
+        """The zones of a line of that length, m."""
+        return (*self.zones[:-1], replace(self.zones[-1], s_b=length))
+
+
+def _footing(like: Line, nodes: int) -> Floats:
+    """Bodies that press on the seabed; those of the nodes that come are none."""
+    out = np.full(nodes, 0.0 if np.isfinite(like.footing).all() else np.nan)
+    some = min(nodes, like.footing.size) - 1
+    out[:some] = like.footing[:some]
+    return out
+
+
+def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan | None:
+    """What a scene's line consists of that is paid out; None: its length stays.  SceneError: it cannot be done."""
+    payout = payout_of(scene)
+    if payout is None:
+        return None
+    length, duration = scene.length, scene.time.duration if scene.time is not None else 0.0
+    law = law_of(payout, length, duration)
+    low, high = _extremes(law, length, duration)
+    longest = max(high, payout.longest or 0.0)
+    if payout.longest is not None and high > payout.longest:
+        _refuse("longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
+    sections = list(whole_scene(scene).cable.sections)
+    joint = max((zone.s_a for zone in zones), default=0.0)
+    points = [x for x in material(scene).at.tolist() if x < length]
+    fixed = max([joint, *points])
+    near = int(np.searchsorted(line.s, fixed * (1 + 1e-12)))
+    if near + FEWEST_CELLS >= line.s.size:
+        expected = f"{FEWEST_CELLS} cells between the last joint or load, s = {fixed:g} m, and the end"
+        _refuse("", "payout", expected, "more cells, or a longer cable")
+    shortest = float(line.s[near + FEWEST_CELLS - 1])
+    if low < shortest:
+        given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
+        expected = f"at least {shortest:.6g} m: {FEWEST_CELLS} cells must be left behind the last joint, load or end"
+        _refuse("", given, expected, fix)
+    h = float(line.h[-1])
+    nodes: list[float] = line.s.tolist()
+    for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
+        if nodes[-1] * (1 + 1e-9) < end:
+            nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
+    while nodes[-3] < longest:
+        nodes.append(nodes[-1] + h)
+    cable = material(whole_scene(scene))
+    if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-1]:
+        _refuse("", "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
+    outside, s = payout.from_outside, np.array(nodes)
+    return PayoutPlan(law, s, length, longest, shortest, zones, cable, _pieces(cable), outside)
+
+
+def _refuse(key: str, given: str, expected: str, fix: str) -> NoReturn:
+    raise SceneError([Complaint(f"{WHERE}.{key}" if key else WHERE, given, expected, fix)])
+
+
+def _sections(scene: Scene, payout: Payout, longest: float) -> list[Section]:
+    """The sections that are out and those on the reel."""
+    out, more = list(scene.cable.sections), longest - scene.length
+    if payout.reel is not None:
+        held = sum(x.length for x in payout.reel)
+        if held < more * (1 - 1e-9):
+            _refuse("reel", f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", "a longer last section")
+        return [*out, *payout.reel, payout.reel[-1].model_copy(update={"length": scene.length})]
+    return [*out, out[-1].model_copy(update={"length": more + scene.length})]
+
+
+def longest_out(scene: Scene) -> float:
+    """Longest length, m, that may be out in a scene's motion; of a line that is not paid out its length."""
+    payout = payout_of(scene)
+    if payout is None or scene.time is None:
+        return scene.length
+    law = law_of(payout, scene.length, scene.time.duration)
+    high = _extremes(law, scene.length, scene.time.duration)[1]
+    return max(high, payout.longest or 0.0)
+
+
+def whole_scene(scene: Scene) -> Scene:
+    """A scene whose cable has also what is on the reel; of a line that is not paid out the scene itself."""
+    payout = payout_of(scene)
+    if payout is None:
+        return scene
+    sections = tuple(_sections(scene, payout, longest_out(scene)))
+    return scene.model_copy(update={"cable": scene.cable.model_copy(update={"sections": sections})})
+
+
+def _pieces(cable: Material) -> Floats:
+    """What every piece of the material has per length; of stiffness one over it."""
+    with np.errstate(divide="ignore"):
+        soft = 1.0 / cable.B
+    columns = [
+        cable.bounds[:-1], cable.mass, cable.weight, cable.damp, cable.ck, cable.tau, cable.drag_n, cable.drag_t,
+        cable.added_n, cable.added_t, cable.buoy, cable.displaced, cable.diameter, cable.rotary, cable.polar,
+        *soft.T, *cable.kappa.T,
+    ]  # fmt: skip
+    pieces = np.ascontiguousarray(np.stack(columns, axis=1))
+    assert pieces.shape[1] == 1 + PER_LENGTH
+    return pieces
+
+
+# --- the law of length ----------------------------------------------------------------------------
+
+
+def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
+    """(K, 8) rows from times and coefficients, highest power first, of any number."""
+    out = np.zeros((len(rows), 8))
+    for k, (t, c) in enumerate(rows):
+        out[k, 0] = t
+        out[k, 8 - len(c) :] = c
+    return out
+
+
+def law_of(payout: Payout, length: float, duration: float) -> Floats:
+    """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.payout.Reel.
+
+    length: m, at t = 0; duration: s, of the motion.
+    """
+    if payout.rate is not None:
+        return _law_of_rate(payout, length)
+    if payout.file is not None:
+        payout = payout.model_copy(update=_rows_of(payout.file))
+    if payout.rates is not None:
+        return _law_of_rates(np.array(payout.rates, float), length, duration)
+    if payout.lengths is not None:
+        return _law_of_lengths(np.array(payout.lengths, float), length, duration)
+    return _rows([(0.0, [length])])
+
+
+def _rows_of(path: str) -> dict[str, Floats]:
+    """Rates or lengths over time of a file, by their key in the scene."""
+    from hybrid.scene.motion_file import RecordRefused, check_file, read_table
+
+    name = Path(path).name
+
+    def checked(_: str, header: list[str]) -> list[str]:
+        if sorted(header) not in (["rate", "t"], ["length", "t"]):
+            given = f"{name} with columns {', '.join(header)[:60]}"
+            raise RecordRefused("columns t,rate or t,length", "name the columns in the first line of the file", given)
+        return header
+
+    try:
+        check_file(path)
+        header, table, lines = read_table(path, checked)
+    except RecordRefused as refused:
+        found = refused.finding
+        _refuse("file", found.given or name, found.expected, found.fix)
+    key, rows = ("rates", 2) if "rate" in header else ("lengths", 3)
+    t, x = table[:, header.index("t")], table[:, 1 - header.index("t")]
+    if len(t) < rows:
+        _refuse("file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
+    for k in np.flatnonzero(np.diff(t) <= 0.0)[:1]:
+        given = f"{name}, line {lines[k + 1]}: t = {t[k + 1]:.9g} after t = {t[k]:.9g}"
+        _refuse("file", given, "times that increase strictly", "sort the rows and drop duplicates")
+    if t[0] != 0.0 or (key == "rates" and x[0] != 0.0):
+        expected = "a first row at t = 0" + (" with rate 0, because the line is at rest" if key == "rates" else "")
+        _refuse("file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
+    return {key: np.column_stack([t, x])}
+
+
+def _law_of_rate(payout: Payout, length: float) -> Floats:
+    """A rate that grows with the ramp, and ends with it."""
+    rate, T, begin = payout.rate or 0.0, payout.ramp or 1.0, payout.begin
+    grows = [rate / T**5, -3.0 * rate / T**4, 2.5 * rate / T**3, 0.0, 0.0, 0.0]
+    rows = [(0.0, [length]), (begin, [*grows, length]), (begin + T, [rate, length + 0.5 * rate * T])]
+    if payout.until is not None:
+        out = length + rate * (payout.until - begin - 0.5 * T)
+        ends = [-x for x in grows[:-1]]
+        rows.append((payout.until, [*ends, rate, out]))
+        rows.append((payout.until + T, [out + 0.5 * rate * T]))
+    return _rows(rows)
+
+
+def _law_of_rates(table: Floats, length: float, duration: float) -> Floats:
+    """Rates at times, a cubic spline between them; beyond the last it is constant."""
+    from scipy.interpolate import CubicSpline  # slow to import
+
+    t, c = table.T
+    spline = CubicSpline(t, c, bc_type=("natural", (1, 0.0) if t[-1] < duration else "natural"))
+    way = spline.antiderivative()
+    rows = [(float(x), [*a[:-1].tolist(), float(a[-1]) + length]) for x, a in zip(way.x, way.c.T, strict=False)]
+    return _rows([*rows, (float(t[-1]), [float(c[-1]), float(way(t[-1])) + length])])
+
+
+def _law_of_lengths(table: Floats, length: float, duration: float) -> Floats:
+    """Lengths at times, a spline of fifth degree between them, which begins and ends without rate and acceleration."""
+    from scipy.interpolate import PPoly, make_interp_spline
+
+    t, out = table.T
+    if abs(out[0] - length) > 1e-9 * length:
+        _refuse("lengths", f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable", "the same length")
+    rest = [(1, 0.0), (2, 0.0)]
+    ends = rest if t[-1] < duration else [(3, 0.0), (4, 0.0)]
+    spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, ends)))
+    pieces = [(float(x), a.tolist()) for x, y, a in zip(spline.x[:-1], spline.x[1:], spline.c.T, strict=True) if y > x]
+    return _rows([*pieces, (float(t[-1]), [float(out[-1])])])
+
+
+def length_at(law: Floats, t: float) -> tuple[float, float, float]:
+    """Length (m) that is out at t (s), its rate (m/s) and the rate of that (m/s2), just before t where it jumps."""
+    row = law[max(int(np.searchsorted(law[:, 0], t)) - 1, 0)]
+    x, c = max(t - row[0], 0.0), row[1:]
+    first = np.polyder(c)
+    return float(np.polyval(c, x)), float(np.polyval(first, x)), float(np.polyval(np.polyder(first), x))
+
+
+def _extremes(law: Floats, length: float, duration: float) -> tuple[float, float]:
+    """Shortest and longest length, m, up to a time, s."""
+    t = np.unique(np.concatenate([np.linspace(0.0, duration, 2001), law[(law[:, 0] <= duration), 0]]))
+    rows = law[np.maximum(np.searchsorted(law[:, 0], t) - 1, 0)]
+    x, found = np.maximum(t - rows[:, 0], 0.0), np.zeros(t.size)
+    for j in range(1, law.shape[1]):
+        found = found * x + rows[:, j]
+    return float(min(found.min(), length)), float(max(found.max(), length))

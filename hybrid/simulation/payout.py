@@ -1,0 +1,227 @@
+"""A line that is paid out in motion: nodes that enter and leave at its fairlead, and what a checkpoint keeps of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from hybrid.adapt.payout_cells import Flow, enter, lack_at, leave
+from hybrid.kernels import books as b
+from hybrid.kernels import payout as p
+from hybrid.kernels.binding import Table
+from hybrid.kernels.energies import observe
+from hybrid.kernels.payout import Reel, blank_reel, blank_reel_job, lengthen, pay_out, stand_still
+from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
+from hybrid.kernels.state import Batch, Ends, Floats, Line, State
+from hybrid.model.build import Model
+from hybrid.model.payout import PayoutPlan, length_at, payout_of
+from hybrid.outputs.observation import Observation
+from hybrid.outputs.probes import Observer
+from hybrid.scene.schema import Scene
+from hybrid.solve.run import CompiledRun
+from hybrid.solve.stepper import Stepper
+from hybrid.store.named_arrays import matched
+
+ROUND_OFF = 1e-9  # of a length
+# What a checkpoint keeps of a reel.
+KEPT = ("numbers", "lack", "rate", "since", "span")
+
+
+class PayingOut:
+    """The length of one line in motion."""
+
+    def __init__(self, model: Model) -> None:
+        assert model.payout is not None
+        self.plan: PayoutPlan = model.payout
+        self.law = self.plan.law.copy()
+        self.count = self.plan.count(self.plan.first)  # material nodes that are out
+        self.reel = self._blank(self.count)
+        self.table = Table(blank_reel_job())
+
+    def _blank(self, count: int) -> Reel:
+        """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
+        plan = self.plan
+        reel = blank_reel(count, self.law, plan.pieces)
+        place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
+        numbers = reel.numbers
+        numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
+        numbers[p.LONGEST], numbers[p.SHORTEST] = plan.limits(count)
+        reel.rest[:-1], reel.rest[-1] = amount_between(plan.pieces, before, place), place - before
+        reel.true[:-1] = np.diff(plan.nodes[:count])
+        return reel
+
+    def on(self, model: Model, length: float) -> Model:
+        """A model with the nodes of now and a length, m."""
+        line = self.plan.line(self.count, length, model.line)
+        cells = line.h.size
+        sea = model.sea if cells == model.cells else model.sea.on(cells)
+        return replace(model, line=line, zones=self.plan.zones_of(length), sea=sea, length=length)
+
+    def attach(self, run: CompiledRun, model: Model, stepper: Stepper) -> None:
+        """Let a run pay out its line from now on."""
+        self.table.bind(
+            line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
+            clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
+            report=stepper.work.report, reel=self.reel,
+        )  # fmt: skip
+        run.pay_out(self.table, pay_out.address(self.table.numbers))
+
+    def stand_still(self) -> None:
+        """The line as it is now, and the force of its fairlead in the report of a state that no step has led to."""
+        stand_still(self.table.numbers)
+
+    @property
+    def lengthening(self) -> Floats:
+        """(N,) m/s2, second rates of the lengths of cells."""
+        out = np.zeros(self.count)
+        out[-1] = self.reel.numbers[p.ACCELERATION]
+        return out
+
+    @property
+    def due(self) -> bool:
+        """Whether a node is to enter or to leave."""
+        return bool(self.reel.numbers[p.DUE])
+
+    def change(self, run: CompiledRun, model: Model) -> tuple[Model, State, float]:
+        """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in."""
+        state, old, plan = run.state, self.reel, self.plan
+        numbers = old.numbers
+        enters = old.true[-1] > numbers[p.LONGEST]
+        flow = self._flow(run)
+        self.count += 1 if enters else -1
+        length = float(numbers[p.LENGTH])
+        changed = self.on(model, length)
+        reel = self._blank(self.count)
+        if enters:
+            out = enter(model.line, changed.line, state, old, reel, flow, float(plan.nodes[self.count - 1]))
+        else:
+            out = leave(model.line, changed.line, state, old, reel, flow)
+        reel.numbers[p.FADING] = (reel.since + reel.span).max()
+        reel.true[-1] = length - plan.nodes[self.count - 1]
+        changed.line.h[:] = reel.true - lack_at(reel, flow.t)[0]
+        self.reel = reel
+        ends = model.ends.at(run.t)
+        return changed, out, energy(changed.line, ends, out) - energy(model.line, ends, state)
+
+    def _flow(self, run: CompiledRun) -> Flow:
+        t, dt = run.t, float(run.clock[b.LAST_DT])
+        rho = float(run.clock[b.RHO])
+        am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
+        _, rate, acceleration = length_at(self.law, t)
+        later = length_at(self.law, t + (am - af) * dt)[1:]
+        cell = self.plan.cell(self.count - 1)
+        return Flow(t, dt, rate, acceleration, (later[0], later[1]), cell, run.books.tension[0].copy())
+
+    def looks(self, observer: Observer, model: Model, batch: Batch) -> Iterator[tuple[Observer, Observation]]:
+        """The outputs of a batch one by one, each of a line as long as it was then."""
+        for k in range(batch.t.size):
+            t = float(batch.t[k])
+            if t >= self.law[0, 0]:  # exactly, where samples interpolate
+                batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
+            length = float(batch.report[k, LENGTH_OUT])
+            line = self.plan.line(self.count, length, model.line)
+            line.h[:] -= lack_at(self.reel, t)[0]
+            there = observer.on(line, model.sea.values, self.plan.zones_of(length))
+            there.first_energy = observer.first_energy
+            one = {name: x[k : k + 1] for name, x in batch._asdict().items() if x.size}
+            yield there, there.look(batch._replace(**one))
+
+    # --- checkpoints ------------------------------------------------------------------------------
+
+    def checkpoint(self) -> dict[str, Any]:
+        """What the next steps depend on."""
+        kept = {name: getattr(self.reel, name).copy() for name in KEPT}
+        return {"count": self.count, "law": self.law.copy(), **kept}
+
+    def restore(self, tree: Any, model: Model) -> Model:
+        """Go on as `checkpoint` has written: the model as it was then.  ValueError: it is that of another line."""
+        template = {"count": 0, "law": np.zeros((0, 8))}
+        given = dict(tree)
+        saved = matched({name: given.pop(name) for name in template}, template, "payout")
+        count, law = saved["count"], saved["law"]
+        if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
+            raise ValueError("a length that no winch gives")
+        if not np.searchsorted(self.plan.nodes, self.plan.shortest) < count < self.plan.nodes.size - 1:
+            raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")
+        self.count, self.law = count, law
+        self.reel = self._blank(count)
+        kept = matched(given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
+        if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
+            raise ValueError("a length that no line has")
+        for name, x in kept.items():
+            getattr(self.reel, name)[:] = x
+        return self.on(model, float(self.reel.numbers[p.LENGTH]))
+
+    def go_on(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
+        """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.
+
+        ValueError: it cannot be so long, or so short.
+        """
+        if self.plan.from_outside:
+            length, rate = asked or (None, length_at(self.law, begin)[1])
+            self.drive(begin, end, length, rate)
+
+    def drive(self, begin: float, end: float, length: float | None, rate: float) -> None:
+        """From `begin` to `end`, s, the length goes to `length`, m, with that rate there, m/s, which it keeps.
+
+        length: None: the one to which a rate that changes evenly leads.  ValueError: longer or shorter than can be.
+        """
+        L, c, _ = length_at(self.law, begin)
+        dt, plan = end - begin, self.plan
+        to = L + 0.5 * (c + rate) * dt if length is None else length
+        if not plan.shortest <= to <= plan.longest * (1.0 + ROUND_OFF):
+            between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
+            raise ValueError(f"the length that is out would be {to:.6g} m, expected between {between} (payout.longest)")
+        mean = (to - L) / dt
+        law = np.zeros((2, 8))
+        law[:, 0] = begin, end
+        law[0, 4:] = (c + rate - 2.0 * mean) / dt**2, (3.0 * mean - 2.0 * c - rate) / dt, c, L
+        law[1, 6:] = rate, to
+        if self.law.shape == law.shape:
+            self.law[:] = law
+        else:
+            self.law = law
+            self.reel = self.reel._replace(law=law)
+            self.table.bind(reel=self.reel)
+
+    def lengthen(self) -> None:
+        """The line as it is at the time of its run."""
+        lengthen(self.table.numbers)
+
+
+def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any) -> tuple[float | None, float]:
+    """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be."""
+    payout = payout_of(scene)
+    if payout is None or paying is None:
+        raise ValueError("the scene has no ends.end.payout: the length of its line stays")
+    if not payout.from_outside:
+        raise ValueError("ends.end.payout gives the length: leave rate, rates, lengths and file out to set it")
+    for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):
+        if isinstance(x, bool) or not isinstance(x, int | float | np.integer | np.floating) or not np.isfinite(x):
+            raise ValueError(f"{name}: expected a finite number, found {x!r:.60}")
+    if length is None:
+        return None, float(rate)
+    plan = paying.plan
+    if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
+        between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
+        raise ValueError(f"length = {length:.9g} m, expected between {between} (ends.end.payout.longest)")
+    return float(length), float(rate)
+
+
+def energy(line: Line, ends: Ends, state: State) -> float:
+    """Kinetic, elastic and potential energy, J."""
+    n, found = line.h.size, np.zeros(4)
+    observe(line, ends, state.e, state.v, state.a1, state.w, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), found)
+    return float(found.sum() - (line.force * state.r).sum())
+
+
+def amount_between(pieces: Floats, begin: float, end: float) -> Floats:
+    """What the material between two arc lengths, m, has of all that it has per length (kernels.payout)."""
+    edges = np.append(pieces[1:, 0], np.inf)
+    starts = np.append(-np.inf, pieces[1:, 0])
+    way = np.maximum(np.minimum(edges, end) - np.maximum(starts, begin), 0.0)
+    some = way > 0.0
+    return np.asarray(way[some] @ pieces[some, 1:])

@@ -1,0 +1,348 @@
+"""Lines that are paid out and taken in, against exact solutions; kicks, energy, resume, Python, sections on the reel."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.model.payout import law_of, length_at
+from hybrid.scene.payout import Payout
+
+G = 9.81
+
+
+def hanging(payout: dict[str, Any], duration: float, **more: Any) -> dict[str, Any]:
+    """40 m of 2 kg/m that hang from a winch; their lower end is free."""
+    return {
+        "cable": {"sections": [{"length": 40.0, "mass": 2.0}]},
+        "ends": {"start": {"kind": "free"}, "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout}},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 20},
+        "time": {"duration": duration, "step": 0.05}, "output": {"every": 0.5}, **more,
+    }  # fmt: skip
+
+
+def sagging(
+    model: str = "catenary", EA: float | None = None, EI: float | None = None, rate: float = 0.8, step: float = 0.05,
+    duration: float = 20.0, **more: Any,
+) -> dict[str, Any]:  # fmt: skip
+    """100 m over 80 m; the winch surges by 1 m in 7 s."""
+    section: dict[str, Any] = {"length": 100.0, "mass": 5.0, "diameter": 0.05}
+    section |= {"axial_stiffness": EA} if EA else {}
+    section |= {"bending_stiffness": EI} if EI else {}
+    winch = {
+        "kind": "pinned", "position": [80, 0, 0], "payout": {"rate": rate, "ramp": 4.0},
+        "motion": {"surge": {"amplitude": 1.0, "period": 7.0}, "ramp": 7.0},
+    }  # fmt: skip
+    return {
+        "cable": {"sections": [section]}, "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": winch},
+        "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "time": {"duration": duration, "step": step},
+        "output": {"every": 0.5}, **more,
+    }  # fmt: skip
+
+
+# --- exact solutions --------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("dimension", [None, 3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_a_hanging_line_weighs_what_is_out_less_its_inertia(dimension: int | None, sign: float) -> None:
+    """T = w L - m L dc/dt at the winch, to round-off, through nodes that enter and leave."""
+    more = {"dimension": dimension} if dimension else {}
+    result = hybrid.run(hanging({"rates": [[0, 0], [20, sign * 1.0]]}, 18.0, **more))
+    length = 40.0 + sign * 0.025 * result.t**2
+    assert np.abs(result["payout/length"] - length).max() < 1e-12 * 40.0
+    force = result["reaction_end"][1:, 2]
+    assert np.abs(force / (2.0 * length[1:] * (G - sign * 0.05)) - 1.0).max() < 1e-9
+    np.testing.assert_allclose(result["payout/power"], -result["payout/rate"] * result["reaction_end"][:, 2], rtol=1e-9)
+    out = result["s"][None] > result["payout/length"][:, None]  # on the reel
+    assert not out.any() or np.abs(result["position"][out]).max() < 1e-12
+
+
+def test_a_steady_rate_changes_nothing_but_the_weight() -> None:
+    result = hybrid.run(hanging({"rate": 0.5, "begin": 1.0, "ramp": 4.0, "until": 20.0}, 30.0))
+    steady = (result.t > 7.0) & (result.t < 20.0)
+    weight = 2.0 * G * result["payout/length"]
+    assert np.abs(result["reaction_end"][steady, 2] / weight[steady] - 1.0).max() < 1e-9
+    assert result["payout/length"][-1] == pytest.approx(40.0 + 0.5 * 19.0, abs=1e-12)
+    assert result["payout/rate"][-1] == 0.0
+
+
+def pendulum(step: float, duration: float, payout: dict[str, Any]) -> dict[str, Any]:
+    """A bob of 100 kg on 10 m of a line that weighs next to nothing, let go at 0.3 rad."""
+    return {
+        "cable": {"sections": [{"length": 10.0, "mass": 1e-4}]},
+        "ends": {
+            "start": {"kind": "body", "mass": 100.0, "volume": 0.0},
+            "end": {"kind": "pinned", "position": [0, 0, 0], "payout": payout},
+        },
+        "initial": {"kind": "straight", "direction": [-np.sin(0.3), 0, np.cos(0.3)]},
+        "model": {"kind": "catenary", "slack": "warn"}, "mesh": {"cells": 10},
+        "time": {"duration": duration, "step": step}, "output": {"every": 0.2},
+    }  # fmt: skip
+
+
+def test_a_pendulum_of_variable_length() -> None:
+    """L th'' + 2 L' th' + g sin th = 0 over ten swings, paid out and taken in: order 2, 1e-3 at 0.02 s."""
+    duration = 80.0
+    payout = {"lengths": [[0, 10], [20, 16], [40, 20], [60, 14], [80, 10.5]]}
+    law = law_of(Payout(**payout), 10.0, duration)
+
+    def swing(t: float, y: np.ndarray) -> list[float]:
+        length, rate, _ = length_at(law, t)
+        return [y[1], -(2.0 * rate * y[1] + G * np.sin(y[0])) / length]
+
+    errors = []
+    for step in (0.04, 0.02):
+        result = hybrid.run(pendulum(step, duration, payout))
+        exact = solve_ivp(swing, (0.0, duration), [0.3, 0.0], rtol=1e-10, atol=1e-12, t_eval=result.t).y
+        bob = result["position"][:, 0]
+        errors.append(np.abs(np.arctan2(bob[:, 0], -bob[:, 2]) - exact[0]).max())
+        assert (np.diff(np.sign(exact[0])) != 0).sum() >= 19  # ten swings
+    assert errors[1] < 1e-3
+    assert errors[0] > 3.5 * errors[1]
+
+
+def test_heavier_line_on_the_reel() -> None:
+    """What comes off the reel has its own mass; cells that hold both weigh what they hold."""
+    reel = [{"length": 3.3, "mass": 2.0}, {"length": 50.0, "mass": 7.0, "diameter": 0.05}]
+    result = hybrid.run(hanging({"rates": [[0, 0], [20, 1.0]], "reel": reel}, 18.0))
+    length = result["payout/length"]
+    mass = 2.0 * np.minimum(length, 43.3) + 7.0 * np.maximum(length - 43.3, 0.0)
+    assert np.abs(result["reaction_end"][1:, 2] / (mass * (G - 0.05))[1:] - 1.0).max() < 1e-9
+
+
+def test_out_and_back_is_where_it_was() -> None:
+    section = {"length": 100.0, "mass": 5.0, "axial_stiffness": 2e6, "damping": {"mass": 3.0}}
+    scene = sagging(duration=200.0, step=0.1)
+    scene["cable"] = {"sections": [section]}
+    del scene["ends"]["end"]["motion"]
+    scene["ends"]["end"]["payout"] = {"lengths": [[0, 100], [40, 108], [80, 113], [120, 96], [160, 100]]}
+    result = hybrid.run(scene)
+    assert np.ptp(result["payout/length"]) > 15.0
+    first, last = (x * (result["s"] <= 100.0)[:, None] for x in (result["position"][0], result["position"][-1]))
+    assert np.abs(first - last).max() < 1e-6 * 100.0
+    pull = np.linalg.norm(result["reaction_end"], axis=1)
+    assert abs(pull[-1] / pull[0] - 1.0) < 1e-6
+
+
+# --- kicks and energy -------------------------------------------------------------------------------
+
+
+def forces(scene: dict[str, Any], skip: int | None = None, last: int | None = None) -> tuple[np.ndarray, list[int]]:
+    """Force at the winch after every step, and the steps after which a node enters or leaves.
+
+    skip: that change is not made; last: steps to compute.
+    """
+    found, changes = [], []
+    with hybrid.Simulation(scene) as sim:
+        paying = sim._loop.run.payout
+        assert paying is not None
+        change = paying.change
+
+        def counted(run: Any, model: Any) -> Any:
+            changes.append(len(found))
+            return change(run, model)
+
+        paying.change = counted
+        steps = round(scene["time"]["duration"] / scene["time"]["step"]) - 1
+        for _ in range(min(steps, last or steps)):
+            if skip is not None and len(changes) == skip:
+                paying.reel.numbers[4:6] = 1e9, -1e9  # no cell is too long or too short
+            sim.step()
+            found.append(np.linalg.norm(sim.forces().end))
+    return np.array(found), changes
+
+
+@pytest.mark.parametrize(
+    ("model", "EA", "EI"), [("catenary", None, None), ("catenary", 2e6, None), ("rod", 2e6, 2e4), ("rod", None, 500.0)]
+)
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_a_cell_that_enters_or_leaves_does_not_kick(
+    model: str, EA: float | None, EI: float | None, rate: float
+) -> None:
+    """The force at the winch, within five steps, against a run in which that one cell does not: 0.1 % of the mean."""
+    scene = sagging(model, EA, EI, rate, duration=12.0)
+    found, changes = forces(scene)
+    assert len(changes) >= 3
+    for k, at in enumerate(changes[:3]):
+        other, _ = forces(scene, skip=k, last=at + 6)
+        assert np.abs(other - found[: at + 6])[at:].max() < 1e-3 * found.mean()
+
+
+@pytest.mark.parametrize(("model", "EA", "EI"), [("catenary", None, None), ("rod", 2e6, 2e4)])
+def test_energy_is_balanced_to_second_order(model: str, EA: float | None, EI: float | None) -> None:
+    left, put_in = [], 0.0
+    for step in (0.1, 0.05):
+        result = hybrid.run(sagging(model, EA, EI, step=step))
+        left.append(np.abs(result["work/scheme"]).max())
+        put_in = np.abs(result["work/end"]).max()
+    assert left[1] < 1e-4 * put_in
+    assert left[0] > 3.0 * left[1]
+
+
+# --- resume and Python ------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(("model", "EA", "EI"), [("catenary", None, None), ("rod", 2e6, 2e4)])
+def test_resumed_bit_for_bit(tmp_path: Path, model: str, EA: float | None, EI: float | None) -> None:
+    scene = sagging(model, EA, EI)
+    scene["ends"]["end"]["payout"]["longest"] = 120.0
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
+    shorter = {**scene, "time": {"duration": 11.0, "step": 0.05}}
+    hybrid.run(shorter, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=20.0)
+    for name in ("position", "tension", "reaction_end", "payout/length", "work/end", "work/zones", "work/scheme"):
+        assert np.array_equal(whole[name], resumed[name]), name
+    with np.errstate(invalid="ignore"):
+        for name in ("envelope/tension_max", "envelope/displacement_max", "envelope/tension_t_min"):
+            assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
+
+
+def test_a_resume_does_not_pay_out_more_than_the_result_has_points_for(tmp_path: Path) -> None:
+    hybrid.run(hanging({"rate": 0.5, "ramp": 2.0}, 5.0), output=tmp_path / "a.h5")
+    with pytest.raises(SceneError, match="longest"):
+        hybrid.resume(tmp_path / "a.h5", until=10.0)
+    scene = hanging({"rate": 0.5, "ramp": 2.0, "longest": 50.0}, 5.0)
+    hybrid.run(scene, output=tmp_path / "b.h5")
+    with pytest.raises(SceneError, match="paid out"):
+        hybrid.resume(tmp_path / "b.h5", settings=["ends.start.force=[1, 0, 0]"], until=10.0)
+
+
+def test_a_length_set_from_python_is_that_of_the_scene() -> None:
+    """Rates set at every step: the same line as one whose scene gives them, linear in each step."""
+    rates = {"rates": [[0, 0], [20, 1.0]]}
+    given = hybrid.run(hanging(rates, 10.0, dimension=3))
+    with hybrid.Simulation(hanging({"longest": 60.0}, 10.0)) as sim:
+        while sim.t < 9.99:
+            sim.set_payout(0.05 * (sim.t + 0.05))
+            sim.step()
+        assert sim.length == pytest.approx(40.0 + 0.025 * sim.t**2, abs=1e-9)
+        assert sim.forces().end[2] == pytest.approx(-given["reaction_end"][-1, 2], rel=1e-9)
+        result = sim.result()
+    np.testing.assert_allclose(result["payout/length"], given["payout/length"], atol=1e-9)
+
+
+def test_save_and_restore_go_back_over_cells_that_enter() -> None:
+    with hybrid.Simulation(hanging({"longest": 60.0}, 20.0)) as sim:
+        sim.step()
+        saved, found = sim.save(), []
+        for _ in range(2):
+            for k in range(120):
+                x = 0.05 * (k + 2)
+                sim.set_length(40.0 + 0.05 * x**2, 0.1 * x)
+                sim.step()
+            found.append((sim.forces().end[2], len(sim.state.s)))
+            if len(found) == 1:
+                sim.restore(saved)
+        assert found[0] == found[1]
+        assert found[0][1] > 21
+
+
+def test_wrong_uses_from_python_are_refused_and_harmless() -> None:
+    with hybrid.Simulation(hanging({"longest": 60.0}, 5.0)) as sim:
+        for bad in (100.0, 1.0, float("nan"), "10", None, True, [40.0]):
+            with pytest.raises(ValueError, match="length"):
+                sim.set_length(bad)  # type: ignore[arg-type]
+        for bad in (float("inf"), "1", None, True):
+            with pytest.raises(ValueError, match="rate"):
+                sim.set_payout(bad)  # type: ignore[arg-type]
+        sim.set_payout(900.0)
+        with pytest.raises(ValueError, match="length that is out"):
+            sim.step()
+        sim.set_payout(0.0)
+        sim.step()
+        assert sim.forces().end[2] == pytest.approx(-2.0 * 40.0 * G, rel=1e-9)
+    with hybrid.Simulation(hanging({"rate": 0.5, "ramp": 2.0}, 5.0)) as sim, pytest.raises(ValueError, match="gives"):
+        sim.set_payout(0.1)
+    plain = hanging({}, 5.0)
+    del plain["ends"]["end"]["payout"]
+    with hybrid.Simulation(plain) as sim, pytest.raises(ValueError, match=r"no ends\.end\.payout"):
+        sim.set_length(41.0)
+
+
+# --- refusals ---------------------------------------------------------------------------------------
+
+
+def refused(scene: dict[str, Any]) -> str:
+    with pytest.raises(SceneError) as found:
+        hybrid.run(scene)
+    return str(found.value)
+
+
+RATE: dict[str, Any] = {"rate": 0.5, "ramp": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"accuracy": "1%"}, "accuracy"),
+        ({"time": {"duration": 5.0}}, "time.step"),
+        ({"output": {"errors": True}}, "output.errors"),
+        ({"solver": "shooting"}, "solver"),
+        ({"contact": {"self": True}}, "contact.self"),
+    ],
+)
+def test_what_is_not_possible_is_refused(change: dict[str, Any], where: str) -> None:
+    assert where in refused(hanging(RATE, 5.0) | change)
+
+
+@pytest.mark.parametrize(
+    ("payout", "where"),
+    [
+        ({"rate": 0.5}, "payout.ramp"),
+        ({"rate": 0.5, "ramp": 4, "until": 3}, "payout.until"),
+        ({"rate": 0.5, "ramp": 1, "rates": [[0, 0], [1, 1]]}, "payout.rates"),
+        ({"rates": [[0, 1], [5, 1]]}, "payout.rates"),
+        ({"rates": [[1, 0], [5, 1]]}, "payout.rates"),
+        ({"rates": [[0, 0], [0, 1]]}, "payout.rates"),
+        ({"lengths": [[0, 39], [5, 41], [6, 42]]}, "payout.lengths"),
+        ({"begin": 4}, "payout.begin"),
+        ({"rate": 0.5, "ramp": 1, "longest": 41}, "payout.longest"),
+        ({"rate": 5.0, "ramp": 1, "reel": [{"length": 2, "mass": 2}]}, "payout.reel"),
+        ({"rate": -20.0, "ramp": 1}, "ends.end.payout"),
+        ({"file": "nowhere.csv"}, "payout.file"),
+    ],
+)
+def test_a_length_that_cannot_be_is_refused(payout: dict[str, Any], where: str) -> None:
+    assert where in refused(hanging(payout, 6.0))
+
+
+def test_other_refusals() -> None:
+    scene = hanging(RATE, 5.0)
+    scene["cable"]["sections"][0] |= {"bending_stiffness": 10.0, "axial_stiffness": 1e6}
+    assert "model" in refused({**scene, "model": "adaptive"})
+    scene["cable"]["sections"][0]["damping"] = {"stiffness": 0.01}
+    assert "damping.stiffness" in refused(scene)
+    scene = hanging(RATE, 5.0)
+    scene["ends"] = {"start": scene["ends"]["end"], "end": scene["ends"]["start"]}
+    assert "ends.start.payout" in refused(scene)
+    scene = hanging(RATE, 5.0)
+    scene["ends"]["end"]["release_at"] = {"time": 2.0}
+    assert "release_at" in refused(scene)
+    scene = hanging(RATE, 5.0)
+    scene["cable"]["attachments"] = [{"kind": "clump", "at": 39.0, "mass": 5.0}]
+    assert "cells" in refused(scene)
+
+
+def test_rates_and_lengths_from_a_file(tmp_path: Path) -> None:
+    table = tmp_path / "rates.csv"
+    table.write_text("rate,t\n0,0\n0.3,10\n0.6,20\n")
+    given = hybrid.run(hanging({"rates": [[0, 0], [10, 0.3], [20, 0.6]]}, 10.0))
+    found = hybrid.run(hanging({"file": str(table)}, 10.0))
+    assert np.array_equal(given["payout/length"], found["payout/length"])
+    assert np.array_equal(given["reaction_end"], found["reaction_end"])
+    for text in (
+        "t,rates\n0,0\n",
+        "t,rate\n0,0\n0,1\n",
+        "t,rate\n0,1\n2,1\n",
+        "t,length\n0,40\n2,41\n",
+        "t,rate\n0,x\n",
+    ):
+        table.write_text(text)
+        assert "payout.file" in refused(hanging({"file": str(table)}, 10.0))

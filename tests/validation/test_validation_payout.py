@@ -1,0 +1,56 @@
+"""Line that is paid out from a ship: Zajac's straight line, and the example."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+import hybrid
+
+EXAMPLES = Path(__file__).parents[2] / "examples"
+
+
+def test_laid_at_the_speed_of_the_ship_a_cable_is_a_straight_line() -> None:
+    """w cos a = 1/2 rho Cd d V^2 sin^2 a (Zajac 1957): the angle to 1e-3, the pull steady within 0.1 %."""
+    speed, depth, length = 1.0, 40.0, 160.0
+    section = {
+        "length": length, "mass": 2.0, "diameter": 0.04, "axial_stiffness": 2e6, "bending_stiffness": 50.0,
+        "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    }  # fmt: skip
+    ship = {
+        "kind": "pinned", "position": [length - 10.6, 0, 0], "motion": {"velocity": [speed, 0, 0], "ramp": 20},
+        "payout": {"rate": speed, "ramp": 20},
+    }  # fmt: skip
+    friction = {"axial": 0.5, "lateral": 0.5}
+    result = hybrid.run({
+        "environment": {
+            "fluid": {"density": 1025},
+            "seabed": {"z": -depth, "stiffness": 2e3, "damping": 5e2, "friction": friction},
+        },
+        "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -depth]}, "end": ship},
+        "initial": "equilibrium", "model": "rod", "dimension": 2, "mesh": {"cells": 160},
+        "time": {"duration": 420, "step": 0.1}, "output": {"every": 1.0, "points": 1201},
+    })  # fmt: skip
+    w, k = (2.0 - 1025 * np.pi * 0.04**2 / 4) * 9.81, 0.5 * 1025 * 1.2 * 0.04 * speed**2
+    cosine = (np.sqrt(w * w + 4 * k * k) - w) / (2 * k)
+    angle = 0.5 * np.pi - result["theta"][-1]
+    z = result["position"][-1, :, 2]
+    between = (z > -25.0) & (z < -2.0) & (result["s"] < result["payout/length"][-1])
+    assert np.abs(angle[between] / np.arccos(cosine) - 1.0).max() < 1e-3
+    pull = np.linalg.norm(result["reaction_end"], axis=1)[-60:]
+    assert np.ptp(pull) < 1e-3 * pull.mean()
+    laid = (result["s"] > 170.0) & (result["s"] < 300.0)
+    assert np.abs(result["velocity"][-1, laid]).max() < 1e-3
+
+
+def test_a_vehicle_goes_down_on_a_tether_that_is_paid_out() -> None:
+    """What the head of the example says."""
+    result = hybrid.run(EXAMPLES / "rov_descent.yaml")
+    assert abs(result["payout/length"][-1] - 998.0) < 1e-9
+    pull = np.linalg.norm(result["reaction_end"], axis=1)
+    for begin, mean in ((40, 2.26e3), (900, 3.89e3), (1000, 5.70e3)):
+        assert abs(pull[begin : begin + 40].mean() / mean - 1.0) < 0.01
+    assert abs(result["position"][-1, 0, 2] + 1001.8) < 1.0 and abs(result["position"][-1, 0, 0] - 42.3) < 1.0
+    assert abs(result["payout/power"].min() + 6.05e3) < 100.0
