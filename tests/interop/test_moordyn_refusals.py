@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 
 import pytest
@@ -183,9 +184,9 @@ words = st.one_of(st.sampled_from(ODD), st.text(max_size=12), st.floats().map(st
 
 
 @st.composite
-def mutated(draw: st.DrawFn) -> str:
+def mutated(draw: st.DrawFn, texts: Sequence[str] = TEXTS) -> str:
     """A deck with cells, rows and characters changed, dropped, doubled and swapped."""
-    rows = [row.split(" ") for row in draw(st.sampled_from(TEXTS)).split("\n")]
+    rows = [row.split(" ") for row in draw(st.sampled_from(texts)).split("\n")]
     for _ in range(draw(st.integers(1, 6))):
         i = draw(st.integers(0, len(rows) - 1))
         full = [j for j, cell in enumerate(rows[i]) if cell] or [0]

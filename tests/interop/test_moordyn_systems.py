@@ -6,7 +6,9 @@ import math
 from pathlib import Path
 
 import pytest
+from hypothesis import HealthCheck, given, settings
 from moordyn_decks import DECKS, FOLDER, one_scene, text_of
+from test_moordyn_refusals import mutated
 
 import hybrid
 from hybrid.interop.moordyn import import_moordyn
@@ -180,3 +182,14 @@ def test_angles_of_a_deck_are_rotations_of_a_scene_and_back(angles: tuple[float,
     for v in ((1.0, 2.0, 3.0), (-1.0, 0.0, 0.5)):
         assert turned(rotation_of(angles), v) == pytest.approx(_rotated(angles, v))
         assert _rotated(angles_of(rotation_of(angles)), v) == pytest.approx(_rotated(angles, v))
+
+
+@settings(max_examples=200, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(mutated([RISER, RISER.replace("3 Body1 0 0 0 0", "3 Body1 1 0 0.5 0"), text_of("rods_and_bodies")]))
+def test_a_mutated_deck_is_one_scene_or_refused_with_its_line(tmp_path: Path, text: str) -> None:
+    (tmp_path / "deck.txt").write_bytes(text.encode("utf-8", errors="surrogateescape"))
+    try:
+        assert import_moordyn(tmp_path / "deck.txt").scenes
+    except hybrid.SceneError as error:
+        lines = {c.line for c in error.complaints if c.where not in ("LINE TYPES", "LINES")}
+        assert all(line is not None and 1 <= line <= text.count("\n") + text.count("\r") + 1 for line in lines)
