@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
-from hybrid.errors import ComputationError
-from hybrid.kernels.forces import SEABED
+from hybrid.errors import Complaint, ComputationError, SceneError
+from hybrid.kernels.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.report import REPORT_SIZE, SEABED_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Floats, batch_of_one
@@ -47,6 +47,8 @@ class StaticCase:
         model, found, switching = self._equilibrium(resolution)
         observer = self._observer(model)
         texts = {"scene": scene_text(self.scene)}
+        if model.line.bits & SELF_CONTACT:
+            refuse_contact(self.scene, model, found)
         envelope = Envelope(self.scene, model, moves=False)
         with result_recorder(self.scene, model, observer, target, texts, found, envelope) as recorder:
             ends, events = model.ends.at(np.inf), EventLog()
@@ -118,6 +120,21 @@ class StaticCase:
             corrected=model.corrected, jumps=jumps, changes=section_changes(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
         )  # fmt: skip
+
+
+def refuse_contact(scene: Scene, model: Model, found: Equilibrium) -> None:
+    """SceneError: the equilibrium, in which no contact is computed, has parts of the line on or in each other."""
+    met: list[tuple[float, float]] = []
+
+    def event(t: float, s: float, other: float, kind: str, text: str, **_: float) -> None:
+        met.append((s, other))
+
+    of_equilibrium(Envelope(scene, model, moves=False), scene, model, found, event)
+    for s, other in met:
+        given = f"true, where the equilibrium without contact touches itself at s = {s:.6g} m and s = {other:.6g} m"
+        expected = "a line that does not touch itself in equilibrium: statics compute no contact of a line with itself"
+        fix = "`hybrid run` with `damping` of the sections, from a start that is apart, until it rests; or leave it out"
+        raise SceneError([Complaint("contact.self", given, expected, fix)])
 
 
 def _values(model: Model, found: Equilibrium, observer: Observer) -> dict[str, object]:

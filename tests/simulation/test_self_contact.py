@@ -231,6 +231,48 @@ def test_it_resumes_bit_for_bit_with_zones_that_move(tmp_path: Path, monkeypatch
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
 
 
+def test_an_equilibrium_that_touches_itself_is_refused() -> None:
+    """A weight pulls the legs of a line straight, 0.95 diameters apart."""
+    ends = {
+        "start": {"kind": "pinned", "position": [0, 0, 0]},
+        "end": {"kind": "pinned", "position": [0, 0.95 * WIDTH, 0]},
+    }
+    with pytest.raises(hybrid.SceneError, match=r"touches itself at s = .* m and s = .* m[\s\S]*hybrid run"):
+        weighted = closing("rod", ends=ends)
+        weighted["cable"]["sections"][0]["bending_stiffness"] = 1e-4
+        weighted["cable"]["attachments"] = [{"kind": "clump", "at": 4.0, "mass": 10.0}]
+        hybrid.static(hybrid.validate_scene(weighted))
+    apart = hybrid.static(hybrid.validate_scene(closing("rod")))
+    assert apart.status == "complete" and not apart["self_contact"].any()
+
+
+def test_a_strand_lies_on_another_on_a_seabed() -> None:
+    """One end of a line on the bed is led across the other leg and lies on it there: the bed bears both."""
+    shut = {"travel": {"by": [0.4, -0.8, 0.0], "over": 2.5}}
+    r = np.array(
+        [[0, 0.25, 0], [1, 0.25, 0], [1.1, 0.2, 0], [1.15, 0, 0], [1.1, -0.2, 0], [1, -0.25, 0], [0, -0.25, 0.0]]
+    )
+    scene = closing(
+        "rod", mesh={"cells": 110},
+        environment={"seabed": {"z": -0.05, "stiffness": 2e4, "damping": 200.0, "friction": 0.3}},
+        initial={"kind": "points", "points": r.tolist()},
+        ends={
+            "start": {"kind": "pinned", "position": r[0].tolist(), "motion": shut},
+            "end": {"kind": "pinned", "position": r[-1].tolist()},
+        },
+    )  # fmt: skip
+    scene["cable"]["sections"][0]["length"] = float(np.linalg.norm(np.diff(r, axis=0), axis=1).sum())
+    scene["time"] = {"duration": 3.5, "step": 0.01}
+    result = hybrid.run(hybrid.validate_scene(scene))
+    both = (result["self_contact"] > 0.0) & (result["contact"] > 0.0)
+    assert both[-1].any(), "contact with the bed and with the line at the same place"
+    assert result["contact"][-1][both[-1]].max() > 3.0 * 0.4 * 9.81
+    assert float(result["self_distance/distance"]) > 0.85 * WIDTH
+    assert result["position"][:, :, 2].min() > -0.05 - 0.5 * WIDTH
+    put_in = np.abs(result["work/end"]).max() + np.abs(result["work/start"]).max() + np.ptp(result["energy/potential"])
+    assert result["work/scheme"].max() < 1e-2 * put_in
+
+
 @pytest.mark.parametrize(
     "model",
     [
