@@ -39,6 +39,7 @@ from hybrid.kernels.self_contact_pairs import (
     FRICTION,
     GRIPS,
     HORIZON,
+    KEEPS,
     MOST_PRODUCTS,
     NODES,
     OVERFLOW,
@@ -48,12 +49,14 @@ from hybrid.kernels.self_contact_pairs import (
     SINCE,
     SLIP_WORK,
     SPEED,
+    STALE,
     STORED,
     TRIED,
     Contact,
     blank_contact,
-    fill_tree,
+    farthest_from_mean,
     find_points,
+    keep_pairs,
     limit,
     look_ahead,
 )
@@ -303,11 +306,11 @@ def rest_points(line, contact):
 
 @inner
 def place(contact, old, u):
-    """The nodes of a configuration, and their tree."""
+    """The nodes of a configuration."""
     for i in range(u.shape[0]):
         for k in range(3):
             contact.at[i, k] = old.r[i, k] + u[i, k]
-    fill_tree(contact.tree, contact.at)
+    contact.counts[STALE] = 1
 
 
 @inner
@@ -322,9 +325,10 @@ def prepare(line, ends, contact, old, u, dt):
             u[i, k] = 0.0
             contact.move[i, k] = dt * old.v[i, k] + 0.5 * dt * dt * old.a[i, k]
     place(contact, old, u)
-    find_points(line, ends, contact)
+    keep_pairs(line, ends, contact)
+    find_points(line, ends, contact, 0.0)
     numbers[SPEED] = 0.0
-    limit(line, ends, contact)
+    limit(line, ends, contact, 0.0)
     near = numbers[SPEED] > 0.0 or contact.counts[POINTS] > 0
     numbers[SPEED] = speed if contact.counts[POINTS] > 0 else numbers[SPEED] / dt
     return near
@@ -369,11 +373,13 @@ def contact_task(table):
         for i in range(work.x.shape[0]):
             for k in range(3):
                 contact.move[i, k] = work.x[i, 1 + k]
-        limit(line, ends, contact)
+        limit(line, ends, contact, farthest_from_mean(work.u))
         contact.numbers[SPEED] = speed
         return contact.numbers[PART]
     place(contact, old, work.u)
-    find_points(line, ends, contact)
+    if phase == REST:
+        numbers[KEEPS] = -1.0
+    find_points(line, ends, contact, farthest_from_mean(work.u))
     if rubs and phase == REST:
         rest_points(line, contact)
     elif rubs:

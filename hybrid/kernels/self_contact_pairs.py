@@ -14,20 +14,32 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import add, dot, scale, sub
 from hybrid.kernels.self_contact_friction import GRIP, HOLD
 from hybrid.kernels.self_contact_law import INNER, OUTER, POINT, P, Q, foot, note_point, spline_point, spline_weights
-from hybrid.kernels.self_distance import DEPTH, LEAF, NEIGHBOURS, box_distance, fill_parents, nearest_feet, runs_on
+from hybrid.kernels.self_distance import (
+    DEPTH,
+    LEAF,
+    NEIGHBOURS,
+    TURNED,
+    box_distance,
+    fill_parents,
+    nearest_feet,
+    runs_on,
+)
 from hybrid.kernels.state import Floats
 
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
 IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
 MOST_PRODUCTS = 60  # of GMRES
+PAIRS_OF_NODE = 8  # that are kept at most
+LEAST_KEEPS = 0.05  # diameters, of KEEPS
 FAR = 2.0  # diameters within which parts of the line are near each other
 LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of what is only foreseen
 (
     PART,  # of a correction that is safe
     ENERGY,  # J, of contact
     SPEED,  # m/s, with which pieces may meet in the step that is prepared
-    WIDEST,  # m, diameter
+    WIDEST,
+    NARROWEST,  # m, diameters
     REACH,  # m, distance within which pairs are looked at
     FRICTION,  # coefficient of friction; 0: none
     STORED,  # J, in the travels that are kept
@@ -35,12 +47,13 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     SINCE,  # s, time that the try led to
     SLIP_WORK,  # J, of friction in the step
     HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
+    KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
     ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
-) = range(12)
-NUMBERS = 12
-WATCH = -1  # beside LIMIT and TOUCH: how near the line is to itself
-POINTS, NODES, OVERFLOW, GRIPS, FRESH = range(5)  # of `counts`
-COUNTS = 5
+) = range(14)
+NUMBERS = 14
+WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
+POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE = range(7)  # of `counts`; STALE: the tree is of other positions
+COUNTS = 7
 
 
 class Contact(NamedTuple):
@@ -54,6 +67,7 @@ class Contact(NamedTuple):
     counts: NDArray[np.int64]  # (COUNTS,)
     tree: Floats  # as kernels.self_distance has it, of pieces
     stack: NDArray[np.int64]
+    pairs: NDArray[np.int64]  # (L, 2) pieces that may come near each other in a step
     at: Floats  # (N+1, 3) m, nodes
     move: Floats  # (N+1, 3) m, the correction that is to be limited
     near: Floats  # (N+1,) FAR diameters over the distance to other parts of the line, now or foreseen
@@ -82,7 +96,8 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contac
         leaves *= 2
     return Contact(
         width=z(nodes), samples=np.ones(nodes, np.int64), stiff=z(nodes), mass=z(nodes), numbers=z(NUMBERS),
-        counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64), at=z((nodes, 3)),
+        counts=z(COUNTS, np.int64), tree=z((2 * leaves, 12)), stack=z((4 * DEPTH, 2), np.int64),
+        pairs=z((PAIRS_OF_NODE * nodes, 2), np.int64), at=z((nodes, 3)),
         move=z((nodes, 3)), near=z(nodes), points=z((points, POINT)), nodes=z(nodes, np.int64), marks=z(nodes, np.int64),
         x=z((nodes, 4)), y=z((nodes, 4)), b=z((nodes, 5)), z=z((nodes, 5)),
         basis=z((MOST_PRODUCTS + 1, (4 if friction else 3) * nodes)), hessenberg=z((MOST_PRODUCTS + 1, MOST_PRODUCTS + 4)),
@@ -210,12 +225,27 @@ def note_near(contact, p, q, width):
 
 
 @inner
+def keep_pair(contact, p, q, room):
+    """Keep a pair if displacements up to KEEPS use up its room, m."""
+    numbers, count = contact.numbers, contact.counts[PAIRS]
+    if not room < 2.0 * numbers[KEEPS]:
+        return
+    if count == contact.pairs.shape[0]:
+        numbers[KEEPS] = -1.0
+        return
+    contact.pairs[count, 0], contact.pairs[count, 1] = p, q
+    contact.counts[PAIRS] = count + 1
+
+
+@inner
 def look_at_pair(line, ends, contact, phase, p, q):
     """What there is to do for pieces p < q whose boxes may be near: limit what is asked, or keep points of contact."""
     if not may_touch(line, ends, contact.width, p, q):
         return
     apart, width = hull_distance(contact.at, p, q), 0.5 * (contact.width[p] + contact.width[q])
-    if phase == WATCH:
+    if phase == COLLECT:
+        keep_pair(contact, p, q, apart - OUTER * width)
+    elif phase == WATCH:
         note_near(contact, p, q, width)
     elif phase == LIMIT:
         moved = largest_difference(contact.move, p, q)
@@ -231,14 +261,23 @@ def look_at_pair(line, ends, contact, phase, p, q):
 
 @inner
 def look_at_pairs(line, ends, contact, phase):
-    """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else."""
+    """Look at all pairs of pieces whose boxes are within REACH, in an order that does not depend on anything else.
+
+    Pairs that are kept for displacements up to KEEPS are found where no cone of tangents is so narrow that these could
+    not bring it together.
+    """
     tree, stack, n = contact.tree, contact.stack, line.h.shape[0]
-    leaves, reach = tree.shape[0] // 2, contact.numbers[REACH]
+    leaves, reach, turned = tree.shape[0] // 2, contact.numbers[REACH], TURNED
+    if phase == COLLECT:
+        turned = max(TURNED, (OUTER + 2.0 * contact.numbers[KEEPS] / contact.numbers[NARROWEST]) / WINDOW)
+    if contact.counts[STALE]:
+        fill_tree(tree, contact.at)
+        contact.counts[STALE] = 0
     stack[0, 0], stack[0, 1], top = 1, 1, 1
     while top > 0:
         top -= 1
         a, b = stack[top, 0], stack[top, 1]
-        if (b - a <= 1 and runs_on(tree, a, b)) or not box_distance(tree, a, b) < reach:
+        if (b - a <= 1 and turned < 1.0 and runs_on(tree, a, b, turned)) or not box_distance(tree, a, b) < reach:
             continue
         if a >= leaves:
             first, second = (a - leaves) * LEAF, (b - leaves) * LEAF
@@ -271,12 +310,34 @@ def farthest_from_mean(move):
 
 
 @inner
-def limit(line, ends, contact):
-    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m."""
+def keep_pairs(line, ends, contact):
+    """Keep the pairs that twice the displacements contact.move, or a part of a diameter, may bring together."""
     numbers = contact.numbers
-    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * farthest_from_mean(contact.move) / SAFE
+    numbers[KEEPS] = max(2.0 * farthest_from_mean(contact.move), LEAST_KEEPS * numbers[WIDEST])
+    numbers[REACH], contact.counts[PAIRS] = OUTER * numbers[WIDEST] + 2.0 * numbers[KEEPS], 0
+    look_at_pairs(line, ends, contact, COLLECT)
+
+
+@inner
+def look_at_kept(line, ends, contact, phase, gone):
+    """Look at the pairs that are kept, or where displacements have gone farther, m, at all."""
+    if gone <= contact.numbers[KEEPS]:
+        for k in range(contact.counts[PAIRS]):
+            look_at_pair(line, ends, contact, phase, contact.pairs[k, 0], contact.pairs[k, 1])
+    else:
+        look_at_pairs(line, ends, contact, phase)
+
+
+@inner
+def limit(line, ends, contact, gone):
+    """The part of contact.move that is safe; SPEED becomes the largest difference of what may come into contact, m.
+
+    gone: m, largest displacement in the step so far.
+    """
+    numbers, far = contact.numbers, farthest_from_mean(contact.move) / SAFE
+    numbers[REACH] = OUTER * numbers[WIDEST] + 2.0 * far
     numbers[PART] = 1.0
-    look_at_pairs(line, ends, contact, LIMIT)
+    look_at_kept(line, ends, contact, LIMIT, gone + far)
 
 
 @inner
@@ -292,14 +353,14 @@ def look_ahead(line, ends, contact, v):
 
 
 @inner
-def find_points(line, ends, contact):
-    """The points of contact, their energy, and the nodes in contact."""
+def find_points(line, ends, contact, gone):
+    """The points of contact, their energy, and the nodes in contact; gone: m, largest displacement in the step."""
     counts, numbers = contact.counts, contact.numbers
     for k in range(counts[NODES]):
         contact.marks[contact.nodes[k]] = 0
     counts[POINTS], counts[NODES], counts[OVERFLOW], numbers[ENERGY] = 0, 0, 0, 0.0
     numbers[REACH] = OUTER * numbers[WIDEST]
-    look_at_pairs(line, ends, contact, TOUCH)
+    look_at_kept(line, ends, contact, TOUCH, gone)
     for k in range(counts[POINTS]):
         for of in (P, Q):
             p = int(contact.points[k, of])

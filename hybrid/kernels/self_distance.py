@@ -145,15 +145,18 @@ def fill_parents(tree):
 
 
 @inner
-def runs_on(tree, a, b):
-    """Whether no two points of what follows from box a to box b, which are the same or neighbours, are near."""
+def runs_on(tree, a, b, turned):
+    """Whether no two points of what follows from box a to box b, which are the same or neighbours, are nearer than
+
+    `turned` of the line between them.
+    """
     size, along = 0.0, 0.0
     for k in range(3):
         low, high = min(tree[a, 6 + k], tree[b, 6 + k]), max(tree[a, 9 + k], tree[b, 9 + k])
         c = low + high
         size += c * c
         along += min(c * low, c * high)
-    return along > 0.0 and along >= TURNED * math.sqrt(size)  # an empty box, of which nothing is known, has a NaN
+    return along > 0.0 and along >= turned * math.sqrt(size)  # an empty box, of which nothing is known, has a NaN
 
 
 @inner
@@ -251,7 +254,7 @@ def search(line, ends, before, state, itself):
     while top > 0:
         top -= 1
         a, b = stack[top, 0], stack[top, 1]
-        if b - a <= 1 and runs_on(tree, a, b):
+        if b - a <= 1 and runs_on(tree, a, b, TURNED):
             continue
         if not box_distance(tree, a, b) - widest < found[CLEARANCE]:
             continue

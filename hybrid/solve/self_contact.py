@@ -18,6 +18,7 @@ from hybrid.kernels.self_contact_pairs import (
     FRICTION,
     GRIPS,
     HORIZON,
+    NARROWEST,
     POINTS,
     ROLLS,
     SINCE,
@@ -59,7 +60,7 @@ class SelfContact:
         contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))
         contact.mass[:] = line.mass / pieces
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
-        contact.numbers[SINCE] = np.nan
+        contact.numbers[SINCE], contact.numbers[NARROWEST] = np.nan, contact.width.min()
         holds_twist = line.spin.all() and bool((line.element * line.kb[:, 2])[[0, -1]].any())
         contact.numbers[ROLLS] = float(bool(line.bits & ROTARY) or holds_twist)
         self.contact = contact
