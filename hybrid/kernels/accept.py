@@ -55,7 +55,7 @@ from hybrid.kernels.books import (
     ZONES,
 )
 from hybrid.kernels.compile import inner
-from hybrid.kernels.forces import SEABED
+from hybrid.kernels.forces import SEABED, SELF_CONTACT
 from hybrid.kernels.newton import OK, SLACK
 from hybrid.kernels.powers import book_work, find_powers, pull
 from hybrid.kernels.report import (
@@ -227,7 +227,20 @@ def end_step(line, state, clock, count):
         return
     if count[REPEATS] > 0 and line.bits & SEABED:
         settle_impact(state, clock[UNTIL] - clock[BEGIN])
+    if count[REPEATS] > 0 and line.bits & SELF_CONTACT:
+        settle_spins(state, clock[UNTIL] - clock[BEGIN])
     count[PHASE] = BEGIN_STEP
+
+
+@inner
+def settle_spins(state, dt):
+    """After shortened steps: friction of the line on itself leaves spin accelerations that would multiply all spins."""
+    fastest = 0.0
+    for c in range(state.w.shape[0]):
+        fastest = max(fastest, abs(state.w[c]))
+    for c in range(state.w.shape[0]):
+        if abs(state.wa[c]) * dt > fastest:
+            state.wa[c], state.wd[c] = 0.0, 0.0
 
 
 @inner

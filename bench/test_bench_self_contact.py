@@ -1,0 +1,149 @@
+"""Contact of a line with itself: random throws, and what searching and solving cost.
+
+    pytest bench/test_bench_self_contact.py -m bench -s
+
+Processor time of this process; ratios are taken within one run.
+"""
+
+from __future__ import annotations
+
+import time
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.kernels.energies import observe
+from hybrid.kernels.newton import NEAR
+from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, TRIED
+from hybrid.kernels.self_distance import LEAST_DISTANCE, LEAST_OTHER, LEAST_S
+from hybrid.simulation.transient import Transient
+
+pytestmark = pytest.mark.bench
+STIFF = 0.1  # N m2
+THROWS, SECONDS = 1000, 120.0
+
+
+def hairpin(angle: float, gap: float, chord: float) -> np.ndarray:
+    """Nodes (N+1, 3) m of a line whose two straight legs cross at an angle (deg), a gap (m) apart, and a bow."""
+    a, x = np.radians(angle), np.linspace(-0.5, 0.5, 25)
+    first = np.column_stack([x, 0.0 * x, 0.0 * x])
+    second = np.column_stack([-x * np.cos(a), -x * np.sin(a), 0.0 * x + gap])
+    leave, arrive = (p / np.linalg.norm(p) for p in (first[1] - first[0], second[1] - second[0]))
+    u = np.linspace(0.0, 1.0, 60)[1:-1, None]
+    way = 3.0 * np.linalg.norm(second[0] - first[-1]) + 1.2
+    bow = (2 * u**3 - 3 * u**2 + 1) * first[-1] + (3 * u**2 - 2 * u**3) * second[0]
+    bow += way * ((u**3 - 2 * u**2 + u) * leave + (u**3 - u**2) * arrive)
+    r = np.vstack([first, bow, second])
+    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+    at = np.linspace(0.0, s[-1], round(s[-1] / chord) + 1)
+    return np.column_stack([np.interp(at, s, r[:, k]) for k in range(3)])
+
+
+def flying(r: np.ndarray, width: float, step: float, duration: float, friction: float, rho: float) -> hybrid.Simulation:
+    """A line with nodes at r, m, that nothing holds."""
+    s = np.append(0.0, np.cumsum(np.linalg.norm(np.diff(r, axis=0), axis=1)))
+    section = {
+        "length": float(s[-1]), "mass": 0.4, "diameter": width, "bending_stiffness": STIFF, "axial_stiffness": 2e5,
+        "torsional_stiffness": 0.8 * STIFF,
+    }  # fmt: skip
+    return hybrid.Simulation(hybrid.validate_scene({
+        "environment": {"gravity": 1e-15}, "cable": {"sections": [section]},
+        "contact": {"self": True, "friction": friction},
+        "ends": {"start": {"kind": "free"}, "end": {"kind": "free"}}, "model": "rod", "mesh": {"nodes": s.tolist()},
+        "initial": {"kind": "points", "points": r.tolist()}, "dimension": 3,
+        "time": {"duration": duration, "step": step, "rho_inf": rho}, "output": {"every": 2.0 * duration, "points": 5},
+    }))  # fmt: skip
+
+
+def energy(run: Transient) -> float:
+    """Kinetic, elastic and contact energy, with that of travels, J."""
+    x, parts = run.state, np.zeros(4)
+    room = np.zeros((x.T.size + 1, 3))
+    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, room, room.copy(), parts)
+    numbers = run.run.contact.contact.numbers
+    return float(parts.sum() + numbers[ENERGY] + numbers[TRIED])
+
+
+def ring(chord: float, radius: float = 0.4) -> tuple[np.ndarray, np.ndarray]:
+    """Nodes (N+1, 3) m of an open ring in the plane y = 0, and velocities that flatten it to 1 m/s without stretching it.
+
+    What is left of the flattening at the nodes is taken from chord to chord, so that none is stretched.
+    """
+    turn = np.linspace(0.05, 2.0 * np.pi - 0.05, round(2.0 * np.pi * radius / chord))
+    out, along = np.column_stack([np.cos(turn), 0.0 * turn, np.sin(turn)]), np.zeros((turn.size, 3))
+    along[:, 0], along[:, 2] = -np.sin(turn), np.cos(turn)
+    r = radius * out
+    v = 0.5 * (np.cos(2.0 * turn)[:, None] * out - 0.5 * np.sin(2.0 * turn)[:, None] * along)
+    d = np.diff(r, axis=0)
+    d /= np.linalg.norm(d, axis=1)[:, None]
+    change = np.diff(v, axis=0)
+    change -= (change * d).sum(axis=1)[:, None] * d
+    return r, v[0] + np.vstack([np.zeros(3), np.cumsum(change, axis=0)])
+
+
+def throw(seed: int) -> dict[str, float]:
+    """One throw: an even seed flattens a ring in its plane, an odd one throws legs that cross; every third is smooth."""
+    random = np.random.default_rng(seed)
+    width, speed = random.uniform(0.01, 0.04), float(np.exp(random.uniform(np.log(2.0), np.log(20.0))))
+    steps, friction = random.uniform(1.0, 10.0), 0.0 if seed % 3 == 0 else random.uniform(0.05, 0.8)
+    r, v = ring(0.025)
+    if seed % 2:
+        r = hairpin(random.uniform(15.0, 90.0), 3.0 * width, 0.025)
+        v = np.zeros_like(r)
+        v[:, 2] = -0.5 - 0.5 * np.tanh(np.linspace(-1.0, 1.0, len(r)) / 0.15)
+    step, duration = steps * width / speed, 60.0 * width / speed * max(1.0, 0.5 * steps)
+    simulation = flying(r, width, step, duration, friction, 0.9 if seed % 2 else 0.5)
+    run = simulation._loop.run
+    run.state.v[:] = v * speed
+    run.state.v[:] += 0.05 * speed * random.normal(size=3) * [1.0, seed % 2, 1.0]
+    run._find_accelerations()
+    mass = run.model.line.mass[:, None]
+    momentum, first, most, touched = (mass * run.state.v).sum(axis=0), energy(run), 0.0, False
+    last, contact, gained = first, run.run.contact, 0.0
+    while simulation.t < duration * (1.0 - 1e-9):
+        simulation.advance(min(simulation.t + step, duration))
+        last, before = energy(run), last
+        most, gained = max(most, last), gained + (last - before) * contact.call[NEAR]
+        touched |= contact.contact.counts[POINTS] > 0
+    touched |= float(run.envelope.itself.itself.found[LEAST_DISTANCE]) < 1.03 * width
+    found = run.envelope.itself.itself.found
+    ends = run.model.line.s[[2, -3]]
+    inside = all(ends[0] < found[k] < ends[1] for k in (LEAST_S, LEAST_OTHER))
+    moved = np.abs((mass * run.state.v).sum(axis=0) - momentum).max() / (mass.sum() * speed)
+    return {
+        "touched": float(touched), "energy": most / first, "gained": gained / first, "momentum": float(moved), "steps": run.steps / (duration / step),
+        "space": float(seed % 2), "inside": float(inside), "distance": float(run.envelope.itself.itself.found[LEAST_DISTANCE]) / width,
+    }  # fmt: skip
+
+
+def test_throws() -> None:
+    """Speeds of 2 to 20 m/s, diameters of 1 to 4 cm, in steps in which a strand could pass 1 to 10 diameters.
+
+    A ring that flattens gains energy in free flight where steps are long, without contact as with it (rho_inf is 0.5
+    there): what is judged is the energy that steps near contact gain.
+    The least distance is that of polygons on straight ways within steps: above 0 nothing has passed through.  Half a
+    cell at each end of the line is no part of contact: throws that are nearest at an end do not count.
+    """
+    found: list[dict[str, float]] = []
+    failed: list[tuple[int, str]] = []
+    begin = time.process_time()
+    while len(found) + len(failed) < THROWS and time.process_time() - begin < SECONDS:
+        seed = len(found) + len(failed)
+        try:
+            found.append(throw(seed))
+        except hybrid.ComputationError as error:
+            failed.append((seed, str(error).splitlines()[0]))
+    values = {name: np.array([x[name] for x in found]) for name in found[0]}
+    print(f"\n{len(found)} throws, {values['touched'].mean():.1%} touched, {len(failed)} failed {failed[:5]}")
+    print(f"largest energy in space {values['energy'][values['space'] > 0].max():.5f} of the start")
+    print(
+        f"in the plane {values['energy'][values['space'] == 0].max():.4f}; steps near contact gain at most {values['gained'].max():.1e}"
+    )
+    print(f"momentum {values['momentum'].max():.1e}; steps {values['steps'].mean():.2f} of those asked")
+    touched = values["distance"][(values["touched"] > 0.0) & (values["inside"] > 0.0)]
+    print(f"least distance {touched.min():.3f} D, 1 % {np.percentile(touched, 1):.3f}, median {np.median(touched):.3f}")
+    assert not failed and values["touched"].mean() > 0.9
+    assert values["energy"][values["space"] > 0].max() <= 1.001 and values["gained"].max() <= 1e-3
+    assert values["momentum"].max() < 1e-13
+    assert touched.min() > 0.0
