@@ -216,7 +216,8 @@ class Room:
         fixed: list[int] = []
         slopes: list[int] = []
         self._given: list[tuple[str, Any, int]] = []  # name, pattern, where its numbers begin
-        self._last: dict[str, Any] = {}  # given, of which `_fixed` has the numbers
+        # views of before, with their numbers and what was given for them
+        self._made: dict[int, tuple[Any, NDArray[np.int64], dict[str, Any]]] = {}
         self._fields: list[Any] = []  # name; type, offset, and what is fixed and what grows of shapes
         for (name, dtype, dims, n), (*_, offset) in zip(packed._fields, places, strict=True):
             self._fields.append((name, dtype, offset, dims))
@@ -229,21 +230,22 @@ class Room:
 
     def view(self, cells: int, **given: Any) -> Any:
         """One for so many cells, in this memory: whatever was there before is overwritten by what is put there."""
-        block, values = self._block, []
-        for name, dtype, offset, dims in self._fields:
-            if dtype is None:
-                values.append(given[name])
-            else:
-                values.append(np.ndarray([a + k * cells for a, k in dims], dtype, block, offset))
-        value, numbers = self._make(values), self._fixed + cells * self._slopes
-        for name, pattern, at in self._given:
-            value_given = given[name]
-            if self._last.get(name, self) is not value_given:
-                found = _numbers(value_given, pattern, name)
-                self._fixed[at : at + len(found)] = numbers[at : at + len(found)] = found
-                self._last[name] = value_given
-        _keep(value, numbers)
-        return value
+        made = self._made.get(cells)
+        if made is None or not all(given[name] is x for name, x in made[2].items()):
+            block, values, numbers = self._block, [], self._fixed + cells * self._slopes
+            for name, dtype, offset, dims in self._fields:
+                if dtype is None:
+                    values.append(given[name])
+                else:
+                    values.append(np.ndarray([a + k * cells for a, k in dims], dtype, block, offset))
+            for name, pattern, at in self._given:
+                found = _numbers(given[name], pattern, name)
+                numbers[at : at + len(found)] = found
+            if len(self._made) >= MOST_KNOWN:
+                self._made.clear()
+            made = self._made[cells] = self._make(values), numbers, given
+        _keep(made[0], made[1])
+        return made[0]
 
 
 def _bits(value: float) -> int:

@@ -37,7 +37,6 @@ class Rows(NamedTuple):
 def _rows(count: int, most: int, make: Callable[..., None], *given: Any) -> Rows:
     """Rows for so many points with at most `most` weights each, from a kernel."""
     begin, columns, weights = np.zeros(count + 1, np.int64), np.zeros(most * count, np.int64), np.zeros(most * count)
-    given = tuple(np.require(x, None, ("C", "W")) for x in given)  # one signature
     make(*given, np.zeros(10, np.int64), np.zeros(10), begin, columns, weights)
     return Rows(begin, columns[: begin[-1]], weights[: begin[-1]])
 
@@ -90,7 +89,8 @@ class Grid:
 
         and the next begins; after: a point on a cut shows the side after it.
         """
-        self.s = s
+        self.s = s = np.require(s, float, ("C", "W"))  # so that kernels have one signature
+        nodes_s = np.require(nodes_s, float, ("C", "W"))
         self.loads, self.changes = tuple(loads), tuple(changes)
         self.parts = stretches(zones, loads)
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])

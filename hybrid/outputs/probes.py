@@ -303,7 +303,7 @@ class Observer:
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))
                 found |= {f"errors/model/right_{name}": part * after[name] for name in SIDED_ERRORS}
-        out = {name: np.array(np.moveaxis(x, -1, 0), order="C") for name, x in found.items()}
+        out = {name: np.array(x.transpose(x.ndim - 1, *range(x.ndim - 1)), order="C") for name, x in found.items()}
         if self._criteria:
             if ratios is None:
                 raise ValueError("criteria are written, but `ratios` is not given")

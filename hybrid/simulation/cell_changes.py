@@ -302,7 +302,8 @@ class CellChanges:
         if zones.clock[z.LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[z.NEXT_REVIEW]:
             return False
         outputs, at = self._run.books.outputs, int(count[b.OUTPUT])
-        return at == outputs.size or bool(outputs[at] > clock[b.NOW] + SAME_TIME * clock[b.LAST_DT])
+        # one at the end of the step is sampled after the change, one within it would have to be before
+        return at == outputs.size or bool(outputs[at] >= clock[b.NOW] - SAME_TIME * clock[b.LAST_DT])
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
