@@ -65,9 +65,10 @@ NOWHERE: Floats = np.zeros((0, 3))
 # What a checkpoint holds of it as plain values.
 REMEMBERED = (
     "_bend", "_twist", "_slack", "_fold", "_sunk", "_off", "_gain", "_loss", "_rested", "_left_out", "_jump",
-    "_put_in", "_potential", "_alive", "_loop", "_writhe",
-    "_writhes",
+    "_put_in", "_potential", "_alive", "_loop", "_writhe", "_writhes",
 )  # fmt: skip
+# What checkpoints of 0.6 files may lack of it: loops were not watched.
+UNWATCHED = {"_loop": 1.0, "_writhe": np.nan, "_writhes": LOOP}
 
 Stop = tuple[Outcome, int] | None
 
@@ -103,7 +104,7 @@ class Diagnostics:
         self._rested = self._left_out = False
         self._jump = SNAP * model.tension_scale  # N
         self._put_in = self._potential = self._alive = 0.0  # J
-        self._loop, self._writhe, self._writhes = 1.0, np.nan, LOOP
+        self._loop, self._writhe, self._writhes = UNWATCHED["_loop"], UNWATCHED["_writhe"], UNWATCHED["_writhes"]
 
     def begin(self) -> None:
         """Note what the contents of the model warn of."""

@@ -17,7 +17,7 @@ from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
 from hybrid.simulation.deferred_recorder import DeferredRecorder
-from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, Stop
+from hybrid.simulation.diagnostics import REMEMBERED, UNWATCHED, Diagnostics, Stop
 from hybrid.simulation.failure import explanation, failed_node, first_remedy, snapshot
 from hybrid.simulation.load_change import change_loads
 from hybrid.simulation.releases import due
@@ -360,7 +360,10 @@ class TimeLoop:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
         restore(self.run, {name: x for name, x in saved.items() if name not in mine})
-        found = matched({name: saved[name] for name in mine}, mine, "state")
+        older = {name: saved[name] for name in mine}
+        if isinstance(older["watch"], dict):
+            older["watch"] = UNWATCHED | older["watch"]
+        found = matched(older, mine, "state")
         self._cpu, self._logged = clock.process_time() - found["cpu"], found["cpu"]
         self.observer.first_energy = found["first_energy"]
         self.diagnostics.restore(found["watch"], self.run.run)

@@ -5,6 +5,7 @@ Short: little time, few cells, few outputs, so that two thousand of them take mi
 
 from __future__ import annotations
 
+import re
 import sys
 from collections.abc import Iterator
 from functools import cache
@@ -36,7 +37,8 @@ def all_scenes() -> dict[str, dict[str, Any]]:
 
 def _whole() -> Iterator[tuple[str, dict[str, Any]]]:
     for path in sorted((TESTS.parent / "examples").glob("*.yaml")):
-        yield path.stem, _read(path.read_text(encoding="utf-8"))
+        text = path.read_text(encoding="utf-8")
+        yield path.stem, _read(re.sub(r"\bfile: (\w+\.csv)", rf"file: {path.parent}/\1", text))
     texts = {
         "everything": EVERYTHING,
         "everything else": EVERYTHING_ELSE.replace("4.0, 10.0]}", "5.0, 10.0]}"),
