@@ -19,6 +19,7 @@ from hybrid.interop.moordyn.rows import read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import frame_of
+from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
 from hybrid.scene.system import System
 from hybrid.simulation.system_stepping import SystemSimulation
@@ -76,17 +77,22 @@ class MoorDyn:
         self.text, self.notes = made.text, made.notes
         self.simulation: SystemSimulation | None = None
         self.dt, self.origin = LONGEST_STEP, inf
-        names = {id: f"point{id}" for id in self.deck.points}
-        used = {name for kind, id, _ in (e for x in self.deck.lines.values() for e in x.ends) if kind == "point"
-                for name in [names[id]]}  # fmt: skip
-        self.points = [MoorDynPoint(self, id, names[id]) for id in sorted(self.deck.points)]
+        scene, _ = parse_either(self.text)
+        assert isinstance(scene, System)
+        self.scene = scene
+        names = {
+            id: f"point{id}" if f"point{id}" in scene.points else f"body{p.on}" for id, p in self.deck.points.items()
+        }
+        self.points = [MoorDynPoint(self, id, names[id]) for id in sorted(names)]
         self.bodies = [
             MoorDynBody(id, [*b.place, *np.radians(b.angles)], {
-                names[k]: np.array(p.place) for k, p in self.deck.points.items()
-                if p.kind == "body" and p.on == id and names[k] in used
+                name: np.array(p.place) for name, p in scene.points.items()
+                if isinstance(p, Fairlead) and p.body == f"body{id}"
             }) for id, b in sorted(self.deck.bodies.items()) if b.kind == "coupled"
         ]  # fmt: skip
-        self.coupled = [x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in used]
+        self.coupled = [
+            x.name for x in self.points if self.deck.points[x.id].kind == "coupled" and x.name in scene.points
+        ]
         self.lines = [self._line(id) for id in sorted(self.deck.lines)]
 
     def _line(self, id: int) -> MoorDynLine:
@@ -159,11 +165,11 @@ def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) ->
     if instance.simulation is not None:
         raise ValueError("the system is running already: Close it, or Create another")
     places = instance.places(instance.numbers(x, "x"), instance.numbers(v, "v"))
-    scene, _ = parse_either(instance.text)
-    assert isinstance(scene, System)
-    data = scene.model_dump(exclude_none=True)
+    data = instance.scene.model_dump(exclude_none=True)
     for name, (place, _) in places.items():
-        data["points"][name]["position"] = place.tolist()
+        data["points"][name] = {"kind": "fixed", "position": place.tolist()}
+    for body in instance.bodies:  # its points are what the caller moves
+        data["bodies"].pop(f"body{body.id}", None)
     data["time"] = {"duration": DURATION, "step": instance.dt}
     data["output"] = data.get("output", {}) | {"every": DURATION}
     instance.simulation = SystemSimulation(data)

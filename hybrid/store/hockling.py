@@ -43,7 +43,7 @@ def formation_ratio(torque: Floats, tension: Floats, stiffness: Floats) -> Float
     """
     needed = formation_tension(torque, np.broadcast_to(stiffness, torque.shape))
     most = float(np.abs(tension).max())
-    if not float(needed.max()) > PART_OF_TENSION * most:
+    if not float(needed.max()) > PART_OF_TENSION * most or most == 0.0:  # without any tension: a start, no scale
         return np.zeros(needed.shape)
     none = NO_TENSION * most
     return np.where(needed > none, needed / np.maximum(tension, none), 0.0)
