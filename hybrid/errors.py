@@ -126,6 +126,7 @@ EVENTS_BY_WEIGHT = (
     "bending at point load neglected",
     "zones fixed",
     "static friction neglected",
+    "body out of water",
     "waves on body neglected",
     "end rotated in",
     "envelope incomplete",

@@ -110,7 +110,10 @@ def _interface(scene: Scene) -> dict[str, Any]:
     with Simulation(scene) as cable:
         positions = cable.state.position[[0, -1]]
         time = scene.require_time()
+        payout = getattr(scene.ends.end, "payout", None)
         return {
+            "payout": payout is not None,
+            "winch": payout is not None and payout.from_outside,
             "ends": {
                 end: {"settable": sorted(cable.settable(end)), "position": np.round(positions[k], 12).tolist()}
                 for k, end in enumerate(ENDS)

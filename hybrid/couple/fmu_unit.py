@@ -66,9 +66,10 @@ class CableUnit:
         self.author, self.description = "hybrid", f"cable {known['name']}: hybrid, Kirchhoff rods and catenaries"
         self.default_experiment = DefaultExperiment(0.0, known["duration"], known["step"])
         self.register_units(UNITS)  # type: ignore[attr-defined]
-        self._register(known["ends"])
+        self.payout_rate, self._winch = 0.0, bool(known["winch"])
+        self._register(known["ends"], bool(known["payout"]))
 
-    def _register(self, ends: dict[str, Any]) -> None:
+    def _register(self, ends: dict[str, Any], pays_out: bool) -> None:
         fixed = {"causality": Fmi3Causality.parameter, "variability": Fmi3Variability.fixed}
         add = self.register_variable  # type: ignore[attr-defined]
         clock = {"causality": Fmi3Causality.independent, "variability": Fmi3Variability.continuous, "unit": "s"}
@@ -88,6 +89,14 @@ class CableUnit:
                     self._vector(end, name, unit, text, np.array(begin))
             for name, (unit, text) in OUTPUTS.items():
                 self._vector(end, name, unit, text, None)
+        if self._winch:
+            text = "rate at which line is paid out at the end of a step; negative: taken in"
+            what = {"causality": Fmi3Causality.input, "variability": Fmi3Variability.continuous, "unit": "m/s"}
+            add(Float64("payout_rate", description=text, **what))
+        if pays_out:
+            text = "unstretched length that is out"
+            what = {"causality": Fmi3Causality.output, "variability": Fmi3Variability.continuous, "unit": "m"}
+            add(Float64("length", description=text, getter=lambda: self.cable.length, **what))
         for name, text in (("tension_max", "largest"), ("tension_min", "lowest")):
             what = {"causality": Fmi3Causality.output, "variability": Fmi3Variability.continuous, "unit": "N"}
             add(Float64(name, description=f"{text} tension along the cable", getter=getattr(self, f"_{name}"), **what))
@@ -165,6 +174,8 @@ class CableUnit:
     def _apply(self, step: float) -> None:
         """Hand the inputs to the simulation."""
         values = self._values
+        if self._winch:
+            self.cable.set_payout(self.payout_rate)
         for k, end in enumerate(ENDS):
             place, speed, turn = (values.get(f"{end}.{name}") for name in ("position", "velocity", "rotation"))
             if place is not None and speed is not None:

@@ -55,7 +55,7 @@ from hybrid.kernels.books import (
     ZONES,
 )
 from hybrid.kernels.compile import inner
-from hybrid.kernels.forces import SEABED, SELF_CONTACT
+from hybrid.kernels.forces import SEABED, SELF_FRICTION
 from hybrid.kernels.newton import OK, SLACK
 from hybrid.kernels.powers import book_work, find_powers, pull
 from hybrid.kernels.report import (
@@ -227,7 +227,7 @@ def end_step(line, state, clock, count):
         return
     if count[REPEATS] > 0 and line.bits & SEABED:
         settle_impact(state, clock[UNTIL] - clock[BEGIN])
-    if count[REPEATS] > 0 and line.bits & SELF_CONTACT:
+    if count[REPEATS] > 0 and line.bits & SELF_FRICTION:
         settle_spins(state, clock[UNTIL] - clock[BEGIN])
     count[PHASE] = BEGIN_STEP
 

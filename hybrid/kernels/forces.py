@@ -20,6 +20,7 @@ FRICTION = 1024
 PLANAR = 2048
 # Contact of the line with itself (hybrid.kernels.self_contact).
 SELF_CONTACT = 4096
+SELF_FRICTION = 8192
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
@@ -34,4 +35,5 @@ FORCES = {
     "seabed contact": (SEABED, "height and its rate; environment.seabed"),
     "seabed friction": (FRICTION, "travel along the seabed; environment.seabed.friction"),
     "contact of the line with itself": (SELF_CONTACT, "distance of its parts; contact.self"),
+    "friction of the line on itself": (SELF_FRICTION, "travel of its parts along each other; contact.friction"),
 }

@@ -2,8 +2,8 @@
 
 Steps end where the motion asks for it, outputs fall where the user asks for them.  Between the two states of a step
 positions are cubic in time by the velocities at both ends (Hermite), chords likewise with lengths that change evenly,
-tensions and reactions lie on the parabola through the step before as well, accelerations and frames change evenly: of
-second order and more (docs/theory.md, 2).
+tensions and reactions lie on the parabola through the step before as well, frames turn as cubics of their spins,
+accelerations change evenly: of second order and more (docs/theory.md, 2).
 """
 
 from __future__ import annotations
@@ -39,7 +39,19 @@ from hybrid.kernels.end_motion import sea_at, turn_by_vector
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import ASSEMBLED, REPORT_SIZE
-from hybrid.kernels.rotations import add, cross, dot, log_rotation, mat_mat, scale, spin_about, sub
+from hybrid.kernels.rotations import (
+    add,
+    cross,
+    dot,
+    inverse_left_jacobian,
+    jacobian_functions,
+    log_rotation,
+    mat_mat,
+    mat_vec,
+    scale,
+    sub,
+    vec_mat,
+)
 
 # Of the step: an output so near to its end is its end.
 SAME_TIME = 1e-9
@@ -96,14 +108,41 @@ def chord_between(old, new, c, x, dt):
 
 
 @inner
-def director_between(line, old, new, c, x, e):
-    """First director of cell c with the chord e: carried from both ends of the step, and turned by parts."""
+def frame_between(before, R, w0, w1, x, dt):
+    """Frame at the part x of a step of dt from `before` to R, which turn with w0 and w1 (1/s, inertial): the rotation
+    vector from `before` on is a cubic with the rates that these give it, as chords are."""
+    turn = log_rotation(relative_rotation(before, R))
+    g, _ = jacobian_functions(dot(turn, turn))
+    rate = mat_vec(inverse_left_jacobian(turn, g), vec_mat(w1, before))
+    here, _ = hermite(x, dt, (0.0, 0.0, 0.0), vec_mat(w0, before), turn, rate)
+    turned, _ = turn_by_vector(here, (0.0, 0.0, 0.0))
+    return mat_mat(before, turned)
+
+
+@inner
+def cell_frame(e, a):
+    """Frame of a cell with the chord e and the first director a."""
+    d, _, _ = chord(e)
+    b = cross(d, a)
+    return (a[0], b[0], d[0], a[1], b[1], d[1], a[2], b[2], d[2])
+
+
+@inner
+def cell_turn(state, c):
+    """Angular velocity of cell c (1/s, inertial): d x dd/dt + w d."""
+    d, l, _ = chord(get3(state.e, c))
+    rate = sub(get3(state.v, c + 1), get3(state.v, c))
+    return add(scale(1.0 / l, cross(d, rate)), scale(state.w[c], d))
+
+
+@inner
+def director_between(line, old, new, c, x, dt, e):
+    """First director of cell c with the chord e: that of its frame between both ends of the step, brought to e."""
     if line.bits & PLANAR:
         return carry_director(line.plane, None, get3(old.a1, c), get3(old.e, c), e)
-    a = carry_director(None, 1, get3(old.a1, c), get3(old.e, c), e)
-    b = carry_director(None, 1, get3(new.a1, c), get3(new.e, c), e)
-    d, _, _ = chord(e)
-    return spin_about(a, d, x * math.atan2(dot(cross(a, b), d), dot(a, b)))
+    before, after = cell_frame(get3(old.e, c), get3(old.a1, c)), cell_frame(get3(new.e, c), get3(new.a1, c))
+    R = frame_between(before, after, cell_turn(old, c), cell_turn(new, c), x, dt)
+    return carry_director(None, 1, (R[0], R[3], R[6]), (R[2], R[5], R[8]), e)
 
 
 @inner
@@ -117,7 +156,7 @@ def sample_cells(line, old, new, x, dt, k, tension, row):
             e = chord_between(old, new, c, x, dt)
             T, w = parabola(x, k, tension[1, c], old.T[c], T), (1.0 - x) * old.w[c] + x * w
             if line.spin[c]:
-                a = director_between(line, old, new, c, x, e)
+                a = director_between(line, old, new, c, x, dt, e)
         put3(row, at, c, e)
         row[at + 3 * n + c] = T
         put3(row, at + 4 * n, c, a)
@@ -143,8 +182,8 @@ def end_frame(imposed, m, k):
 
 
 @inner
-def sample_ends(imposed, x, row):
-    """What the ends impose: frames turned by parts from the one to the other, the rest by parts."""
+def sample_ends(imposed, x, dt, row):
+    """What the ends impose: frames as cubics of their spins, the rest by parts."""
     for k in range(2):
         old, new = imposed[1, k], imposed[0, k]
         for j in range(3):
@@ -155,9 +194,8 @@ def sample_ends(imposed, x, row):
             row[SAMPLE_MOMENT + at] = (1.0 - x) * old[18 + j] + x * new[18 + j]
         R = end_frame(imposed, 0, k)
         if x < 1.0:
-            before = end_frame(imposed, 1, k)
-            turn, _ = turn_by_vector(scale(x, log_rotation(relative_rotation(before, R))), (0.0, 0.0, 0.0))
-            R = mat_mat(before, turn)
+            w0, w1 = (old[12], old[13], old[14]), (new[12], new[13], new[14])
+            R = frame_between(end_frame(imposed, 1, k), R, w0, w1, x, dt)
         for j in range(9):
             row[SAMPLE_FRAME + 9 * k + j] = R[j]
 
@@ -168,7 +206,7 @@ def sample_head(sea, books, x, dt, k, t, row):
     row[0] = t
     for j in range(4):
         row[SAMPLE_SEA + j] = sea.now[j]
-    sample_ends(books.imposed, x, row)
+    sample_ends(books.imposed, x, dt, row)
     report = books.report
     for j in range(REPORT_SIZE):
         row[SAMPLE_REPORT + j] = report[0, j]

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.forces import FRICTION, SEABED, SELF_CONTACT
+from hybrid.kernels.forces import FRICTION, SEABED, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Floats, Line, State, blank_state
 from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
@@ -173,7 +173,8 @@ def build(
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    touch |= SELF_CONTACT if scene.contact.self else 0
+    if scene.contact.self:
+        touch |= SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
     line = line_on(cable, s, rod, touch, sections_turn=layout is None)  # rods that come and go have no such inertia
     h, compliance = line.h, line.ck
 

@@ -97,15 +97,19 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     sections = list(whole_scene(scene).cable.sections)
     joint = max((zone.s_a for zone in zones), default=0.0)
     points = [x for x in material(scene).at.tolist() if x < length]
-    fixed = max([joint, *points])
+    changes = [x for x in np.cumsum([x.length for x in scene.cable.sections]).tolist() if x < length * (1 - 1e-9)]
+    fixed = max([joint, *points, *changes])
     near = int(np.searchsorted(line.s, fixed * (1 + 1e-12)))
     if near + FEWEST_CELLS >= line.s.size:
-        expected = f"{FEWEST_CELLS} cells between the last joint or load, s = {fixed:g} m, and the end"
+        expected = (
+            f"{FEWEST_CELLS} cells between the last joint, load or change of section, s = {fixed:g} m, and the end"
+        )
         _refuse("", "payout", expected, "more cells, or a longer cable")
     shortest = float(line.s[near + FEWEST_CELLS - 1])
     if low < shortest:
         given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
-        expected = f"at least {shortest:.6g} m: {FEWEST_CELLS} cells must be left behind the last joint, load or end"
+        left = f"{FEWEST_CELLS} cells must be left behind the last joint, load or change of section"
+        expected = f"at least {shortest:.6g} m: {left}"
         _refuse("", given, expected, fix)
     h = float(line.h[-1])
     nodes: list[float] = line.s.tolist()
@@ -193,7 +197,7 @@ def law_of(payout: Payout, length: float, duration: float) -> Floats:
     if payout.rates is not None:
         return _law_of_rates(np.array(payout.rates, float), length, duration)
     if payout.lengths is not None:
-        return _law_of_lengths(np.array(payout.lengths, float), length, duration)
+        return _law_of_lengths(np.array(payout.lengths, float), length)
     return _rows([(0.0, [length])])
 
 
@@ -252,7 +256,7 @@ def _law_of_rates(table: Floats, length: float, duration: float) -> Floats:
     return _rows([*rows, (float(t[-1]), [float(c[-1]), float(way(t[-1])) + length])])
 
 
-def _law_of_lengths(table: Floats, length: float, duration: float) -> Floats:
+def _law_of_lengths(table: Floats, length: float) -> Floats:
     """Lengths at times, a spline of fifth degree between them, which begins and ends without rate and acceleration."""
     from scipy.interpolate import PPoly, make_interp_spline
 
@@ -260,8 +264,7 @@ def _law_of_lengths(table: Floats, length: float, duration: float) -> Floats:
     if abs(out[0] - length) > 1e-9 * length:
         _refuse("lengths", f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable", "the same length")
     rest = [(1, 0.0), (2, 0.0)]
-    ends = rest if t[-1] < duration else [(3, 0.0), (4, 0.0)]
-    spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, ends)))
+    spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, rest)))
     pieces = [(float(x), a.tolist()) for x, y, a in zip(spline.x[:-1], spline.x[1:], spline.c.T, strict=True) if y > x]
     return _rows([*pieces, (float(t[-1]), [float(out[-1])])])
 

@@ -255,6 +255,8 @@ class Observation:
                 self._strains_of_rod(side, a, b)
                 continue
             side[:, 0] = self.bends[a : b + 1]
+            if b - a < 2:
+                continue
             for row, one, two, x, x1, x2 in (
                 (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
                 (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
@@ -262,7 +264,7 @@ class Observation:
                 if b - a >= 4:
                     p = (x - x1) / (x2 - x1)
                     side[row, 0] = np.maximum(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
-                elif b - a >= 2:
+                else:
                     side[row, 0] = side[one, 0]
         return out
 

@@ -195,6 +195,12 @@ class FreeBody(Table):
 
     @model_validator(mode="after")
     def _matrices_are_possible(self) -> FreeBody:
+        most, rest = max(self.inertia), sum(self.inertia) - max(self.inertia)
+        if most > rest * (1.0 + 1e-9):
+            expected = (
+                f"moments of which none is more than the other two together; {most:g} is more than {rest:g} kg m^2"
+            )
+            refuse([Finding(("inertia",), expected, "check which axis is which, and the units")])
         for key, unit in (("added_mass", "kg"), ("damping", "N s/m")):
             matrix: Matrix | None = getattr(self, key)
             if matrix is None:

@@ -11,6 +11,7 @@ from pathlib import Path
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome, ResultError
+from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.state import Floats
@@ -84,6 +85,7 @@ class SystemRun:
             for k, (name, scene, model) in enumerate(zip(names, self.scenes, self.model.models, strict=True))
         ]
         self.t, self.steps = 0.0, 0
+        self._dry: set[str] = set()  # bodies that have been said to be out of the water
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self.state: SystemState = self.found.state.copy()
         self.recorder = self._points_recorder(text)
@@ -108,8 +110,23 @@ class SystemRun:
         """Record points, bodies and lines as they are."""
         values = values_of(self.system, self.model, solver, self.state, self.t)
         self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
+        self._look_for_dry_bodies()
         for line_, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True):
             line_.output(self.t, x.ends, state, work)
+
+    def _look_for_dry_bodies(self) -> None:
+        """An event where a body that counts as submerged has risen out of the water."""
+        fluid = self.system.environment.fluid
+        if fluid is None or fluid.surface is None:
+            return
+        for body, row in zip(self.model.bodies, self.state.bodies, strict=True):
+            given = self.system.free_bodies[body.name]
+            centre = row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(given.centre_of_buoyancy)
+            above = float(centre[2]) - fluid.surface
+            if given.volume and above > 0.0 and body.name not in self._dry:
+                self._dry.add(body.name)
+                text = f"body {body.name}: the centre of its volume is {above:.4g} m above the surface, but all of its"
+                self.recorder.event(self.t, 0.0, 0.0, "body out of water", f"{text} buoyancy still lifts it")
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too, and put the lines into its file."""

@@ -104,6 +104,14 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     """
     system = _system(scene)
     kind, name = _target(system, at)
+    try:
+        known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
+    except (TypeError, ValueError):
+        known = False
+    if not known:
+        given = f"{distances!r:.60} m, heading {heading!r:.20}"
+        fix = "give finite numbers, such as --reach 20 --heading 90"
+        raise SceneError([Complaint("offsets", given, "distances (m) and a heading (deg)", fix)])
     model = build_system(system)
     found = equilibrium_of_system(system, model, np.inf)
     place = _place(system, model, found, name) if kind == "point" else None

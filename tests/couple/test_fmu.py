@@ -222,3 +222,13 @@ def test_what_is_no_unit_is_not_replaced(tmp_path: Path) -> None:
     with pytest.raises(hybrid.SceneError):
         hybrid.export_fmu(hybrid.parse_scene(SCENE.replace("time: {duration: 2, step: 0.05}", "")), tmp_path / "a.fmu")
     assert not (tmp_path / "a.fmu").exists()
+
+
+def test_a_winch_is_an_input(tmp_path: Path) -> None:
+    scene = SCENE.replace("[10, 0, 0]}", "[10, 0, 0], payout: {longest: 14}}").replace(", axial_stiffness: 1e5", "")
+    unit = hybrid.export_fmu(hybrid.parse_scene(scene), tmp_path / "winch.fmu")
+    with running(unit, tmp_path / "open") as (cable, number):
+        for k in range(40):
+            cable.setFloat64([number["payout_rate"]], [0.5 * (k + 1) / 40.0])
+            step(cable, k)
+        assert cable.getFloat64([number["length"]]) == pytest.approx([12.5])

@@ -338,3 +338,21 @@ def test_bodies_and_fairleads_that_do_not_fit_are_refused() -> None:
     tables["bodies"]["buoy"] = {"position": [0, 0, 0], "motion": motion}
     with pytest.raises(SceneError, match=r"bodies\.buoy\.motion[\s\S]*ramp"):
         hybrid.static(tables)
+
+
+def test_a_submerged_body_that_rises_out_of_the_water_is_noted() -> None:
+    """All of its buoyancy acts wherever it is: 10 m3 of 2 t are above the surface at the equilibrium."""
+    line = {"sections": [{"length": 60, "mass": 10, "diameter": 0.05, "axial_stiffness": 1e7}]}
+    scene = {
+        "environment": {"fluid": {"density": 1025, "surface": 0}},
+        "points": {
+            "a": {"position": [20, 0, -40]}, "b": {"position": [-20, 0, -40]}, "to_a": {"body": "buoy", "place": [1, 0, 0]},
+            "to_b": {"body": "buoy", "place": [-1, 0, 0]},
+        },
+        "bodies": {"buoy": {"initial_guess": [0, 0, 0], "mass": 2000, "inertia": [1e3, 1e3, 1e3], "volume": 10}},
+        "lines": {"one": {"start": "a", "end": "to_a"} | line, "two": {"start": "b", "end": "to_b"} | line},
+    }  # fmt: skip
+    result = hybrid.static(scene)
+    assert result["bodies/buoy/position"][0, 2] > 0.0
+    (event,) = [x for x in result.events if x.kind == "body out of water"]
+    assert "buoyancy" in event.text

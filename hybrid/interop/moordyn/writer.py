@@ -365,6 +365,8 @@ class _Writer:
         kind = "Coupled" if end.prescribed_motion is not None else "Fixed"
         if end.release is not None:
             self.notes.append(f"ends.{name}.release_at is left out")
+        if getattr(end, "payout", None) is not None:
+            self.notes.append(f"ends.{name}.payout is left out: the line of the deck keeps its length at t = 0")
         if end.kind in ("free", "body"):
             made = self._loose(f"ends.{name}", end, place)
         elif end.kind == "pinned":
