@@ -142,3 +142,25 @@ def test_outputs_with_criteria_wait_in_the_buffer(monkeypatch: pytest.MonkeyPatc
     assert len(names) > 3 and len({x.kind for x in many.events} & {"grow", "split"}) > 0
     for name in [*names, "position", "tension"]:
         assert np.array_equal(many[name], one[name]), name
+
+
+@pytest.mark.parametrize(
+    "motion", [{"pitch": {"amplitude": 15, "period": 6}}, {"roll": {"amplitude": 90, "period": 12}}]
+)
+def test_outputs_within_a_step_follow_a_clamp_that_turns(motion: dict[str, Any]) -> None:
+    """The moment at a clamp is that of outputs at which steps end: an evenly turned frame left an eighth of it."""
+    section = {"length": 30, "mass": 3, "diameter": 0.04, "axial_stiffness": 2e6, "bending_stiffness": 60,
+               "torsional_stiffness": 40, "drag": {"normal": 1.2}}  # fmt: skip
+    clamp = {"kind": "clamped", "tangent": [1, 0, 0.5], "normal": [0, 1, 0], "position": [25, 0, 0]}
+    scene = {
+        "environment": {"fluid": {"density": 1025}}, "cable": {"sections": [section]}, "initial": "equilibrium",
+        "ends": {
+            "start": clamp | {"position": [0, 0, 0], "tangent": [1, 0, -0.5]}, "end": clamp | {"motion": motion | {"ramp": 6}},
+        },
+        "model": "rod", "mesh": {"cells": 120}, "time": {"duration": 9, "step": 0.2},
+    }  # fmt: skip
+    fine = hybrid.run(scene | {"time": {"duration": 9, "step": 0.01}, "output": {"every": 0.1}})
+    within = hybrid.run(scene | {"output": {"every": 0.1}})
+    ends = within.times % 0.2 < 1e-6  # steps end there
+    off = np.abs(within.moment_end - fine.moment_end).max(axis=1)
+    assert off[~ends].max() < 1.3 * off[ends].max() + 0.01 * np.abs(fine.moment_end).max()
