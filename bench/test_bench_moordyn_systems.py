@@ -23,8 +23,8 @@ import hybrid
 from hybrid.interop.moordyn.bodies import rotation_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
-from hybrid.scene.ends import Motion
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import Motion
 
 pytestmark = pytest.mark.bench
 Vector = NDArray[np.float64]

@@ -13,8 +13,8 @@ from test_result_file import recorder
 from test_statics_sea import SEEDS, variant
 
 import hybrid
-from hybrid.scene.ends import Harmonic, Motion
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import Harmonic, Motion
 
 pytestmark = pytest.mark.bench
 

@@ -97,6 +97,22 @@ def round_off_tension(line, ca, scale):
 
 
 @inner
+def has_converged(size, before, it, part):
+    """Outcome OK or NOT_CONVERGED after correction `it`, and the next correction as it is predicted.
+
+    size, before: of this correction and the one before, relative; part: of the correction that was made.
+    """
+    ratio = size / before
+    left = size * min(1.0, ratio * ratio)
+    if part == 1.0:
+        if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
+            return OK, left
+        if it > 4 and size < ROUND_OFF and ratio > 0.3:
+            return OK, size
+    return NOT_CONVERGED, left
+
+
+@inner
 def ask_contact(contact, table, what):
     """What kernels.self_contact answers."""
     contact[ASKED] = what
@@ -188,13 +204,7 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
         update(plane, space, line, new, cv, ca, part, task.turning, work)
         turn = max(turn, WHOLE * shift / reach)
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
-        ratio = size / before
-        left = size * min(1.0, ratio * ratio)
-        if part == 1.0:
-            if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
-                outcome = OK
-            elif it > 4 and size < ROUND_OFF and ratio > 0.3:
-                outcome, left = OK, size
+        outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)

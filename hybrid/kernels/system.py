@@ -36,14 +36,13 @@ from hybrid.kernels.newton import (
     NOT_CONVERGED,
     NOT_FINITE,
     OK,
-    ROUND_OFF,
     SINGULAR,
     SLACK,
     STEP,
-    TOLERANCE,
     TURNED_TOO_FAR,
     WHOLE,
     Task,
+    has_converged,
     round_off_tension,
 )
 from hybrid.kernels.node_forces import get3
@@ -198,6 +197,21 @@ def keep_books(tables, joints, dt, t):
             note_extremes(line, job.sea, job.ends, new, books, t)
 
 
+@inner
+def end_system_step(tables, joints, floors, old, new, work, task, s, t, solved):
+    """Rates and books of a step that is `solved`; OK or why it is refused, with its line (-1: a body) and cell."""
+    line, turn, cell = end_lines(tables, floors, s, task, solved)
+    turned = end_bodies(old, new, work, s)
+    if line >= 0:
+        return (TURNED_TOO_FAR if turn > 0.0 else SLACK), line, cell
+    if solved and not turned < LARGEST_STEP_TURN:
+        return TURNED_TOO_FAR, -1, -1
+    if solved:
+        keep_books(tables, joints, task.dt, t)
+        book_bodies(work, task.dt)
+    return OK, -1, -1
+
+
 @kernel
 def solve_system(
     task, t, solver, tables, numbers, joints, fairleads, arms, gaps, floors, first, columns, functional, net,
@@ -278,24 +292,12 @@ def solve_system(
             job = read(tables[l])
             update(None, 1, job.line, job.new, s.cv, s.ca, part, False, job.work)
         move_bodies(new, work, s.cv, s.ca, part)
-        ratio = size / before
-        left = size * min(1.0, ratio * ratio)
-        if part == 1.0:
-            if size <= TOLERANCE or (it > 1 and size < 1e-3 and left <= 0.1 * TOLERANCE):
-                outcome = OK
-            elif it > 4 and size < ROUND_OFF and ratio > 0.3:
-                outcome, left = OK, size
+        outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
     if task.what == STEP:
-        bad_line, turn, cell = end_lines(tables, floors, s, task, outcome == OK)
-        turned = end_bodies(old, new, work, s)
-        if bad_line >= 0:
-            outcome, line, where = TURNED_TOO_FAR if turn > 0.0 else SLACK, bad_line, cell
-        elif outcome == OK and not turned < LARGEST_STEP_TURN:
-            outcome, line, where = TURNED_TOO_FAR, -1, -1
-        elif outcome == OK:
-            keep_books(tables, joints, task.dt, t)
-            book_bodies(work, task.dt)
+        bad, line_of_bad, cell = end_system_step(tables, joints, floors, old, new, work, task, s, t, outcome == OK)
+        if bad != OK:
+            outcome, line, where = bad, line_of_bad, cell
     if task.what == ASSEMBLY and outcome == OK:
         begin_books(tables, joints, t)
         book_bodies(work, 0.0)

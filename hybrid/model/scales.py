@@ -8,7 +8,7 @@ import numpy as np
 
 from hybrid.kernels.state import Line
 from hybrid.model.sections import attached_weights, attachments_at, bending_stiffness, weight
-from hybrid.scene.ends import SHIFTS
+from hybrid.scene.motion_tables import SHIFTS
 from hybrid.scene.schema import Scene, Section, Straight
 
 

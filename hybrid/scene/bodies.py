@@ -31,7 +31,8 @@ from hybrid.scene.base import (
     refuse,
     unwrap,
 )
-from hybrid.scene.ends import Free, Loading, Motion, Triple
+from hybrid.scene.ends import Free, Loading, Triple
+from hybrid.scene.motion_tables import Motion
 
 ROTATION = "roll, pitch and yaw, about x, then y, then z of the inertial frame [deg]"
 # Of the largest number of a matrix: how far it may be from symmetric.

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.ends import SHIFTS, TURNS, Harmonic, Motion, Vessel, smooth_step
 from hybrid.scene.motion_file import RecordRefused, read_record, spline
+from hybrid.scene.motion_tables import SHIFTS, TURNS, Harmonic, Motion, Vessel, smooth_step
 from hybrid.scene.rao_file import point_harmonics
 
 Array = NDArray[np.float64]

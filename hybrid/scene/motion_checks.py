@@ -14,8 +14,9 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.scene.analysis import Time
 from hybrid.scene.base import Finding, Place, dotted
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import SHIFTS, End, Ends, Harmonic, Motion, Vessel
+from hybrid.scene.ends import End, Ends
 from hybrid.scene.load_checks import load_findings, turning_times
+from hybrid.scene.motion_tables import SHIFTS, Harmonic, Motion, Vessel
 
 if TYPE_CHECKING:
     from hybrid.scene.motion_file import Record

@@ -15,7 +15,8 @@ from typing import Literal
 from hybrid.scene.analysis import Initial, Points, Straight
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
-from hybrid.scene.ends import SHIFTS, TURNS, End, Ends, Motion, Triple
+from hybrid.scene.ends import End, Ends, Triple
+from hybrid.scene.motion_tables import SHIFTS, TURNS, Motion
 from hybrid.scene.sea import CurrentPoint, CurrentProfile, PowerLawCurrent, UniformCurrent
 
 # What a scene that insists on a plane may leave it by, as a part of a vector's or the cable's length: the last of the

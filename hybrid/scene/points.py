@@ -8,7 +8,8 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
-from hybrid.scene.ends import TURNS, Body, Free, Loading, Motion
+from hybrid.scene.ends import Body, Free, Loading
+from hybrid.scene.motion_tables import TURNS, Motion
 
 # Names are keys of the result file and of its groups.
 FORBIDDEN = "/."

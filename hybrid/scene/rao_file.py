@@ -20,8 +20,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from hybrid.scene.ends import SHIFTS, TURNS
 from hybrid.scene.motion_file import RecordRefused, check_file, read_table
+from hybrid.scene.motion_tables import SHIFTS, TURNS
 
 FREEDOMS = (*SHIFTS, *TURNS)
 COLUMNS = ("frequency", "heading", *FREEDOMS, *(f"{name}_phase" for name in FREEDOMS))

@@ -39,7 +39,8 @@ from hybrid.scene.base import Table, Text, Vector, refuse
 from hybrid.scene.cable import AddedMass, Cable, Contact, Damping, Drag, Environment, Fluid, Section
 from hybrid.scene.checks import contradictions
 from hybrid.scene.end_loads import Load
-from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Harmonic, Motion, Pinned, Travel
+from hybrid.scene.ends import Body, Clamped, End, Ends, Free, Guided, Pinned
+from hybrid.scene.motion_tables import Harmonic, Motion, Travel
 from hybrid.scene.sea import (
     Current,
     CurrentPoint,

@@ -28,7 +28,7 @@ from hybrid.kernels.self_distance import (
     blank_itself_job,
     watch_itself,
 )
-from hybrid.kernels.state import Floats, State
+from hybrid.kernels.state import Floats, State, Work
 from hybrid.model.build import Model
 from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
@@ -156,6 +156,17 @@ def is_bent(state: State) -> bool:
     along, c = state.e @ (state.r[-1] - state.r[0]), state.r[-1] - state.r[0]
     size = np.linalg.norm(state.e, axis=1) * np.linalg.norm(c)
     return bool((~((along > 0.0) & (along >= TURNED * size))).any())
+
+
+def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -> None:
+    """The line of `model` touches itself in the run from now on; contact that there was goes on."""
+    before = run.contact
+    contact = SelfContact(
+        model.line, diameters(model), least_bending(model), model.tension_scale, scene.contact.friction
+    )
+    if before is not None:
+        contact.restore(before.checkpoint(run.t))
+    run.touch_itself(contact, model.line, model.ends.values, work)
 
 
 def refuse_start_in_itself(contact: SelfContact, scene: Scene, model: Model) -> None:

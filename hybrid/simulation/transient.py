@@ -28,14 +28,14 @@ from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
-from hybrid.simulation.events import EventLog, slack_steps_text, steps_cut_text
+from hybrid.simulation.events import EventLog
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
-from hybrid.simulation.self_watch import diameters, least_bending, refuse_start_in_itself
-from hybrid.simulation.zone_switching import ZoneSwitching
+from hybrid.simulation.self_watch import let_touch_itself, refuse_start_in_itself
+from hybrid.simulation.step_events import look_at_itself, note_cut, note_slack, note_unknown_error
+from hybrid.simulation.zone_switching import ZoneSwitching, note_change
 from hybrid.solve.run import CompiledRun, Tried
-from hybrid.solve.self_contact import SelfContact
 from hybrid.solve.statics import Equilibrium
 from hybrid.solve.stepper import Stepper
 
@@ -334,13 +334,13 @@ class Transient:
         run = self.run
         flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
         if flags & b.UNKNOWN_ERROR:
-            self._note_unknown_error()
+            note_unknown_error(self)
         if flags & b.STEPS_CUT:
-            self._note_cut()
+            note_cut(self)
         if flags & b.STEPS_SLACK:
-            self._note_slack()
+            note_slack(self)
         if flags & (b.IS_BENT | b.MEETS_ITSELF):
-            self._look_at_itself(flags)
+            look_at_itself(self, flags, self._cells is not None)
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:
@@ -357,38 +357,6 @@ class Transient:
         outputs, at = run.books.outputs, int(run.count[b.OUTPUT])
         if not changes and (at == outputs.size or outputs[at] > end + dt):
             run.count[b.PHASE] = b.END_STEP  # nothing to sample, nothing to change
-
-    def _note_cut(self) -> None:
-        """An end turns too far in a fixed step, which was cut: an event for the first."""
-        clock, most = self.run.clock, self.resolution.turn
-        if not self.turned and not self.controlled:
-            text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
-            self.events.event(float(clock[b.PREVIOUS]), 0.0, self.model.length, "steps cut", text)
-        self.turned, clock[b.MUTE_CUTS] = True, 1.0
-
-    def _note_slack(self) -> None:
-        """A catenary was slack in a step too long for its waves, and is not in shorter ones: an event for the first."""
-        clock, cell = self.run.clock, int(self.run.count[b.SLACK_CELL])
-        text = slack_steps_text(float(clock[b.SLACK_STEP]), float(clock[b.LAST_DT]), float(clock[b.WAVE_STEP]))
-        self._note(cell, "steps cut", text)
-        self.slackened, clock[b.MUTE_SLACK] = True, 1.0
-
-    def _look_at_itself(self, flags: int) -> None:
-        """The line has become so bent that it could come near itself, or it meets itself: an event."""
-        assert self.envelope is not None
-        watch = self.envelope.itself
-        if self._cells is not None and not watch.watching:
-            watch.attach(self.model, self.run)  # the line has had other cells since it was attached
-        if flags & b.MEETS_ITSELF or watch.look(self.run):
-            watch.tell(self.t, float(self.run.clock[b.LAST_DT]), self.events.event)
-
-    def _note_unknown_error(self) -> None:
-        """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
-        assert self.correction is not None
-        if self.t > self.beyond:
-            s = float(self.model.line.s[max(self.correction.corrector.furthest, 0)])
-            self.events.event(self.t, s, s, "model error not estimated", self.correction.beyond)
-            self.beyond = self.t + self.model.time_scale  # that it takes the whole line to move
 
     def _adapt(self) -> None:
         """After the outputs of a step: zones change where criteria ask for it, and the plane is left where it must."""
@@ -433,13 +401,7 @@ class Transient:
             ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
             model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
             run.books.work[0, b.ZONES] += booked
-        base = self.switching.manager.layout.base
-        for k, why in enumerate(change.reasons):
-            energy = booked if k == 0 else 0.0  # of all that change now
-            self.events.event(
-                self.t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
-                criterion=why.criterion, value=why.value, threshold=why.threshold, energy=energy,
-            )  # fmt: skip
+        note_change(self.events, self.switching.manager.layout.base, self.t, change, booked)
         if cells is None:
             self.set_model(model, state)
             self.evaluate_forces()
@@ -467,11 +429,7 @@ class Transient:
             marks_on(model.line.s, self.marked), self.correction.corrector if self.correction is not None else None,
         )  # fmt: skip
         if touches:
-            before, friction = self.run.contact, self.scene.contact.friction
-            contact = SelfContact(model.line, diameters(model), least_bending(model), model.tension_scale, friction)
-            if before is not None:
-                contact.restore(before.checkpoint(self.t))
-            self.run.touch_itself(contact, model.line, model.ends.values, self.stepper.work)
+            let_touch_itself(self.run, self.scene, model, self.stepper.work)
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.nodes)
             self.envelope.itself.attach(model, self.run)

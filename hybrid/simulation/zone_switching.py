@@ -33,6 +33,7 @@ from hybrid.kernels.zone_switch import (
 from hybrid.kernels.zone_transfer import Transfer
 from hybrid.model.build import Model
 from hybrid.model.layout import Layout
+from hybrid.simulation.events import EventLog
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.store.named_arrays import matched
 
@@ -54,6 +55,16 @@ def on_layout(model: Model, layout: Layout) -> Model:
     assert model.on_base is not None
     line = model.on_base.line(layout, model.line.bits, model.line.plane)
     return replace(model, line=line, zones=layout.zones, layout=layout, sea=model.sea.on(line.h.size))
+
+
+def note_change(events: EventLog, base: Floats, t: float, change: Change, booked: float) -> None:
+    """Events of a change of zones at t (s); base: (B+1,) m, nodes of the base mesh; booked: J, that it puts in."""
+    for k, why in enumerate(change.reasons):
+        events.event(
+            t, float(base[why.a]), float(base[why.b]), why.kind, why.text,
+            criterion=why.criterion, value=why.value, threshold=why.threshold,
+            energy=booked if k == 0 else 0.0,  # of all that change now
+        )  # fmt: skip
 
 
 class ZoneSwitching:

@@ -11,8 +11,8 @@ import pytest
 from numpy.typing import NDArray
 from scene_texts import OCEAN, change, complaints
 
-from hybrid.scene.ends import smooth_step, way_of_smooth_step
 from hybrid.scene.motion import EndMotion
+from hybrid.scene.motion_tables import smooth_step, way_of_smooth_step
 from hybrid.scene.schema import Harmonic, Motion, Travel
 
 Array = NDArray[np.float64]

@@ -1,0 +1,159 @@
+"""How a scene says that an end, a point or a body moves: harmonics, travel, a vessel, a file."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.base import Finding, NonNegative, Number, Positive, Table, Text, Vector, refuse, table_or_list
+from hybrid.scene.end_loads import Triple
+
+SHIFTS = ("surge", "sway", "heave")
+TURNS = ("roll", "pitch", "yaw")
+
+
+def smooth_step(x: float) -> tuple[float, float]:
+    """10 x^3 - 15 x^4 + 6 x^5 from 0 to 1 and its derivative, C2 at both ends; constant before and after."""
+    x = min(max(x, 0.0), 1.0)
+    return x * x * x * (10.0 + x * (6.0 * x - 15.0)), 30.0 * x * x * (1.0 - x) ** 2
+
+
+def way_of_smooth_step(x: float) -> float:
+    """The integral of `smooth_step` from 0 to x: 5/2 x^4 - 3 x^5 + x^6, beyond 1 growing like x - 1/2."""
+    inside = min(max(x, 0.0), 1.0)
+    return inside**4 * (2.5 + inside * (inside - 3.0)) + max(x - 1.0, 0.0)
+
+
+def _sum(parts: list[tuple[Triple, float]]) -> Triple:
+    """The sum of vectors times factors."""
+    return (sum(f * v[0] for v, f in parts), sum(f * v[1] for v, f in parts), sum(f * v[2] for v, f in parts))
+
+
+class Harmonic(Table):
+    """amplitude x sin(2 pi t / period + phase)."""
+
+    amplitude: Number = Field(description="amplitude; degrees for roll, pitch and yaw [m or deg]")
+    period: Positive = Field(description="period, one over the frequency, 2 pi over omega [s]")
+    phase: Number = Field(default=0.0, description="phase [deg]")
+
+
+Harmonics = Annotated[
+    Annotated[Harmonic, Tag("<table>")] | Annotated[tuple[Harmonic, ...], Field(min_length=1), Tag("<list>")],
+    Discriminator(table_or_list),
+]
+
+
+class Travel(Table):
+    """A smooth move to another place: by x (10 x^3 - 15 x^4 + 6 x^5), x = (t - begin) / over."""
+
+    by: Vector = Field(description="the way from the old place to the new one, inertial frame [m]")
+    over: Positive = Field(description="time that it takes [s]")
+    begin: NonNegative = Field(default=0.0, description="time at which it begins [s]")
+
+
+class Vessel(Table):
+    """A vessel that carries the end: it moves with the waves of the scene, to first order; it grows with their ramp."""
+
+    rao: Text = Field(
+        min_length=1,
+        description="CSV file, relative to the scene file: a row for every frequency [rad/s] and heading [deg], the "
+        "direction of the waves against that of the vessel (0: from astern, 180: from ahead); columns surge, sway, "
+        "heave (m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin)",
+    )
+    origin: Vector = Field(description="point of the vessel that the RAO is for, at rest, inertial frame [m]")
+    heading: Number = Field(
+        default=0.0, description="direction of its bow, counter-clockwise from the inertial x axis [deg]"
+    )
+    fairlead: Vector | None = Field(
+        default=None,
+        description="the end in axes of the vessel from its origin (to the bow, to port, up); absent: it follows from "
+        "the position of the end, with which it must agree [m]",
+    )
+
+    def place(self, fairlead: Triple) -> Triple:
+        """Where a point given in axes of the vessel is, at rest, inertial frame [m]."""
+        c, s = math.cos(math.radians(self.heading)), math.sin(math.radians(self.heading))
+        x, y, z = fairlead
+        return self.origin[0] + c * x - s * y, self.origin[1] + s * x + c * y, self.origin[2] + z
+
+
+class Motion(Table):
+    """Prescribed motion of an end, relative to where it is held; it must start from rest, or have a `ramp`.
+
+    What is given adds up; only a file stands alone.
+    """
+
+    surge: Harmonics | None = Field(default=None, description="harmonic motion along x, or a list whose sum is meant")
+    sway: Harmonics | None = Field(default=None, description="harmonic motion along y, or a list")
+    heave: Harmonics | None = Field(default=None, description="harmonic motion along z, or a list")
+    roll: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial x axis, or a list")
+    pitch: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial y axis, or a list")
+    yaw: Harmonics | None = Field(default=None, description="harmonic rotation about the inertial z axis, or a list")
+    velocity: Vector | None = Field(
+        default=None,
+        description="steady travel (tow) at this velocity or speed, reached over `ramp`; inertial frame [m/s]",
+    )
+    travel: Travel | None = Field(default=None, description="a smooth move to another place")
+    follow: Literal["waves"] | None = Field(
+        default=None, description="waves: rises and falls with the surface where the end is; needs waves with a ramp"
+    )
+    vessel: Vessel | None = Field(default=None, description="a vessel that carries the end in the waves of the scene")
+    ramp: Positive | None = Field(
+        default=None, description="time over which harmonic motion, velocity and a file grow from zero, smoothly [s]"
+    )
+    file: Text | None = Field(
+        default=None,
+        min_length=1,
+        description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (s, m, degrees) in any order; relative to the "
+        "scene file; it starts at rest where the end is, or `ramp` blends it in",
+    )
+
+    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
+        """The harmonic motions that are given, by name; one that is no list is a tuple of one."""
+        named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
+        return {
+            name: (given,) if isinstance(given, Harmonic) else given
+            for name, given in named.items()
+            if given is not None
+        }
+
+    def shifts(self) -> list[str]:
+        """The keys given that move the end; those of TURNS turn it, and a file may do both."""
+        named = (*SHIFTS, "velocity", "travel", "follow", "vessel")
+        return [name for name in named if getattr(self, name) is not None]
+
+    def carried(self, t: float) -> tuple[Triple, Triple]:
+        """How far velocity and travel have carried the end at t [s], and how fast they do: m and m/s, inertial."""
+        ways: list[tuple[Triple, float, float]] = []  # along which vector, how much of it, how fast
+        if self.velocity is not None and self.ramp is not None:
+            x = t / self.ramp
+            ways.append((self.velocity, self.ramp * way_of_smooth_step(x), smooth_step(x)[0]))
+        if self.travel is not None:
+            grown, rate = smooth_step((t - self.travel.begin) / self.travel.over)
+            ways.append((self.travel.by, grown, rate / self.travel.over))
+        return _sum([(v, far) for v, far, _ in ways]), _sum([(v, fast) for v, _, fast in ways])
+
+    @model_validator(mode="after")
+    def _one_source(self) -> Motion:
+        given = [*self.shifts(), *(name for name in TURNS if getattr(self, name) is not None)]
+        ramped = [name for name in given if name not in ("travel", "follow", "vessel")]
+        if self.vessel is not None:
+            fix = "leave it out, or write all of the motion into a file; travel may move the vessel"
+            beside = [name for name in given if name not in ("vessel", "travel")]
+            refuse(Finding((name,), "nothing, because vessel already gives the motion", fix) for name in beside)
+        if self.file is not None:
+            fix = "put the whole motion into the file, or leave file out"
+            refuse(Finding((name,), "nothing, because file already gives the motion", fix) for name in given)
+        elif not given:
+            expected = f"at least one of {', '.join((*SHIFTS, *TURNS))}, velocity, travel, follow, vessel, or file"
+            refuse([Finding((), expected, "say how the end moves, or leave motion out")])
+        elif self.ramp is not None and not ramped:
+            expected = "nothing, because a ramp is for velocity and for harmonic motion"
+            fix = "leave it out: travel has `over`, and what follows the waves grows with waves.ramp"
+            refuse([Finding(("ramp",), expected, fix)])
+        if self.velocity is not None and any(self.velocity) and self.ramp is None:
+            expected = "a number > 0, in s, because the cable starts at rest and velocity has to grow from zero"
+            refuse([Finding(("ramp",), expected, "add `ramp: ...` (s), such as 10")])
+        return self

@@ -1,0 +1,51 @@
+"""Events of an accepted step: steps that were cut, an error that is not known, a line that comes near itself."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from hybrid.kernels import books as b
+from hybrid.simulation.events import slack_steps_text, steps_cut_text
+
+if TYPE_CHECKING:
+    from hybrid.simulation.transient import Transient
+
+
+def note_cut(moving: Transient) -> None:
+    """An end turns too far in a fixed step, which was cut: an event for the first."""
+    clock, most = moving.run.clock, moving.resolution.turn
+    if not moving.turned and not moving.controlled:
+        text = steps_cut_text(float(clock[b.CUT_ANGLE]), float(clock[b.CUT_STEP]), most)
+        moving.events.event(float(clock[b.PREVIOUS]), 0.0, moving.model.length, "steps cut", text)
+    moving.turned, clock[b.MUTE_CUTS] = True, 1.0
+
+
+def note_slack(moving: Transient) -> None:
+    """A catenary was slack in a step too long for its waves, and is not in shorter ones: an event for the first."""
+    clock, cell = moving.run.clock, int(moving.run.count[b.SLACK_CELL])
+    text = slack_steps_text(float(clock[b.SLACK_STEP]), float(clock[b.LAST_DT]), float(clock[b.WAVE_STEP]))
+    s = float(moving.model.line.s[cell])
+    moving.events.event(moving.t, s, s, "steps cut", text)
+    moving.slackened, clock[b.MUTE_SLACK] = True, 1.0
+
+
+def note_unknown_error(moving: Transient) -> None:
+    """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
+    assert moving.correction is not None
+    if moving.t > moving.beyond:
+        s = float(moving.model.line.s[max(moving.correction.corrector.furthest, 0)])
+        moving.events.event(moving.t, s, s, "model error not estimated", moving.correction.beyond)
+        moving.beyond = moving.t + moving.model.time_scale  # that it takes the whole line to move
+
+
+def look_at_itself(moving: Transient, flags: int, cells_change: bool) -> None:
+    """The line has become so bent that it could come near itself, or it meets itself: an event.
+
+    flags: of kernels.books; cells_change: whether the line may have other cells than when it was attached.
+    """
+    assert moving.envelope is not None
+    watch = moving.envelope.itself
+    if cells_change and not watch.watching:
+        watch.attach(moving.model, moving.run)
+    if flags & b.MEETS_ITSELF or watch.look(moving.run):
+        watch.tell(moving.t, float(moving.run.clock[b.LAST_DT]), moving.events.event)
