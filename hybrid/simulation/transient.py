@@ -445,6 +445,10 @@ class Transient:
         self.model, self.stepper.line, self.stepper.work = model, model.line, work
         self.plane_monitor.take(model.line)
 
+    def _note(self, node: int, kind: str, text: str) -> None:
+        s = float(self.model.line.s[node])
+        self.events.event(self.t, s, s, kind, text)
+
     def envelope_values(self) -> dict[str, np.ndarray]:
         """Values of the envelope in the file, up to now; none where no extremes are kept."""
         if self.envelope is None:
