@@ -34,6 +34,7 @@ class Cable(NamedTuple):
     buoy: Floats
     displaced: Floats
     diameter: Floats
+    polar: Floats  # kg m; not a number: rods have none
     B: Floats  # (n, 3)
     kappa: Floats  # (n, 3)
     EI: Floats  # N m2, mean of both axes
@@ -48,8 +49,8 @@ def blank_cable(n: int) -> Cable:
     """A cable of nothing on n base cells."""
     z = np.zeros
     return Cable(
-        z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z((n, 3)), z((n, 3)), z(n), z(n),
-        z((9, n + 1)), z(9), z(n + 1, np.int8), z((2, 2), np.int8),
+        z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z((n, 3)), z((n, 3)), z(n),
+        z(n), z((9, n + 1)), z(9), z(n + 1, np.int8), z((2, 2), np.int8),
     )  # fmt: skip
 
 
@@ -95,7 +96,7 @@ def fill_cells(cable, s, of, rod, line):
         j, h = of[c], s[c + 1] - s[c]
         half = 0.5 * h
         line.h[c], line.ck[c], line.tau[c], line.diameter[c] = h, cable.ck[j], cable.tau[j], cable.diameter[j]
-        line.spin[c], line.rotary[c], line.polar[c] = rod[c], np.nan, np.nan
+        line.spin[c], line.rotary[c], line.polar[c] = rod[c], 0.0 * cable.polar[j], h * rod[c] * cable.polar[j]
         line.drag_n[c], line.drag_t[c] = half * cable.drag_n[j], half * cable.drag_t[j]
         line.added_n[c], line.added_t[c] = half * cable.added_n[j], half * cable.added_t[j]
         line.buoy[c], line.displaced[c] = half * cable.buoy[j], half * cable.displaced[j]

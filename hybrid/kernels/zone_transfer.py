@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import add, cross, dot, scale, spin_about, sub, transport
@@ -373,6 +374,21 @@ def make_frames(job, p, q):
 
 
 @inner
+def carry_spins(job, p, q):
+    """Rates of spin of the fresh rod cells p to q (excluded): between those of the rods beside them."""
+    out, target = job.out, job.target
+    left, right = p > 0 and target.spin[p - 1], q < target.h.shape[0] and target.spin[q]
+    if not left and not right:
+        return
+    a, b = (p - 1 if left else q), (q if right else p - 1)
+    for c in range(p, q):
+        x = (c - p + 1) / (q - p + 1)
+        out.w[c] = (1.0 - x) * out.w[a] + x * out.w[b]
+        out.wa[c] = (1.0 - x) * out.wa[a] + x * out.wa[b]
+        out.wd[c] = (1.0 - x) * out.wd[a] + x * out.wd[b]
+
+
+@inner
 def carry_frames(job):
     """Frames of rods that are new."""
     target, m = job.target, job.target.h.shape[0]
@@ -386,6 +402,8 @@ def carry_frames(job):
             q += 1
         if q > p:
             make_frames(job, p, q)
+            if target.bits & ROTARY:
+                carry_spins(job, p, q)
         p = max(q, p + 1)
 
 

@@ -20,7 +20,7 @@ from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
 from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
 from hybrid.model.layout import Layout
-from hybrid.model.line import line_on
+from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
@@ -175,7 +175,8 @@ def build(
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
     if scene.contact.self:
         touch |= SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
-    line = line_on(cable, s, rod, touch, sections_turn=layout is None)  # rods that come and go have no such inertia
+    moves = layout is not None
+    line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
     h, compliance = line.h, line.ck
 
     start = blank_state(n, len(line.torsion))

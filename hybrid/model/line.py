@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from hybrid.kernels.forces import BODIES, ROTARY
+from hybrid.kernels.forces import BODIES, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state import NO_TORSION, Floats, Line
 from hybrid.model.material import Material
 
 
 def line_on(
     material: Material, s: Floats, rod: np.ndarray, more_bits: int = 0, sections_turn: bool = True,
+    comes_and_goes: bool = False,
 ) -> Line:  # fmt: skip
     """The line of a material with nodes s (N+1,) and rod cells where `rod` (N,) is true.
 
     more_bits: forces that the surroundings ask for; sections_turn: whether cross-sections of rods have inertia.
+    comes_and_goes: its rods do; they have inertia about their chords alone, where nothing else holds their spin.
     """
     h = np.diff(s)
     n = h.size
@@ -25,6 +27,8 @@ def line_on(
     if sections_turn and rod.any() and (material.polar[of] > 0.0).any():
         bits |= ROTARY
         rotary, polar = h * rod * material.rotary[of], h * rod * material.polar[of]
+        if comes_and_goes:
+            rotary = 0.0 * polar
     point = {name: np.full(n + 1, 0.0 if name == "point_mass" or bits & BODIES else np.nan) for name in material.points}
     place = material.point_nodes(s)
     for name, values in material.points.items():
@@ -49,6 +53,24 @@ def line_on(
         buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
         footing=footing, bits=bits, torsion=torsion, **point,
     )  # fmt: skip
+
+
+def spins_freely(material: Material) -> bool:
+    """Whether only inertia holds the spin of rods that come and go.
+
+    Where no torque passes from end to end, a rod between joints turns freely about its chords, and the damping of its
+    bend turns it: at once by half a turn where the bend goes through zero and nothing has inertia.
+    """
+    passes = all(material.held_twist) and all(material.held_tangent)
+    return not passes and bool(material.bits & STIFFNESS_DAMPING) and bool(material.polar.any())
+
+
+def with_spin_inertia(line: Line, material: Material) -> Line:
+    """The line with inertia of its rods about their chords, where nothing else holds their spin from now on."""
+    if line.bits & ROTARY or not spins_freely(material):
+        return line
+    polar = line.h * line.spin * material.polar[material.piece(0.5 * (line.s[:-1] + line.s[1:]))]
+    return line._replace(bits=line.bits | ROTARY, polar=polar, rotary=0.0 * polar)
 
 
 def _to_nodes(x: Floats) -> Floats:

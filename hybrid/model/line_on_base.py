@@ -10,7 +10,7 @@ from hybrid.kernels.state import NO_PLANE, NO_TORSION, Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import NodeKinds, blank_kinds
 from hybrid.kernels.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.model.layout import Layout
-from hybrid.model.line import torsion_zones
+from hybrid.model.line import spins_freely, torsion_zones
 from hybrid.model.material import LEAST_TENSION, POINT, TENSION_FLOOR, Material
 
 lines = Packed(blank_line, given=("bits", "plane", "torsion"))
@@ -29,13 +29,16 @@ class LineOnBase:
         """base: (n+1,) m, nodes that are always there."""
         of = material.piece(0.5 * (base[:-1] + base[1:]))
         per_length = {name: np.ascontiguousarray(getattr(material, name)[of]) for name in PER_LENGTH}
+        polar = material.polar[of] if spins_freely(material) else np.full(of.size, np.nan)
         place = material.point_nodes(base)
         load = np.zeros(base.size, np.int8)
         load[place] = 1
         self._points, self._place, self._material = np.zeros((9, base.size)), place, material
         held = np.array([material.held_tangent, material.held_twist], np.int8).T.copy()
         EI, w = material.mean_bending[of], np.abs(material.submerged_weight[of])
-        self._cable = Cable(**per_length, EI=EI, w=w, points=self._points, blank=np.zeros(9), load=load, held=held)
+        self._cable = Cable(
+            **per_length, polar=polar, EI=EI, w=w, points=self._points, blank=np.zeros(9), load=load, held=held
+        )
         self._line_job, self._kinds_job = Table(blank_line_job()), Table(blank_kinds_job())
         self._bits, self._of = -1, of
         self._holds_twist = bool(held.all())

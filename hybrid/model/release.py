@@ -9,6 +9,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.state import Line
 from hybrid.model.build import Model
+from hybrid.model.line import with_spin_inertia
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.scene.schema import Scene
 
@@ -25,7 +26,7 @@ def without_hold(model: Model, k: int, t: float) -> Model:
     )
     line, ends, on_base = _without_clamp(model.line, -k), model.ends.released_at(k, t), None
     if model.layout is not None:
-        on_base = LineOnBase(cable, model.layout.base)
+        line, on_base = with_spin_inertia(line, cable), LineOnBase(cable, model.layout.base)
     return replace(model, line=line, cable=cable, ends=ends, on_base=on_base)
 
 
