@@ -17,19 +17,20 @@ PACKAGE = Path(hybrid.__file__).parent
 FILES = sorted(PACKAGE.rglob("*.py"))
 
 # One rule for each room: which other rooms it may import.  docs/architecture.md draws them.
-COMPUTING = ("errors", "kernels", "scene", "store", "model", "solve", "adapt", "outputs")
+COMPUTING = ("errors", "kernels", "scene", "statistics", "store", "model", "solve", "adapt", "outputs")
 ALLOWED: dict[str, tuple[str, ...]] = {
     "errors": (),
     "kernels": (),
     "scene": ("errors",),
-    "store": ("errors",),
+    "statistics": ("errors",),
+    "store": ("errors", "statistics"),
     "model": ("errors", "kernels", "scene"),
     "solve": ("errors", "kernels", "model"),
     "adapt": ("errors", "kernels", "model"),
     "outputs": ("errors", "kernels", "model", "solve", "store"),
     "shooting": ("errors", "scene"),  # the second solver shares nothing with the first but the scene
     "simulation": (*COMPUTING, "shooting"),
-    "view": ("errors", "store"),
+    "view": ("errors", "statistics", "store"),
     "exports": ("errors", "store"),
     "interop": ("errors", "scene"),
     "studies": (*COMPUTING, "simulation", "view"),
@@ -40,7 +41,7 @@ ALLOWED: dict[str, tuple[str, ...]] = {
 
 # Packages from outside that only these rooms may import.
 ONLY = {
-    "scipy": ("scene", "store", "model", "solve", "adapt", "outputs", "shooting", "simulation", "view", "exports", "studies"),
+    "scipy": ("scene", "statistics", "store", "model", "solve", "adapt", "outputs", "shooting", "simulation", "view", "exports", "studies"),
     "numba": ("kernels",),
     "h5py": ("store", "exports"),
     "matplotlib": ("view",),

@@ -30,6 +30,7 @@ FLOORS = (
         "scene": (1.5, "what there is: YAML, checks"),
         "store": (3.65, "HDF5 files"),
     },
+    {"statistics": (3.65, "moments, extremes, fatigue")},
     {"errors": (2.3, "errors, outcomes, remedies")},
 )
 COLUMN, HIGH, WIDE, GAP = 226, 50, 198, 40

@@ -18,6 +18,7 @@ import typer
 
 import hybrid
 import hybrid.cli.result_commands  # registers its commands
+import hybrid.cli.statistics_command
 from hybrid.cli.app import (
     REFUSED,
     Drawn,

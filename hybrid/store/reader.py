@@ -42,6 +42,7 @@ from h5py import h5d, h5ds, h5g, h5o
 from hybrid.errors import ResultError
 from hybrid.store.format import plain_text
 from hybrid.store.hdf5_file import check_format, open_file
+from hybrid.store.histories import Histories
 from hybrid.store.integrity import readable
 from hybrid.store.lines import GROUP, Lines
 from hybrid.store.names import ALIASES, OLD_ATTRIBUTES, OLD_EVENTS, OLD_NAMES, right_of
@@ -66,7 +67,7 @@ TEXTS = ("scene", "changes")
 HIDDEN = ("checkpoint", GROUP)  # what is for the program alone, and results of lines
 
 
-class Result:
+class Result(Histories):
     """The recorded answer of one run.
 
     Arrays have the output times first: `position` is (nt, ns, 3).  `units`, `describe` and `dims` say what each

@@ -1,0 +1,144 @@
+"""The command stats: what the histories of a result amount to."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import numpy as np
+import typer
+
+from hybrid.cli.app import Json, LineName, Quiet, app, numbers, opened_line, session, window, words
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+HOUR = 3600.0
+
+
+@app.command()
+def stats(
+    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to look at.", show_default=False)],
+    names: Annotated[
+        Any, typer.Option(metavar="NAME,..", parser=words, help="These quantities; else forces, tension, bending.")
+    ] = None,
+    at: Annotated[
+        Any, typer.Option(metavar="S,S,..", parser=numbers, help="At these arc lengths (m); else where it is largest.")
+    ] = None,
+    times: Annotated[Any, typer.Option(metavar="A:B", parser=window, help="Only from A to B (s).")] = None,
+    hours: Annotated[float, typer.Option(metavar="H", help="Extremes of so many hours.")] = 3.0,
+    curve: Annotated[str | None, typer.Option(metavar="NAME", help="Fatigue damage by this curve ..")] = None,
+    strength: Annotated[
+        float | None, typer.Option(metavar="N", help=".. of tension over this strength (N), or ..")
+    ] = None,
+    section: Annotated[
+        Any, typer.Option(metavar="A,D,E", parser=numbers, help=".. of stress: area (m2), diameter (m), modulus (Pa).")
+    ] = None,
+    line: LineName = None, quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
+    with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
+        rows = rows_of(opened, names, at, times, hours * HOUR)
+        for row in rows:
+            console.json("statistics", **row)
+        console.show(lambda: _table(rows, hours))
+        for text in dict.fromkeys(row["no_extreme"] for row in rows if "no_extreme" in row):
+            console.note(f"note: no extreme of {hours:g} h: {text}")
+        facts: dict[str, Any] = {}
+        if curve is not None:
+            s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
+            facts = _fatigue_facts(opened, s, damage, times)
+            console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")
+        console.json("done", file=str(result), status=opened.status, fatigue=facts)
+
+
+def rows_of(
+    result: Result, names: list[str] | None, at: list[float] | None, times: Any, duration: float
+) -> list[dict[str, Any]]:
+    """One row for each history: its summary, and the extreme of `duration` (s) or why there is none."""
+    from hybrid.errors import ResultError
+    from hybrid.statistics.extremes import of_record
+    from hybrid.statistics.moments import summary
+    from hybrid.store.histories import history_of, lies_along, usual_names
+
+    rows = []
+    for name in usual_names(result) if names is None else names:
+        history = history_of(result, name, times, at if lies_along(result, name) else None)
+        values = history.values.reshape(history.t.size, -1)
+        if names is None and not values.any():
+            continue
+        if history.s is None:
+            picked: list[tuple[float | None, int]] = [(None, k) for k in range(values.shape[1])]
+        elif at is None:
+            k = int(values.max(axis=0).argmax())
+            picked = [(float(history.s[k]), k)]
+        else:
+            picked = [(float(s), k) for k, s in enumerate(history.s)]
+        for s, k in picked:
+            found = summary(history.t, values[:, k])
+            row: dict[str, Any] = {"quantity": name, "unit": history.unit, "s": s, "of": history.basis}
+            row |= {key: _number(value) for key, value in found._asdict().items()}
+            row["extreme"] = None
+            try:
+                row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
+            except ResultError as error:
+                row["no_extreme"] = str(error).splitlines()[0]
+            rows.append(row)
+    return rows
+
+
+def _number(value: Any) -> float | None:
+    x = float(value)
+    return x if np.isfinite(x) else None
+
+
+def _table(rows: list[dict[str, Any]], hours: float) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=True)
+    for title in (
+        "s (m)",
+        "mean",
+        "deviation",
+        "skewness",
+        "smallest",
+        "largest",
+        "period (s)",
+        f"in {hours:g} h",
+        "90 %",
+    ):
+        table.add_column(title, justify="right", no_wrap=True)
+
+    def text(x: float | None) -> str:
+        return "" if x is None else f"{x:.5g}"
+
+    for row in rows:
+        extreme = row["extreme"]
+        table.add_row(
+            f"{row['quantity']} ({row['unit']})", text(row["s"]), text(row["mean"]), text(row["deviation"]),
+            "" if row["skewness"] is None else f"{row['skewness']:.2f}", text(row["minimum"]), text(row["maximum"]),
+            text(row["crossing_period"]), text(extreme and extreme["most_probable"]),
+            text(extreme and extreme["fractile"]),
+        )  # fmt: skip
+    return table
+
+
+def _fatigue_facts(result: Result, s: np.ndarray, damage: np.ndarray, times: Any) -> dict[str, Any]:
+    from hybrid.statistics.fatigue import life_in_years
+    from hybrid.store.histories import history_of
+
+    t = history_of(result, "tension", times).t
+    k, duration = int(damage.argmax()), float(t[-1] - t[0])
+    life = float(life_in_years([damage[k]], [1.0], duration))
+    return {
+        "s": float(s[k]),
+        "damage": float(damage[k]),
+        "duration": duration,
+        "life": life if np.isfinite(life) else None,
+    }
+
+
+def _fatigue_text(facts: dict[str, Any]) -> str:
+    life = "no end" if facts["life"] is None else f"{facts['life']:.3g} years of this"
+    return f"most at s = {facts['s']:.5g} m, {facts['damage']:.3g} in {facts['duration']:.6g} s; life {life}"

@@ -1,0 +1,116 @@
+"""Mean, deviation, skewness, extremes and periods of histories.
+
+Samples need not be even in time, because an end force is known at every step and steps may have any length: a mean is
+the integral over time (trapezoidal rule) divided by the time.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from hybrid.errors import ResultError
+
+Floats = NDArray[np.float64]
+
+# A deviation below this part of the largest value is round-off: there is no skewness and no period.
+STEADY = 1e-9
+
+
+class Summary(NamedTuple):
+    """Of histories (nt, ...): values (...) in the unit of the history, but for skewness [-] and times [s].
+
+    What a history does not have is NaN: the skewness and period of one that is steady, the period and the
+    significant range of one with less than two up-crossings of its mean.
+    """
+
+    mean: Floats
+    deviation: Floats
+    skewness: Floats
+    minimum: Floats
+    t_minimum: Floats
+    maximum: Floats
+    t_maximum: Floats
+    crossing_period: Floats
+    significant_range: Floats
+    cycles: NDArray[np.int64]
+
+
+def checked(t: ArrayLike, x: ArrayLike, least: int = 2) -> tuple[Floats, Floats]:
+    """Times (nt,) s that grow, and histories (nt, ...) of finite numbers; ResultError if they are not."""
+    times, values = np.asarray(t, float), np.asarray(x, float)
+    if times.ndim != 1 or values.ndim == 0 or values.shape[0] != times.size:
+        raise ResultError(f"a history has one value for each time: {times.shape} times and {values.shape} values")
+    if times.size < least:
+        raise ResultError(f"{times.size} values are too few\n    expected: {least} at least")
+    if not np.all(np.diff(times) > 0.0):
+        raise ResultError("the times of a history must grow")
+    if not np.all(np.isfinite(values)):
+        raise ResultError(
+            "a history has values that are no finite numbers\n    try:      leave out when it is not there"
+        )
+    return times, values
+
+
+def mean_over_time(t: Floats, x: Floats) -> Floats:
+    """Mean (...) over the time of histories (nt, ...)."""
+    return np.asarray(np.trapezoid(x, t, axis=0) / (t[-1] - t[0]))
+
+
+def summary(t: ArrayLike, x: ArrayLike) -> Summary:
+    """What histories x (nt, ...) at times t (nt,) s amount to; ResultError if they are no histories.
+
+    cycles: from up-crossing of the mean to up-crossing; crossing_period: their mean length, s; significant_range: mean
+    of the largest third of their ranges, as the significant height is that of a sea.
+    """
+    times, values = checked(t, x)
+    mean = mean_over_time(times, values)
+    off = values - mean
+    deviation = np.sqrt(mean_over_time(times, off**2))
+    moves = deviation > STEADY * np.abs(values).max(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        skewness = np.where(moves, mean_over_time(times, off**3) / deviation**3, np.nan)
+    low, high = values.argmin(axis=0), values.argmax(axis=0)
+    shape = values.shape[1:]
+    period, significant = np.full(shape, np.nan), np.full(shape, np.nan)
+    cycles = np.zeros(shape, int)
+    for where in np.ndindex(shape):
+        if moves[where]:
+            found = cycles_of(times, off[(slice(None), *where)])
+            cycles[where] = found.ranges.size
+            if found.ranges.size:
+                period[where] = (found.t[-1] - found.t[0]) / found.ranges.size
+                significant[where] = mean_of_largest_third(found.ranges)
+    return Summary(
+        mean, deviation, skewness, values.min(axis=0), times[low], values.max(axis=0), times[high], period,
+        significant, cycles,
+    )  # fmt: skip
+
+
+class Cycles(NamedTuple):
+    """Cycles between up-crossings t (n+1,) s: highest and lowest value (n,) of each, and their difference."""
+
+    t: Floats
+    crests: Floats
+    troughs: Floats
+    ranges: Floats
+
+
+def cycles_of(t: Floats, off: Floats) -> Cycles:
+    """Cycles of one history (nt,) about zero."""
+    up = np.flatnonzero((off[:-1] < 0.0) & (off[1:] >= 0.0))
+    if up.size < 2:
+        none = np.empty(0)
+        return Cycles(none, none, none, none)
+    at = t[up] - off[up] * (t[up + 1] - t[up]) / (off[up + 1] - off[up])
+    inside = off[: up[-1] + 1]
+    crests = np.maximum.reduceat(inside, up[:-1] + 1)
+    troughs = np.minimum.reduceat(inside, up[:-1] + 1)
+    return Cycles(at, crests, troughs, crests - troughs)
+
+
+def mean_of_largest_third(ranges: Floats) -> float:
+    """Mean of the largest third of values, of one at least."""
+    return float(np.sort(ranges)[-max(1, round(ranges.size / 3)) :].mean())

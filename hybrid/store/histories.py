@@ -1,0 +1,203 @@
+"""Histories of a result, and what they amount to: statistics, spectra, extremes, fatigue damage.
+
+An end force is known at every step, and its statistics are those of the steps; all else is known at the outputs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.statistics import extremes, fatigue, moments, spectrum
+from hybrid.store.names import ALIASES
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+Floats = np.ndarray
+Window = tuple[float | None, float | None]
+
+# What is looked at when nothing is asked for, where the result has it.
+USUAL = ("end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact")
+# Fibres around a section at which its stress is counted.
+FIBRES = 8
+
+
+class History(NamedTuple):
+    """A quantity over time: values (nt,) or (nt, n), at arc lengths s (n,) m if it lies along the line."""
+
+    name: str
+    unit: str
+    t: Floats
+    values: Floats
+    s: Floats | None
+    basis: str
+
+
+class Section(NamedTuple):
+    """A section for stresses: area of the material (m2), outer diameter (m), Young's modulus (Pa)."""
+
+    area: float
+    outer_diameter: float
+    modulus: float
+
+
+def usual_names(result: Result) -> list[str]:
+    """The quantities of USUAL that a result has."""
+    return [name for name in USUAL if name in result or f"steps/{name}" in result]
+
+
+def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
+    """A history of a result.  times: from and to (s); at: arc lengths (m), None: all output points.
+
+    ResultError for what is no history of numbers, a window with no two values in it, or a place outside.
+    """
+    stored = f"steps/{name}" if f"steps/{name}" in result and name not in result else ALIASES.get(name, name)
+    values = result[stored]
+    if isinstance(values, Mapping):
+        raise ResultError(f"'{name}' is a group; ask for one of {', '.join(f'{name}/{key}' for key in values)}")
+    dims = result.dims(stored)
+    if not dims or dims[0] not in ("t", "steps/t") or not np.issubdtype(np.asarray(values).dtype, np.number):
+        raise ResultError(f"'{name}' is no history: its dimensions are ({', '.join(dims)})\n    try:      tension")
+    t, s = np.asarray(result[dims[0]]), None
+    if dims[1:] == ("s",):
+        s = np.asarray(result["s"] if at is None else np.atleast_1d(np.asarray(at, float)))
+        if at is not None:
+            values = result.at(s=s, names=[stored], side="left")[stored]
+    elif at is not None:
+        raise ResultError(f"'{name}' has no value at an arc length: its dimensions are ({', '.join(dims)})")
+    first, last = times or (None, None)
+    a, b = -np.inf if first is None else first, np.inf if last is None else last
+    inside = (t >= a) & (t <= b)
+    if inside.sum() < 2:
+        over = f"{t[0]:.6g} to {t[-1]:.6g} s" if t.size else "none"
+        raise ResultError(
+            f"{int(inside.sum())} values of '{name}' lie between t = {a:g} and {b:g} s\n"
+            f"    expected: 2 at least, of {over}"
+        )
+    basis = "every step" if dims[0] == "steps/t" else "every output"
+    return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
+
+
+class Histories:
+    """What a result can tell of its histories."""
+
+    def statistics(
+        self: Any, names: Sequence[str] | None = None, *, times: Window | None = None, at: Any = None
+    ) -> dict[str, moments.Summary]:
+        """Summaries of histories by name, each of the shape of the quantity at one time: mean, deviation, skewness,
+        extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
+
+        names: None for end forces, tension, curvature, bending moment, torque and contact force, where the result has
+        them; times: from and to, s; at: arc lengths, m, None: all output points.
+        """
+        found = {}
+        for name in usual_names(self) if names is None else names:
+            history = history_of(self, name, times, at if lies_along(self, name) else None)
+            found[name] = moments.summary(history.t, history.values)
+        return found
+
+    def extreme(
+        self: Any, name: str, *, at: float | None = None, duration: float = extremes.THREE_HOURS,
+        threshold: float | None = None, times: Window | None = None, smallest: bool = False,
+        probability: float = extremes.FRACTILE,
+    ) -> extremes.Extreme:  # fmt: skip
+        """The largest (or smallest) value that a time of `duration` (s) brings, by peaks over a threshold of a history.
+
+        at: arc length (m), of a quantity along the line; threshold: in the unit of the quantity, None: nine tenths of
+        the peaks are below it.  ResultError with too few peaks.
+        """
+        history = _one(history_of(self, name, times, at))
+        if not smallest:
+            return extremes.of_record(history.t, history.values, duration, threshold, probability)
+        low = None if threshold is None else -threshold
+        found = extremes.of_record(history.t, -history.values, duration, low, probability)
+        return found._replace(
+            most_probable=-found.most_probable, fractile=-found.fractile,
+            most_probable_interval=_negated(found.most_probable_interval),
+            fractile_interval=_negated(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
+        )  # fmt: skip
+
+    def spectrum(
+        self: Any, name: str, *, at: Any = None, times: Window | None = None, segment: float | None = None
+    ) -> spectrum.Spectrum:
+        """The spectrum of a history by Welch's method; segment: s, None: an eighth of the record."""
+        history = history_of(self, name, times, at)
+        return spectrum.welch(history.t, history.values, segment)
+
+    def damage(
+        self: Any, curve: str | Mapping[str, Any] | fatigue.Curve, *, strength: float | None = None,
+        section: Section | Sequence[float] | None = None, concentration: float = 1.0, times: Window | None = None,
+        at: Any = None,
+    ) -> tuple[Floats, Floats]:  # fmt: skip
+        """Arc lengths (n,) m and the damage (n,) that the outputs of the run do there, by a curve of fatigue.
+
+        curve: a name of hybrid/statistics/fatigue_curves.csv, or kind, log_a, m (log_a2, m2, knee) of one's own.
+        strength: N, reference strength, for a T-N curve.  section: (area m2, outer diameter m, Young's modulus Pa) for
+        an S-N curve; the stress is that of tension and bending at the worst of FIBRES fibres, times `concentration`.
+        The damage is that of the time of the outputs; divide by it for a rate.
+        """
+        law = fatigue.curve_of(curve)
+        tension = history_of(self, "tension", times, at)
+        if law.kind == "T-N":
+            if strength is None or section is not None:
+                raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: strength=..., in N")
+            return np.asarray(tension.s), fatigue.damage(tension.values, law, concentration / strength)
+        if section is None or strength is not None:
+            fix = "section=(area m2, outer diameter m, Young's modulus Pa)"
+            raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
+        bends = _bends(self, times, at)
+        found = []
+        for k in range(FIBRES):
+            angle = 2.0 * np.pi * k / FIBRES
+            about = np.cos(angle) * bends[..., 0] + np.sin(angle) * bends[..., 1]
+            stress = fatigue.stress_of(tension.values, about, *Section(*section))
+            found.append(fatigue.damage(stress, law, concentration))
+        return np.asarray(tension.s), np.max(found, axis=0)
+
+
+def _bends(result: Result, times: Window | None, at: Any) -> Floats:
+    """Curvature (nt, n, 2) 1/m about two axes across the mean tangent of every place."""
+    size = history_of(result, "curvature", times, at).values
+    s, t = np.asarray(result["s"]), np.asarray(result["t"])
+    first, last = times or (None, None)
+    inside = (t >= (-np.inf if first is None else first)) & (t <= (np.inf if last is None else last))
+    theta, phi = result["theta"][inside], result["phi"][inside]
+    tangent = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
+    before = np.concatenate([tangent[:, :1], tangent[:, :-1]], axis=1)
+    after = np.concatenate([tangent[:, 1:], tangent[:, -1:]], axis=1)
+    axis = np.cross(before, after)
+    length = np.linalg.norm(axis, axis=2, keepdims=True)
+    axis = np.divide(axis, length, out=np.zeros_like(axis), where=length > 0.0)
+    mean = tangent.mean(axis=0)
+    if at is not None:
+        nearest = np.abs(s[:, None] - np.atleast_1d(np.asarray(at, float))).argmin(axis=0)
+        axis, mean = axis[:, nearest], mean[nearest]
+    aside = np.eye(3)[np.abs(mean).argmin(axis=1)]
+    one = np.cross(mean, aside)
+    one /= np.linalg.norm(one, axis=1, keepdims=True)
+    two = np.cross(mean, one)
+    two /= np.linalg.norm(two, axis=1, keepdims=True)
+    return np.stack([(axis * one).sum(axis=2) * size, (axis * two).sum(axis=2) * size], axis=2)
+
+
+def lies_along(result: Result, name: str) -> bool:
+    """Whether a quantity has a value at every arc length."""
+    known = ALIASES.get(name, name)
+    return known in result and result.dims(known)[1:] == ("s",)
+
+
+def _one(history: History) -> History:
+    """The same as one history; ResultError if it is several."""
+    values = history.values.reshape(history.values.shape[0], -1)
+    if values.shape[1] != 1:
+        fix = "at=..., an arc length in m" if history.s is not None else "a quantity with one value"
+        raise ResultError(f"'{history.name}' has {values.shape[1]} values at a time\n    try:      {fix}")
+    return history._replace(values=values[:, 0])
+
+
+def _negated(interval: tuple[float, float]) -> tuple[float, float]:
+    return -interval[1], -interval[0]

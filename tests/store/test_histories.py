@@ -1,0 +1,139 @@
+"""Statistics of a result: which values they are of, and what is refused."""
+
+from __future__ import annotations
+
+import json
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.cli.commands import main
+from hybrid.errors import ResultError
+from hybrid.statistics import fatigue, moments
+from hybrid.store.histories import history_of
+
+SCENE = {
+    "environment": {"fluid": {"density": 1025.0}},
+    "cable": {
+        "sections": [
+            {
+                "length": 60.0, "mass": 8.0, "diameter": 0.04, "axial_stiffness": 1e7, "bending_stiffness": 500.0,
+                "drag": {"normal": 1.2},
+            }
+        ]
+    },
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -40]},
+        "end": {
+            "kind": "pinned", "position": [35, 0, 0], "motion": {"heave": {"amplitude": 1.0, "period": 5.0}, "ramp": 5.0},
+        },
+    },
+    "initial": "equilibrium",
+    "model": "rod",
+    "mesh": {"cells": 20},
+    "time": {"duration": 130.0, "step": 0.1},
+    "output": {"every": 0.25},
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    return hybrid.run(SCENE, tmp_path_factory.mktemp("stats") / "run.h5")
+
+
+def test_statistics_are_of_steps_and_of_outputs(result: hybrid.Result) -> None:
+    """An end force is taken at every step; tension has a value at each place, which is that of its column."""
+    found = result.statistics(times=(30.0, None))
+    assert found["end_force_end"].maximum == result["steps/end_force_end"][result["steps/t"] >= 30.0].max()
+    tension = found["tension"]
+    assert tension.mean.shape == result.s.shape
+    late = result.t >= 30.0
+    one = moments.summary(result.t[late], result.tension[late, 7])
+    assert tension.deviation[7] == pytest.approx(one.deviation, rel=1e-12)
+    assert tension.crossing_period[-1] == pytest.approx(5.0, rel=2e-3)
+    assert result.statistics(["tension"], at=[10.0, 20.0])["tension"].mean.shape == (2,)
+
+
+def test_extremes_and_their_negative(result: hybrid.Result) -> None:
+    """The smallest value is the negative of the largest of what is negated, with its interval the right way round."""
+    low = result.extreme("tension", at=30.0, smallest=True, duration=600.0)
+    assert low.fractile < low.most_probable < result.at(s=30.0, names=["tension"])["tension"].mean()
+    assert low.fractile_interval[0] <= low.fractile <= low.fractile_interval[1]
+
+
+def test_spectrum_has_its_peak_where_the_motion_is(result: hybrid.Result) -> None:
+    found = result.spectrum("end_force_end", times=(30.0, None), segment=50.0)
+    assert found.peak_period == pytest.approx(5.0, rel=0.05)
+    deviation = result.statistics(["end_force_end"], times=(30.0, None))["end_force_end"].deviation
+    assert found.significant == pytest.approx(4.0 * deviation, rel=0.02)
+
+
+def test_damage_along_the_line(result: hybrid.Result) -> None:
+    """By tension it is that of the history; by stress it is at least that of tension alone, and of one plane in one."""
+    s, damage = result.damage("studless chain T-N", strength=1e6, times=(30.0, None))
+    history = history_of(result, "tension", (30.0, None))
+    assert np.array_equal(s, result.s)
+    assert damage[5] == fatigue.damage(history.values[:, 5], "studless chain T-N", 1e-6)
+    section = (5e-4, 0.04, 2e11)
+    _, worst = result.damage("D sea", section=section, times=(30.0, None))
+    axial = fatigue.damage(history.values, "D sea", 1e-6 / section[0])
+    assert np.all(worst >= 0.999 * axial) and worst.max() > axial.max()
+    # the line bends in one plane: tension and bending of the fibre in it, on either side
+    bend = history_of(result, "curvature", (30.0, None)).values[:, 10]
+    sides = [
+        fatigue.damage(fatigue.stress_of(history.values[:, 10], sign * bend, *section), "D sea") for sign in (1.0, -1.0)
+    ]
+    assert worst[10] == pytest.approx(max(sides), rel=0.15)
+    assert worst[10] <= max(sides) * (1.0 + 1e-9)
+
+
+@pytest.mark.parametrize(
+    ("ask", "text"),
+    [
+        (lambda r: r.statistics(["tensio"]), "did you mean"),
+        (lambda r: r.statistics(["energy"]), "is a group"),
+        (lambda r: r.statistics(["s"]), "no history"),
+        (lambda r: r.statistics(["tension"], times=(1e3, 2e3)), "0 values"),
+        (lambda r: r.statistics(["tension"], at=[1e3]), "outside the result"),
+        (lambda r: r.extreme("tension"), "an arc length"),
+        (lambda r: r.extreme("end_force_end", at=3.0), "no value at an arc length"),
+        (lambda r: r.extreme("end_force_end", duration=0.1), "less than one peak"),
+        (lambda r: r.extreme("end_force_end", times=(0.0, 20.0)), "too few"),
+        (lambda r: r.spectrum("tension", segment=1e6), "expected"),
+        (lambda r: r.damage("D sea", strength=1e6), "ranges of stress"),
+        (lambda r: r.damage("studless chain T-N"), "strength"),
+        (lambda r: r.damage("D see", section=(1, 1, 1)), "did you mean D sea"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_is_refused_in_words(result: hybrid.Result, ask: object, text: str) -> None:
+    with pytest.raises((ResultError, KeyError, AttributeError), match=text):
+        ask(result)  # type: ignore[operator]
+
+
+def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:
+    """Every figure of the table is in the JSON; a run that is too short for extremes says so once."""
+    with pytest.raises(SystemExit) as ended:
+        main(
+            [
+                "stats",
+                str(result.file),
+                "--json",
+                "--times",
+                "30:",
+                "--curve",
+                "studless chain T-N",
+                "--strength",
+                "1e6",
+            ]
+        )
+    assert not ended.value.code
+    rows = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    tension = next(row for row in rows if row.get("quantity") == "tension")
+    column = np.flatnonzero(result.s == tension["s"])[0]
+    assert tension["maximum"] == result.tension[result.t >= 30.0, column].max()
+    assert rows[-1]["fatigue"]["damage"] > 0.0
+    with pytest.raises(SystemExit):
+        main(["stats", str(result.file), "--times", "100:"])
+    shown = capsys.readouterr()
+    assert "tension (N)" in shown.out and "no extreme of 3 h" in shown.err
