@@ -101,6 +101,10 @@ def _is_anchor(result: Result, end: str) -> bool:
         return False
     *normal, offset = result["seabed"].tolist()
     place = result.position[-1, 0 if end == "start" else -1]
+    if "seabed_height" in result:
+        from hybrid.view.projections import bed_heights
+
+        return float(place[2] - bed_heights(result, place[:1], place[1:2])[0]) <= ANCHORED
     return float(place @ normal) - offset <= ANCHORED
 
 

@@ -20,6 +20,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.block_elimination_plane import solve_again_planar
 from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, LAST_DT, PARITY, RHO, STEP_BEFORE, UNKNOWN_ERROR
@@ -83,8 +84,9 @@ class History(NamedTuple):
 def seabed_rates(line, sea, i, state, u, history):
     """What history adds to the force of the seabed on node i, and contact at r + e to its linearisation there."""
     v, e, y, ahead, out = state.v, state.e, history.y, history.ahead, history.travel
-    n = (sea.normal[0], sea.normal[1], sea.normal[2])
-    p, pd = sea.offset + 0.5 * sea.onset - dot(n, get3(state.r, i)), -dot(n, get3(v, i))
+    x = get3(state.r, i)
+    n, p = bed_under(sea, x)
+    pd = -dot(n, get3(v, i))
     N = more = 0.0
     yi, q = -dot(n, get3(y, i)), -dot(n, get3(ahead, i))
     k, c, o = sea.stiffness, sea.damping, sea.onset
@@ -92,17 +94,20 @@ def seabed_rates(line, sea, i, state, u, history):
         j = i + side
         if 0 <= j <= line.h.shape[0]:
             cell = i - 1 if side < 0 else i
-            po = p + dot(n, get3(e, cell)) if side < 0 else p - dot(n, get3(e, cell))
-            qo = -dot(n, get3(ahead, j))
+            if side < 0:
+                m, po = bed_before(sea, n, p, x, get3(e, cell))
+            else:
+                m, po = bed_beside(sea, n, p, x, get3(e, cell))
+            qo = -dot(m, get3(ahead, j))
             near = p > 0.0 or po > 0.0
             if near or p + q > 0.0 or po + qo > 0.0:
-                vo = -dot(n, get3(v, j))
+                vo = -dot(m, get3(v, j))
                 f = f0 = f1 = g0 = g1 = 0.0
                 if near:
                     f, f0, f1, g0, g1 = contact(p, po, pd, vo, line.h[cell], k, c, o)
                 g, _, _, _, _ = contact(p + q, po + qo, pd, vo, line.h[cell], k, c, o)
                 N += f
-                more += g - f - f0 * q - f1 * qo + g0 * yi - g1 * dot(n, get3(y, j))
+                more += g - f - f0 * q - f1 * qo + g0 * yi - g1 * dot(m, get3(y, j))
     if line.footing[i] > 0.0 and p > 0.0:
         f, f0, g0 = pressure(0.0, p, p, pd, pd, k, c, o)
         N += line.footing[i] * f
@@ -236,10 +241,10 @@ def predict_error(old, s, history):
 
 
 @inner
-def carry_travel(sea, slid, travel, old, new, i):
+def carry_travel(sea, r, slid, travel, old, new, i):
     """The error of friction's travel at node i after the step."""
     q = add(get3(slid, i), sub(get3(new[0], i), get3(old[0], i)))
-    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
+    normal, _ = bed_under(sea, get3(r, i))
     q = sub(q, scale(dot(normal, q), normal))
     slides = get3(travel, i)
     slid[i, 0], slid[i, 1], slid[i, 2] = scale(travel[i, 3], sub(q, scale(dot(slides, q), slides)))
@@ -344,7 +349,7 @@ def put_error(job, old, new, history, s, dt, moving):
             else:
                 new[1, i, k], new[2, i, k], new[3, i, k] = 0.0, 0.0, 0.0
         if moving and job.line.bits & FRICTION:
-            carry_travel(job.sea, arrays.slid, history.travel, old, new, i)
+            carry_travel(job.sea, job.new.r, arrays.slid, history.travel, old, new, i)
     return clipped, where
 
 

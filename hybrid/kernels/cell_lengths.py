@@ -14,6 +14,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.bed import bed_under
 from hybrid.kernels.compile import inner
 from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT
 from hybrid.kernels.forces import SEABED
@@ -91,7 +92,7 @@ def lower_at_edge(line, sea, state, zones, i, dt):
     p, q = depth(sea, state.r, i), depth(sea, state.r, i + 1)
     s, h = line.s, line.s[i + 1] - line.s[i]
     part = p / (p - q)
-    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
+    normal, _ = bed_under(sea, get3(state.r, i))
     rises = (1.0 - part) * dot(normal, get3(state.v, i)) + part * dot(normal, get3(state.v, i + 1))
     l0 = bending_length(zones.kinds, state.T, i)
     at, way = s[i] + part * h, dt * rises * h / (q - p)

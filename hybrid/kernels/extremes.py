@@ -14,6 +14,7 @@ import math
 import numpy as np
 
 from hybrid.kernels.assembly import get9
+from hybrid.kernels.bed import bed_under
 from hybrid.kernels.books import CURVATURE, DISPLACEMENT, MOMENT, PRESSURE, SEAM, SELF_PRESSURE, TENSION, TORQUE
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
@@ -195,9 +196,10 @@ def first_strains(line, ends, state, books):
 
 
 @inner
-def node_pressure(sea, normal, state, i):
+def node_pressure(sea, state, i):
     """Pressure of the bed at a node, N/m."""
-    p, v = sea.offset + 0.5 * sea.onset - dot(normal, get3(state.r, i)), -dot(normal, get3(state.v, i))
+    normal, p = bed_under(sea, get3(state.r, i))
+    v = -dot(normal, get3(state.v, i))
     return pressure(0.0, p, p, v, v, sea.stiffness, sea.damping, sea.onset)[0]
 
 
@@ -205,13 +207,12 @@ def node_pressure(sea, normal, state, i):
 def note_contact(line, sea, state, books, t):
     """Force per length that the nodes bear, each over its half cells, as outputs have it."""
     n = line.h.shape[0]
-    normal = get3(sea.normal.reshape(1, 3), 0)
-    here = node_pressure(sea, normal, state, 0)
+    here = node_pressure(sea, state, 0)
     force = length = 0.0  # of the half cell before the node
     for i in range(n + 1):
         after = 0.0
         if i < n:
-            after = node_pressure(sea, normal, state, i + 1)
+            after = node_pressure(sea, state, i + 1)
             force += line.h[i] * (2.0 * here + after) / 6.0
             length += 0.5 * line.h[i]
         widen_both(books.extremes, books.right, PRESSURE, i, force / length, t)

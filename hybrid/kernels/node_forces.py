@@ -6,6 +6,7 @@ and kernels.seabed.
 
 from __future__ import annotations
 
+from hybrid.kernels.bed import bed_before, bed_beside, bed_under
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import ADDED_MASS, BODIES, DRAG, FLOW, FRICTION, MASS_DAMPING, SEABED, SURFACE, WAVES
 from hybrid.kernels.loads import body_drag, half_cell_added_mass, half_cell_drag
@@ -105,21 +106,23 @@ def body_water(line, i, z, eta, u, U1, vi, b, af, cv, ca, report):
 @inner
 def seabed_forces(line, sea, i, x, u, v, e, cv, report):
     """Contact and friction at node i: F, D, GL, GR."""
-    n = (sea.normal[0], sea.normal[1], sea.normal[2])
-    p, vi = sea.offset + 0.5 * sea.onset - dot(n, x), get3(v, i)
-    pd = -dot(n, vi)
+    n, p = bed_under(sea, x)
+    left = right = n  # normals of the bed under the nodes beside this one
+    pd = -dot(n, get3(v, i))
     N = DN = NL = NR = 0.0  # force along n; its derivatives by the penetration of node i, and by those beside it
     if i > 0:
-        po = p + dot(n, get3(e, i - 1))
+        left, po = bed_before(sea, n, p, x, get3(e, i - 1))
         if p > 0.0 or po > 0.0:
             h = line.h[i - 1]
-            f, f0, f1, g0, g1 = contact(p, po, pd, -dot(n, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
+            f, f0, f1, g0, g1 = contact(p, po, pd, -dot(left, get3(v, i - 1)), h, sea.stiffness, sea.damping, sea.onset)
             N, NL, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if i < line.h.shape[0]:
-        po = p - dot(n, get3(e, i))
+        right, po = bed_beside(sea, n, p, x, get3(e, i))
         if p > 0.0 or po > 0.0:
             h = line.h[i]
-            f, f0, f1, g0, g1 = contact(p, po, pd, -dot(n, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset)
+            f, f0, f1, g0, g1 = contact(
+                p, po, pd, -dot(right, get3(v, i + 1)), h, sea.stiffness, sea.damping, sea.onset
+            )
             N, NR, DN = N + f, f1 + cv * g1, DN + f0 + cv * g0
     if line.footing[i] > 0.0 and p > 0.0:
         f, f0, g0 = pressure(0.0, p, p, pd, pd, sea.stiffness, sea.damping, sea.onset)
@@ -138,9 +141,11 @@ def seabed_forces(line, sea, i, x, u, v, e, cv, report):
         F, slope, q = add(F, f), add(n, g), scale(part, q)
     sea.slid[i, 0], sea.slid[i, 1], sea.slid[i, 2] = q
     sea.bed[i, 0], sea.bed[i, 1], sea.bed[i, 2] = F
-    # penetrations: dp_i = -n.dr_i, dp_{i-1} = -n.(dr_i - de), dp_{i+1} = -n.(dr_i + de)
-    S = outer(slope, n)
-    return F, madd(D, mscale(-(DN + NL + NR), S)), mscale(NL, S), mscale(-NR, S)
+    # penetrations: dp_i = -n.dr_i, dp_{i-1} = -n.(dr_i - de), dp_{i+1} = -n.(dr_i + de), each with n where it is; how
+    # n turns with x is left out: p times the curvature of the bed
+    L, R = mscale(NL, outer(slope, left)), mscale(NR, outer(slope, right))
+    D = madd(D, mscale(-DN, outer(slope, n)))
+    return F, madd(D, mscale(-1.0, madd(L, R))), L, mscale(-1.0, R)
 
 
 @inner

@@ -122,6 +122,6 @@ def lowest_not_held(line, sea, T):
 
 @inner
 def normal_force(sea, i):
-    """Force of the bed on a node along the normal of the bed, N."""
+    """Force of the bed on a node along the normal of the bed, of a bed of depths upwards, N."""
     n, bed = sea.normal, sea.bed
     return n[0] * bed[i, 0] + n[1] * bed[i, 1] + n[2] * bed[i, 2]

@@ -23,6 +23,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.bed import bed_under
 from hybrid.kernels.compile import inner, kernel
 
 G1, G2 = 0.5 - math.sqrt(3.0) / 6.0, 0.5 + math.sqrt(3.0) / 6.0  # Gauss points of a piece
@@ -94,16 +95,23 @@ def contact(p0, p1, v0, v1, h, k, c, o):
     return N, N0, N1, V0, V1
 
 
+@inner
+def depth_of(sea, r, i):
+    """How deep node i lies below where contact begins, m."""
+    _, p = bed_under(sea, (r[i, 0], r[i, 1], r[i, 2]))
+    return p
+
+
 @kernel
 def normal_forces(line, sea, r, N):
     """Force N (N+1,) N of the bed along its normal on the nodes of a line at rest."""
-    n, o = sea.normal, sea.onset
+    o = sea.onset
     for i in range(N.shape[0]):
         N[i] = 0.0
     for i in range(N.shape[0]):
-        p0 = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+        p0 = depth_of(sea, r, i)
         if i < line.h.shape[0]:
-            p1 = sea.offset + 0.5 * o - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
+            p1 = depth_of(sea, r, i + 1)
             if p0 > 0.0 or p1 > 0.0:
                 N[i] += contact(p0, p1, 0.0, 0.0, line.h[i], sea.stiffness, sea.damping, o)[0]
                 N[i + 1] += contact(p1, p0, 0.0, 0.0, line.h[i], sea.stiffness, sea.damping, o)[0]
@@ -115,17 +123,16 @@ def normal_forces(line, sea, r, N):
 def stored(line, sea, r):
     """Energy (J) that the bed has stored under the line."""
     energy = 0.0
-    n, k, o = sea.normal, sea.stiffness, sea.onset
+    k, o = sea.stiffness, sea.onset
     for i in range(line.footing.shape[0]):
         if line.footing[i] > 0.0:
-            p = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
+            p = depth_of(sea, r, i)
             if p >= o:
                 energy += line.footing[i] * k * (0.5 * p * (p - o) + o * o / 6.0)
             elif p > 0.0:
                 energy += line.footing[i] * k * p * p * p / (6.0 * o)
     for i in range(line.h.shape[0]):
-        p0 = sea.offset + 0.5 * o - (n[0] * r[i, 0] + n[1] * r[i, 1] + n[2] * r[i, 2])
-        p1 = sea.offset + 0.5 * o - (n[0] * r[i + 1, 0] + n[1] * r[i + 1, 1] + n[2] * r[i + 1, 2])
+        p0, p1 = depth_of(sea, r, i), depth_of(sea, r, i + 1)
         if p0 <= 0.0 and p1 <= 0.0:
             continue
         xb, xc = pieces(p0, p1, o)

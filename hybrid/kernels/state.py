@@ -121,6 +121,9 @@ class Sea(NamedTuple):
     ramps: Floats  # (2,) s, over which the current and the waves grow from nothing; 0: there from the start
     normal: Floats  # (3,) unit normal of the seabed, upwards
     offset: float  # m, normal . x on the seabed
+    bed_x: Floats  # (K,) m, increasing: of a bed of depths on a grid (kernels.bed); empty: the bed is a plane
+    bed_y: Floats  # (M,) m, increasing
+    bed_heights: Floats  # (K M, 4) z (m), its slopes along x and y, and the rate of these along the other, 1/m
     stiffness: float  # N/m per m
     damping: float  # N s/m per m
     onset: float  # m, penetration over which contact sets in
@@ -272,7 +275,7 @@ def no_sea(n_cells: int) -> Sea:
     node, nan = (n_cells + 1, 3), float("nan")
     return Sea(
         np.zeros(1), np.zeros((1, 3)), np.zeros((0, 6)), nan, nan, np.array([0.0, 1.0, 1.0, 0.0]), np.zeros(2),
-        np.array([0.0, 0.0, 1.0]), nan, nan, nan, nan, np.full(2, nan), nan,
+        np.array([0.0, 0.0, 1.0]), nan, np.zeros(0), np.zeros(0), np.zeros((0, 4)), nan, nan, nan, np.full(2, nan), nan,
         np.zeros((n_cells + 1, 7)), np.zeros((10, LANES)), np.zeros(node), np.zeros(node), np.zeros(node), np.zeros(node),
     )  # fmt: skip
 

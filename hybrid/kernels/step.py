@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+from hybrid.kernels.bed import bed_under
 from hybrid.kernels.block_elimination import ROW
 from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE
 from hybrid.kernels.cell import chord
@@ -50,10 +51,11 @@ def largest_turn(e, u):
 
 
 @kernel
-def friction_axes(sea, e, slip):
+def friction_axes(sea, r, e, slip):
     """Remember for friction how the line lies when a step starts: its direction along the bed, its elastic travel."""
-    n, last = sea.normal, e.shape[0]
+    last = e.shape[0]
     for i in range(last + 1):
+        n, _ = bed_under(sea, get3(r, i))
         x, y, z = 0.0, 0.0, 0.0
         for c in range(max(i - 1, 0), min(i + 1, last)):
             d, _, _ = chord(get3(e, c))
@@ -148,11 +150,11 @@ def find_rates(space, line, sea, old, new, u, s):
 @inner
 def seabed_work(line, sea, old, new, u, report):
     """Work of the seabed in the step, and what it stores."""
-    normal = (sea.normal[0], sea.normal[1], sea.normal[2])
     for i in range(u.shape[0]):  # force times way: bounded by the energy of a blow, however short the step is not
         b = (0.5 * (old.bed[i, 0] + sea.bed[i, 0]), 0.5 * (old.bed[i, 1] + sea.bed[i, 1]),
              0.5 * (old.bed[i, 2] + sea.bed[i, 2]))  # fmt: skip
         ui = get3(u, i)
+        normal, _ = bed_under(sea, get3(new.r, i))
         along = dot(normal, ui) * dot(normal, b)
         report[CONTACT_WORK] += along
         report[FRICTION_WORK] += dot(b, ui) - along
@@ -188,7 +190,7 @@ def begin_step(plane, space, line, sea, old, new, u, s, safe):
         if line.bits & WAVES:  # at the predicted positions, which are right to third order
             wave_kinematics(sea, old.r, u)
         if line.bits & FRICTION:
-            friction_axes(sea, old.e, old.slip)
+            friction_axes(sea, old.r, old.e, old.slip)
     return turn, cell
 
 

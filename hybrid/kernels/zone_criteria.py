@@ -21,6 +21,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.bed import bed_under
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
@@ -62,8 +63,8 @@ def get9(A, i):
 
 @inner
 def depth(sea, r, i):
-    n = (sea.normal[0], sea.normal[1], sea.normal[2])
-    return sea.offset + 0.5 * sea.onset - dot(n, get3(r, i))
+    _, p = bed_under(sea, get3(r, i))
+    return p
 
 
 @inner

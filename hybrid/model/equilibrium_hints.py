@@ -41,7 +41,7 @@ def reasons_against(scene: Scene, rod_ends: tuple[bool, bool], flexible: float =
                 )
     fluid = scene.environment.fluid
     still = fluid is None or not fluid.flows()
-    if bed is not None and bed.slope is None and len(held) == 1 and still and not all(rod_ends):
+    if bed is not None and bed.is_level and len(held) == 1 and still and not all(rod_ends):
         forces = [x for end in scene.ends.both for x in end.loads if x.what == "force"]
         if not any(any(x.value[:2]) for x in forces):
             found.append(

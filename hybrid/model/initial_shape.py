@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def initial_nodes(scene: Scene, s: Floats) -> tuple[Floats, str]:
         if tangent:
             direction = np.array(tangent, float)
         else:  # what is held on the bed lies on it, level
-            direction = _along_bed(scene) if lies else np.array([0.0, 0.0, hanging])
+            direction = _along_bed(scene, place) if lies else np.array([0.0, 0.0, hanging])
     direction /= np.linalg.norm(direction)
     first = np.array(start, float) if start else np.array(end, float) - length * direction
     return first + s[:, None] * direction, "a straight line"
@@ -86,10 +86,10 @@ def from_joint(scene: Scene, s: Floats) -> Iterator[tuple[str, Floats]]:
     yield "a line that hangs from its first joint", r
 
 
-def _along_bed(scene: Scene) -> Floats:
-    """A direction in the plane of the seabed, across its slope."""
+def _along_bed(scene: Scene, place: Sequence[float]) -> Floats:
+    """A direction along the seabed at a place, across its slope."""
     bed = scene.environment.seabed
-    rise = bed.slope if bed is not None and bed.slope is not None else (0.0, 0.0)
+    rise = bed.rise(place[0], place[1]) if bed is not None else (0.0, 0.0)
     if not any(rise):
         return np.array([1.0, 0.0, 0.0])
     return np.array([-rise[1], rise[0], 0.0])

@@ -6,6 +6,7 @@ import math
 
 import numpy as np
 
+from hybrid.kernels.bed import HEIGHTS
 from hybrid.kernels.state import Floats, Sea, no_sea, with_waves
 from hybrid.model.ends import rise
 from hybrid.model.scales import pressing
@@ -78,6 +79,11 @@ def surroundings(scene: Scene, cells: int) -> Surroundings:
             sea = with_waves(sea, components(fluid.waves, depth, scene.environment.gravity), depth)
             wave_ramp = fluid.waves.ramp
     if bed is not None:
+        if bed.depths is not None:
+            grid = bed.depths.surface
+            heights = -grid.values.reshape(-1, HEIGHTS)
+            heights[:, 0] += bed.z
+            sea = sea._replace(bed_x=grid.x, bed_y=grid.y, bed_heights=heights)
         slope = bed.slope or (0.0, 0.0)
         normal = np.array([0.0 - slope[0], 0.0 - slope[1], 1.0]) / math.hypot(*slope, 1.0)
         sea = sea._replace(

@@ -22,7 +22,7 @@ from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside
 from hybrid.outputs.output_grid import Grid
-from hybrid.outputs.touchdown import Touchdown, along, carried, contact_pressure, penetration, touchdown
+from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
 from hybrid.solve.bending_corrector import Shift
 
 
@@ -365,7 +365,7 @@ class Observation:
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
-        q = contact_pressure(self.sea, self._depth, -along(self.sea.normal, self._plain.v))
+        q = contact_pressure(self.sea, self._depth, sinking(self.sea, self._plain.r, self._plain.v))
         return np.asarray(self.grid.chords @ carried(self.batch.h.T if self.batch.h.size else self.line.h, q))
 
     @property

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.state import Floats, Line, Sea
 
 
@@ -19,10 +20,22 @@ class Touchdown(NamedTuple):
 
 def penetration(sea: Sea, r: Floats) -> Floats:
     """How deep points (n, 3, nb) lie below where contact begins, m: half an onset above the seabed; negative above."""
-    return np.asarray(sea.offset + 0.5 * sea.onset - along(sea.normal, r))
+    if not sea.bed_x.size:
+        return np.asarray(sea.offset + 0.5 * sea.onset - _along(sea.normal, r))
+    n, _, nb = r.shape
+    return planes_under(sea, np.moveaxis(r, 1, 2).reshape(-1, 3))[1].reshape(n, nb)
 
 
-def along(normal: Floats, x: Floats) -> Floats:
+def sinking(sea: Sea, r: Floats, v: Floats) -> Floats:
+    """Rates of `penetration` (n, nb), m/s, of points (n, 3, nb) that move by v."""
+    if not sea.bed_x.size:
+        return -_along(sea.normal, v)
+    n, _, nb = r.shape
+    normals = planes_under(sea, np.moveaxis(r, 1, 2).reshape(-1, 3))[0].reshape(n, nb, 3)
+    return -_along(np.moveaxis(normals, 2, 0), v)
+
+
+def _along(normal: Floats, x: Floats) -> Floats:
     """Component of vectors (n, 3, nb) along a normal; by no library, whose sums depend on the number of outputs."""
     return np.asarray(normal[0] * x[:, 0] + normal[1] * x[:, 1] + normal[2] * x[:, 2])
 

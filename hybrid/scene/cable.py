@@ -71,6 +71,11 @@ class Environment(Table):
         description="the ground (sea floor) at the depth of the water; absent: none",
     )
 
+    def files(self) -> list[str]:
+        """Paths of the files that are read."""
+        depths = self.seabed.depths if self.seabed is not None else None
+        return [depths.file] if depths is not None and depths.file is not None else []
+
     @property
     def waves(self) -> Waves | None:
         """The waves, if there are any."""
@@ -82,7 +87,7 @@ class Environment(Table):
         if self.fluid is None or self.fluid.surface is None:
             return None
         if self.seabed is not None:
-            return self.fluid.surface - self.seabed.z
+            return self.fluid.surface - self.seabed.height(0.0, 0.0)
         return self.fluid.waves.depth if self.fluid.waves is not None else None
 
 

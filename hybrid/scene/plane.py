@@ -229,6 +229,9 @@ def _sea(environment: Environment) -> Iterator[Witness]:
     """Directions of current, waves and seabed."""
     fluid, bed = environment.fluid, environment.seabed
     if bed is not None:
+        if bed.depths is not None:  # its slopes lie in no plane
+            for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0)):
+                yield Witness(("environment", "seabed", "depths"), "along", axis)
         rise_x, rise_y = bed.slope or (0.0, 0.0)
         yield Witness(("environment", "seabed", "slope"), "along", (-rise_x, -rise_y, 1.0))
     if fluid is None:

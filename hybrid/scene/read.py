@@ -246,6 +246,7 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
     points = data.get("points") if isinstance(data, dict) else None
     files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
+    files.append(("environment", "seabed", "depths"))
     for path in files:
         here = data
         for key in path:

@@ -29,6 +29,7 @@ from hybrid.scene.base import (
     refuse,
     unwrap,
 )
+from hybrid.scene.depths import Depths
 
 # --- currents ----------------------------------------------------------------------------------
 
@@ -221,11 +222,17 @@ class Friction(Table):
 
 
 class Seabed(Table):
-    """A plane bed that pushes back along its normal like a spring under every metre of cable."""
+    """A bed, plane or of depths on a grid, that pushes back along its normal like a spring under each metre."""
 
-    z: Number = Field(description="height of the bed at x = y = 0 [m]")
+    z: Number = Field(
+        description="height of the bed at x = y = 0; with `depths`, the height they count down from, usually that of "
+        "the surface [m]"
+    )
     slope: Pair | None = Field(
         default=None, description="[dz/dx, dz/dy], how steeply the bed rises along x and y; absent: level [-]"
+    )
+    depths: Depths | None = Field(
+        default=None, description="an uneven bed (bathymetry): depths on a grid; absent: a plane"
     )
     stiffness: Positive = Field(description="force per metre of cable and metre of penetration [N/m per m]")
     damping: NonNegative = Field(
@@ -238,5 +245,25 @@ class Seabed(Table):
 
     def height(self, x: float, y: float) -> float:
         """Height of the bed [m] at x, y [m]."""
+        if self.depths is not None:
+            return self.z - self.depths.surface.at(x, y)[0]
         rise_x, rise_y = self.slope or (0.0, 0.0)
         return self.z + rise_x * x + rise_y * y
+
+    def rise(self, x: float, y: float) -> tuple[float, float]:
+        """How steeply the bed rises along x and y, at x, y [m]."""
+        if self.depths is not None:
+            _, down_x, down_y = self.depths.surface.at(x, y)
+            return -down_x, -down_y
+        return self.slope or (0.0, 0.0)
+
+    @property
+    def is_level(self) -> bool:
+        """Whether the bed is as high everywhere."""
+        return self.depths is None and not any(self.slope or ())
+
+    @model_validator(mode="after")
+    def _one_shape(self) -> Seabed:
+        if self.slope is not None and self.depths is not None:
+            refuse([Finding(("slope",), "nothing, because depths give the shape of the bed", "leave one of them out")])
+        return self

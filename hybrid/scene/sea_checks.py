@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from hybrid.scene.analysis import Equilibrium, Initial, Straight
 from hybrid.scene.base import Finding, Place, unit
 from hybrid.scene.cable import Cable, Environment
+from hybrid.scene.depths import Depths
 from hybrid.scene.ends import Ends, Triple
 from hybrid.scene.sea import RegularWaves, wavenumber
 
@@ -133,8 +134,10 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
         return
     depth = cable.length
     if fluid is not None and fluid.surface is not None:
-        depth = max(fluid.surface - seabed.z, 0.0)
+        depth = max(fluid.surface - seabed.height(0.0, 0.0), 0.0)
     fix = "raise it, or lower environment.seabed.z"
+    if seabed.depths is not None:
+        yield from _within_depths(seabed.depths, ends)
     named: list[tuple[Place, Triple]] = [(("ends", n, "position"), p) for n, p in ends.held().items()]
     named += [(("ends", n, "initial_guess"), p) for n, p in ends.initial_guesses().items()]
     if not isinstance(initial, Equilibrium | Straight):
@@ -156,6 +159,17 @@ def nothing_in_the_ground(environment: Environment, cable: Cable, ends: Ends, in
                 given = f"a way to [{x:.8g}, {y:.8g}, {z:.8g}], {under:.4g} m under the seabed"
                 where: Place = ("ends", name, "motion", "travel", "by")
                 yield Finding(where, "a way that ends on the seabed or above", fix, given)
+
+
+def _within_depths(depths: Depths, ends: Ends) -> Iterator[Finding]:
+    """Ends beside the grid of depths, where nobody knows the bed."""
+    grid = depths.surface
+    (a, b), (c, d) = ((float(k[0]), float(k[-1])) for k in (grid.x, grid.y))
+    for key, places in (("position", ends.held()), ("initial_guess", ends.initial_guesses())):
+        for name, (x, y, _) in places.items():
+            if not (a <= x <= b and c <= y <= d):
+                expected = f"a place over the grid of depths, x from {a:g} to {b:g} m and y from {c:g} to {d:g} m"
+                yield Finding(("ends", name, key), expected, "extend the grid to where the cable may go")
 
 
 def _straight_in_the_ground(

@@ -187,7 +187,7 @@ def _drifts(environment: Environment, cable: Cable, ends: Ends) -> tuple[str, st
         return f"nothing holds this cable against the horizontal force of {math.hypot(*push):.4g} N at its ends", remedy
     if not rubs and fluid is not None and fluid.flows() and _drags(cable, ends):
         return "nothing holds this cable against the current, and it drifts", remedy
-    if not rubs and seabed is not None and weight > 0.0 and seabed.slope is not None and any(seabed.slope):
+    if not rubs and seabed is not None and weight > 0.0 and not seabed.is_level:
         return "nothing holds this cable on the slope of the seabed, and it slides", remedy
     return "", ""
 

@@ -210,7 +210,11 @@ class Case:
     @property
     def _files(self) -> dict[str, str]:
         """Digests of the files of motions and loads, by path: a run that is resumed needs the same."""
-        paths = {path for x in (self.scene, *(x.scene for x in self.changes)) for path in x.ends.files()}
+        paths = {
+            path
+            for x in (self.scene, *(x.scene for x in self.changes))
+            for path in (*x.ends.files(), *x.environment.files())
+        }
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 
     def _check(self, point: Checkpoint, source: Path) -> None:

@@ -14,6 +14,7 @@ import numpy as np
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.accept import LARGEST_TWIST
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED
 from hybrid.kernels.report import BEND, TWIST_NODE
@@ -312,7 +313,7 @@ class Diagnostics:
         self._layers(batch)
         if line.bits & SEABED:
             sea = self._model.sea.values
-            depth = sea.offset - batch.r @ sea.normal
+            depth = planes_under(sea, batch.r.reshape(-1, 3))[1].reshape(batch.r.shape[:2]) - 0.5 * sea.onset
             for k in np.flatnonzero(depth.max(axis=1) > self._sunk):
                 node = int(np.argmax(depth[k]))
                 if depth[k, node] > self._sunk:

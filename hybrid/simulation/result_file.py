@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.forces import SEABED, SURFACE
+from hybrid.kernels.state import Sea
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
@@ -162,13 +164,42 @@ def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
     ]
 
 
+def _mean_plane(sea: Sea) -> np.ndarray:
+    """Unit normal and offset of the plane through the heights of a grid, by least squares."""
+    x, y = (a.ravel() for a in np.meshgrid(sea.bed_x, sea.bed_y, indexing="ij"))
+    z, *rise = np.linalg.lstsq(np.column_stack([np.ones_like(x), x, y]), sea.bed_heights[:, 0], rcond=None)[0]
+    size = float(np.hypot(1.0, np.hypot(*rise)))
+    return np.array([-rise[0], -rise[1], 1.0, z]) / size
+
+
+def _depths(model: Model) -> list[tuple[Field, np.ndarray]]:
+    """A seabed of depths on a grid, and how it lies under the ends of the cable."""
+    sea = model.sea.values
+    shape = sea.bed_x.size, sea.bed_y.size
+    ends = planes_under(sea, model.start.r[[0, -1]])[0]
+    what = "unit normals of the seabed under the start and the end, where they are first"
+    return [
+        (Field("seabed_x", "m", "x of the grid of depths", shape[:1], ("seabed_x",)), sea.bed_x),
+        (Field("seabed_y", "m", "y of the grid of depths", shape[1:], ("seabed_y",)), sea.bed_y),
+        (
+            Field("seabed_height", "m", "height of the seabed", shape, ("seabed_x", "seabed_y"), "inertial"),
+            sea.bed_heights[:, 0].reshape(shape),
+        ),
+        (Field("seabed_ends", "", what, (2, 3), ("ends", "xyz"), "inertial"), ends),
+    ]
+
+
 def _surroundings(model: Model) -> list[tuple[Field, np.ndarray]]:
     """What pictures show besides the cable: seabed, still water, what is attached."""
     line, sea = model.line, model.sea.values
     out: list[tuple[Field, np.ndarray]] = []
     if line.bits & SEABED:
         text = "plane of the seabed: unit normal n and offset c, n . x = c on it"
-        out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), np.append(sea.normal, sea.offset)))
+        plane = np.append(sea.normal, sea.offset)
+        if sea.bed_x.size:
+            text, plane = f"{text}; the mean of its depths", _mean_plane(sea)
+            out += _depths(model)
+        out.append((Field("seabed", "", text, (4,), ("plane",), "inertial"), plane))
     if line.bits & SURFACE:
         out.append((Field("surface", "m", "height of still water"), np.array(sea.surface)))
     if model.attached:

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels import entry
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.bending_error import (
     CLIPPED,
     CURRENT,
@@ -194,20 +195,20 @@ class Corrector:
         """Force (nb, 3) N of the seabed on the first or last node, which is held, as its neighbour moves."""
         sea, near = self.sea, [cell, cell + 1] if k == 0 else [cell + 1, cell]
         r, v = batch.r[:, near] + error[:, 0, near, :3], batch.v[:, near] + error[:, 1, near, :3]
-        normal = sea.normal
-        depth = sea.offset + 0.5 * sea.onset - (r[..., 0] * normal[0] + r[..., 1] * normal[1] + r[..., 2] * normal[2])
-        rates = -(v[..., 0] * normal[0] + v[..., 1] * normal[1] + v[..., 2] * normal[2])
+        normals, depth = planes_under(sea, r.reshape(-1, 3))
+        normals, depth = normals.reshape(r.shape), depth.reshape(r.shape[:2])
+        rates = -(v[..., 0] * normals[..., 0] + v[..., 1] * normals[..., 1] + v[..., 2] * normals[..., 2])
         out = np.zeros((len(depth), 3))
         for i in np.flatnonzero(depth.max(axis=1) > 0.0):
             p, q = depth[i].tolist(), rates[i].tolist()
-            out[i] = contact(*p, *q, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0] * normal
+            out[i] = contact(*p, *q, self.line.h[cell], sea.stiffness, sea.damping, sea.onset)[0] * normals[i, 0]
         return out
 
     def rest(self, sea: Sea, ends: Ends, state: State, with_friction: bool = False) -> None:
         """The error of an equilibrium; with_friction: friction took part in it, so that a shift is felt as friction."""
         line = self.line._replace(bits=self.line.bits & ~(WAVES if with_friction else FRICTION | WAVES))
         if line.bits & FRICTION:
-            friction_axes(sea, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip)
         work = workspace(line.h.size, keep=True)
         ca = ANCHOR * self.scale / (float(line.mass.sum()) * self.length)
         still, no_spin = np.zeros_like(state.r), np.zeros_like(state.w)

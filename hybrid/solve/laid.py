@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.state import Ends, Line, Sea, State
 
 
@@ -18,7 +19,7 @@ def laid_on_bed(line: Line, sea: Sea, ends: Ends, state: State) -> State:
     """
     laid, cells = state.copy(), line.h.size
     laid.slip[:] = 0.0
-    touches = sea.offset - state.r @ sea.normal > 0.0
+    touches = planes_under(sea, state.r)[1] > 0.5 * sea.onset
     touches[0] |= bool(ends.held[0]) and bool(touches[1])
     touches[cells] |= bool(ends.held[1]) and bool(touches[cells - 1])
     shortening = (line.h / np.linalg.norm(state.e, axis=1) - 1.0)[:, None] * state.e

@@ -10,6 +10,7 @@ import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.entry import Limits, workspace_of
 from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
@@ -85,7 +86,7 @@ class _Solver:
         for _ in range(BALANCING):
             self.work.u[:] = 0.0
             if line.bits & FRICTION:
-                friction_axes(self.sea, new.e, new.slip)
+                friction_axes(self.sea, new.r, new.e, new.slip)
             outcome, iterations, _, where = entry.equilibrium(
                 line, sea or self.sea, ends, new, self.anchor, limits, turning, self.work
             )
@@ -108,7 +109,7 @@ class _Solver:
             if far.max() > DRIFTED * self.length:  # what no bond holds is held by the anchor's springs alone
                 outcome, where = Outcome.SINGULAR, int(np.argmax(far))
             elif line.bits & SEABED:
-                deep = self.sea.offset - new.r @ self.sea.normal
+                deep = planes_under(self.sea, new.r)[1] - 0.5 * self.sea.onset
                 if deep.max() > max(BURIED * self.length, BURIED_ONSETS * self.sea.onset):
                     outcome, where = Outcome.BURIED, int(np.argmax(deep))
         judged = line is self.line and sea is None and is_judged(line, ends, self.length)
@@ -125,7 +126,7 @@ class _Solver:
     def prove(self, ends: Ends, state: State) -> float:
         """Largest force out of balance at a node, N; infinity when it cannot be told."""
         if self.line.bits & FRICTION:
-            friction_axes(self.sea, state.e, state.slip)
+            friction_axes(self.sea, state.r, state.e, state.slip)
         self.work.u[:] = 0.0
         bad = entry.assembly(self.line, self.sea, ends, state, 0.0, self.anchor, self.work)
         return float(self.work.report[RESIDUAL]) if bad < 0 else float("inf")

@@ -11,6 +11,7 @@ import numpy as np
 
 from hybrid.errors import Outcome
 from hybrid.kernels import entry
+from hybrid.kernels.bed import planes_under
 from hybrid.kernels.block_elimination import solve_again
 from hybrid.kernels.entry import NO_PUSH, Limits, block_rows, out_of_balance, workspace_of
 from hybrid.kernels.forces import FRICTION, PLANAR, SEABED, WAVES
@@ -55,7 +56,7 @@ def static_friction_travel(line: Line, sea: Sea, r: Floats, force: Floats) -> Fl
     """
     N = np.zeros(r.shape[0])
     normal_forces(line, sea, r, N)
-    side = np.cross(sea.normal, sea.axis)
+    side = np.cross(planes_under(sea, r)[0], sea.axis)
     parts = []
     for direction, mu in ((sea.axis, sea.friction[0]), (side, sea.friction[1])):
         along = np.einsum("ij,ij->i", force, direction)
@@ -108,7 +109,7 @@ class Stepper:
         entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
         force = out_of_balance(line, rows)
         force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0
-        friction_axes(sea, state.e, state.slip)
+        friction_axes(sea, state.r, state.e, state.slip)
         state.slip[:] = static_friction_travel(self.line, sea, state.r, force)
 
     def consistent_accelerations(
@@ -136,7 +137,7 @@ class Stepper:
         if self.line.bits & WAVES:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            friction_axes(sea, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip)
         bad = entry.correction(self.line, sea, held, state, 0.0, HEAVY, work._replace(gaps=gaps))
         if bad >= 0:
             return Taken(Outcome.SINGULAR, 1, np.inf, bad, float(work.report[RESIDUAL]))
@@ -168,7 +169,7 @@ class Stepper:
         if self.line.bits & WAVES:
             wave_kinematics(sea, state.r, self.work.u)
         if self.line.bits & FRICTION:
-            friction_axes(sea, state.e, state.slip)
+            friction_axes(sea, state.r, state.e, state.slip)
         entry.assembly(self.line, sea, ends, state, 0.0, HEAVY, self.work)
         if self.line.bits & SEABED:
             self.work.report[SEABED_ENERGY] = stored(self.line, sea, state.r)

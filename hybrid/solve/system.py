@@ -259,7 +259,7 @@ class SystemSolver:
         if x.line.bits & WAVES:
             wave_kinematics(x.sea, state.r, work.u)
         if x.line.bits & FRICTION:
-            friction_axes(x.sea, state.e, state.slip)
+            friction_axes(x.sea, state.r, state.e, state.slip)
 
     # --- equilibrium --------------------------------------------------------------------------------
 

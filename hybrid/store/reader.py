@@ -270,6 +270,8 @@ class Result(Histories):
         the bed, and the angle (nt,) deg of the pull to the bed; both 0 where the line lies on the bed there.
         """
         pull, normal = -self[f"reaction_{end}"], self["seabed"][:3]
+        if "seabed_ends" in self:
+            normal = self["seabed_ends"][0 if end == "start" else 1]
         up = np.maximum(pull @ normal, 0.0)
         along = np.linalg.norm(pull - (pull @ normal)[:, None] * normal, axis=1)
         return up, np.degrees(np.arctan2(up, along))

@@ -22,6 +22,7 @@ from hybrid.view.projections import (
     Numbers,
     View,
     bed_in,
+    bed_profile,
     extent_in,
     free_edges,
     magnification,
@@ -138,7 +139,8 @@ def sea(result: Result, view: View) -> list[Item]:
     aside = int(view.project(result.position[-1])[0][top] < middle[0])  # where the cable is not: left or right
     wet = "surface" in result and view.upright
     planes = [(float(result["surface"]), 0.0, WATER, LEVEL, "still water", 2.0)] if wet else []
-    planes += [(*bed, SAND, BED, "seabed", -3.0)] if bed else []
+    uneven = bed_profile(view, result)
+    planes += [(*bed, SAND, BED, "seabed", -3.0)] if bed and uneven is None else []
     items: list[Item] = []
     for height, rise, fill, edge, name, lift in planes:
         z, at = height + rise * x, float(box[0, aside])
@@ -146,6 +148,10 @@ def sea(result: Result, view: View) -> list[Item]:
         items += [Area(np.array([corners]), fill), Line(x, z, colour=edge, width=0.9)]
         side, up = ("left", "right")[aside], "bottom" if lift > 0 else "top"
         items.append(Text(at, height + rise * at, name, edge, (0.0, lift), side, up))
+    if uneven is not None:
+        floor = min(deep, float(uneven[:, 1].min()))
+        outline = np.vstack([uneven, [[uneven[-1, 0], floor], [uneven[0, 0], floor]]])
+        items += [Area(outline[None], SAND), Line(uneven[:, 0], uneven[:, 1], "seabed", colour=BED, width=0.9)]
     return items
 
 

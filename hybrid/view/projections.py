@@ -102,6 +102,34 @@ def free_edges(result: Result) -> list[int]:
     return [0, 1] if held.all() else [int(k) for k in np.flatnonzero(~held)]
 
 
+def bed_heights(result: Result, x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """Heights of a seabed of depths under places x, y (n,), m: linear between the points of its grid, for pictures."""
+    knots, z = (result["seabed_x"], result["seabed_y"]), result["seabed_height"]
+    at, part = [], []
+    for k, place in zip(knots, (x, y), strict=True):
+        i = np.clip(np.searchsorted(k, place, "right") - 1, 0, len(k) - 2)
+        at.append(i)
+        part.append((place - k[i]) / (k[i + 1] - k[i]))
+    (i, j), (a, b) = at, part
+    low, high = (1.0 - b) * z[i, j] + b * z[i, j + 1], (1.0 - b) * z[i + 1, j] + b * z[i + 1, j + 1]
+    return np.asarray((1.0 - a) * low + a * high)
+
+
+def bed_profile(view: View, result: Result) -> np.ndarray | None:
+    """A seabed of depths under the cable, in an upright view: (n, 2) across and height, with as many points beyond."""
+    if "seabed_height" not in result or not view.upright:
+        return None
+    place = result.position[-1]
+    across = place @ view.across
+    order = np.argsort(across)
+    place, span = place[order], max(float(np.ptp(across)), 1e-9)
+    if float(np.ptp(across)) < 1e-6 * (1.0 + float(np.abs(across).max())):
+        place = place[[0, -1]]
+    beyond = span * np.linspace(0.0, 1.0, 31)[1:, None] * view.across
+    path = np.vstack([place[0] - beyond[::-1], place, place[-1] + beyond])
+    return np.column_stack([path @ view.across, bed_heights(result, path[:, 0], path[:, 1])])
+
+
 def bed_in(view: View, result: Result) -> tuple[float, float] | None:
     """The seabed in an upright view, where the cable lies: height at the origin, and rise per metre across."""
     if "seabed" not in result or not view.upright:

@@ -12,7 +12,7 @@ import numpy as np
 from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
 from hybrid.view.plotly_backend import colour_scale
-from hybrid.view.projections import STILL
+from hybrid.view.projections import STILL, bed_heights
 from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, WATER, colour_of, prefix
 from hybrid.view.zones import COLOURS, span_of
 
@@ -20,6 +20,7 @@ from hybrid.view.zones import COLOURS, span_of
 _FROM_SHADE = 2
 _THIN = 0.12  # of the largest extent: the least depth of the box around a flat cable, so that planes in it are visible
 _OPEN = 0.45  # of the largest extent: what a thin direction is opened to where axes are stretched
+PATCHES = 40  # of an uneven seabed, along x and along y
 _NEAR = 1.0  # of the largest extent: a seabed or a surface farther from the cable is not drawn
 
 
@@ -124,7 +125,8 @@ def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
 def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
     """Seabed and still water; the box (2, 3) grows to hold those that are near."""
     size = float(np.ptp(box, axis=0).max()) or 1.0
-    found = [("seabed", result["seabed"].tolist(), SAND, BED, 0.85)] if "seabed" in result else []
+    uneven = "seabed_height" in result
+    found = [("seabed", result["seabed"].tolist(), SAND, BED, 0.85)] if "seabed" in result and not uneven else []
     if "surface" in result:
         found.append(("still water", [0.0, 0.0, 1.0, float(result["surface"])], WATER, LEVEL, 0.45))
     planes: list[dict[str, Any]] = [
@@ -141,13 +143,42 @@ def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
     for plane in (x for x in planes if not x["far"] and x["normal"][:2] == [0.0, 0.0]):
         level = plane["offset"] / plane["normal"][2]
         box[:, 2] = min(box[0, 2], level), max(box[1, 2], level)
-    return planes
+    return [_uneven(result, box, size), *planes] if uneven else planes
+
+
+def _uneven(result: Result, box: np.ndarray, size: float) -> dict[str, Any]:
+    """A seabed of depths over the box, which grows to hold it if it is near."""
+    x, y = (np.linspace(box[0, k], box[1, k], PATCHES + 1) for k in (0, 1))
+    X, Y = (a.ravel() for a in np.meshgrid(x, y, indexing="ij"))
+    z = bed_heights(result, X, Y)
+    low, high = float(z.min()), float(z.max())
+    far = max(box[0, 2] - high, low - box[1, 2], 0.0) > _NEAR * size
+    if not far:
+        box[:, 2] = min(box[0, 2], low), max(box[1, 2], high)
+    text = f"seabed, z from {low:.4g} to {high:.4g} m"
+    return {
+        "name": "seabed", "far": far, "text": text, "surface": (X, Y, z), "fill": SAND, "line": BED, "solid": 0.85
+    }  # fmt: skip
+
+
+def _triangles() -> dict[str, list[int]]:
+    """Corners of the triangles of a surface of PATCHES x PATCHES cells, and the way around its rim."""
+    n = PATCHES + 1
+    k = (np.arange(PATCHES)[:, None] * n + np.arange(PATCHES)).ravel()
+    sides = {"i": [*k, *k], "j": [*(k + 1), *(k + n + 1)], "k": [*(k + n + 1), *(k + n)]}
+    last = n * n - 1
+    rim = [*range(n), *range(2 * n - 1, last + 1, n), *range(last - 1, last - n, -1), *range(last - 2 * n + 1, -1, -n)]
+    return {name: [int(x) for x in value] for name, value in (sides | {"rim": rim}).items()}
 
 
 def _plane(plane: dict[str, Any], box: np.ndarray) -> dict[str, Any]:
     """Its four corners in the box, and how it looks."""
     if plane["far"]:
         return {}
+    if "surface" in plane:
+        x, y, z = plane["surface"]
+        look = {key: plane[key] for key in ("name", "fill", "line", "solid", "text")}
+        return look | {"x": x.tolist(), "y": y.tolist(), "z": z.tolist()} | _triangles()
     normal, offset = plane["normal"], plane["offset"]
     x, y = box[[0, 1, 1, 0], 0], box[[0, 0, 1, 1], 1]
     z = (offset - normal[0] * x - normal[1] * y) / normal[2]

@@ -70,6 +70,18 @@ model: {kind: catenary}
 mesh: {cells: 20}
 time: {duration: 10.0, step: 0.05}
 """
+UNEVEN = """\
+environment:
+  fluid: {density: 1025.0}
+  seabed:
+    z: 0.0
+    stiffness: 1.0e+4
+    depths: {x: [-50.0, 0.0, 50.0], y: [-50.0, 50.0], depth: [[12.0, 10.0], [11.0, 10.0], [9.0, 8.0]]}
+cable: {sections: [{length: 20.0, mass: 1.0, diameter: 0.02}]}
+ends: {start: {kind: pinned, position: [0.0, 0.0, -10.0]}, end: {kind: pinned, position: [15.0, 0.0, 0.0]}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
 PAYOUTS = {
     "rate": "rate: 0.5, begin: 1.0, ramp: 2.0, until: 8.0, longest: 60.0, reel: [{length: 30.0, mass: 2.0}]",
     "rates": "rates: [[0.0, 0.0], [5.0, 1.0], [9.0, -0.5]]",
@@ -79,6 +91,7 @@ TEXTS = (
     {name: WOUND.replace("PAYOUT", payout) for name, payout in PAYOUTS.items()}
     | {
         "loaded": LOADED,
+        "uneven": UNEVEN,
         "adaptive": ADAPTIVE,
         "everything": EVERYTHING,
         "everything else": EVERYTHING_ELSE,

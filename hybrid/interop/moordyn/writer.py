@@ -187,6 +187,11 @@ class _Writer:
             self.notes.append("environment.fluid.current is left out: MoorDyn reads currents from other files")
         if fluid is not None and fluid.waves is not None:
             self.notes.append("environment.fluid.waves is left out: MoorDyn reads waves from other files")
+        if bed is not None and bed.depths is not None:
+            expected = (
+                "a level bed: MoorDyn reads an uneven one from a file of its own, with straight lines between depths"
+            )
+            self._refuse("environment.seabed.depths", "a grid", expected, "give z alone, for a comparison")
         if bed is not None and bed.slope is not None and any(bed.slope):
             expected = "a level bed, which a deck has"
             self._refuse("environment.seabed.slope", bed.slope, expected, "leave slope out, for a comparison")

@@ -59,7 +59,7 @@ def unsupported(scene: Scene) -> str:
         return "there is no water"
     if fluid.waves is not None or fluid.flows():
         return "the water moves"
-    if bed is not None and (bed.friction is not None or (bed.slope is not None and any(bed.slope))):
+    if bed is not None and (bed.friction is not None or not bed.is_level):
         return "the seabed has friction or a slope"
     return ""
 

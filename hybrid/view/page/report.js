@@ -189,10 +189,12 @@
         size: [...each((m) => 2 * m.size), 28], line: { color: [...each(() => scene.ink), "#c00000"], width: 1 }, opacity: 1 },
       hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     for (const plane of scene.planes) if (plane.x) {
-      traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: [0, 0], j: [1, 2], k: [2, 3], color: plane.fill,
+      traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: plane.i ?? [0, 0],
+        j: plane.j ?? [1, 2], k: plane.k ?? [2, 3], color: plane.fill,
         opacity: plane.solid, hoverinfo: "skip", lighting: { ambient: 1, diffuse: 0, specular: 0 } });
-      traces.push({ type: "scatter3d", mode: "lines", x: [...plane.x, plane.x[0]], y: [...plane.y, plane.y[0]],
-        z: [...plane.z, plane.z[0]], line: { color: plane.line, width: 2 }, hoverinfo: "skip" });
+      const rim = plane.rim ?? [0, 1, 2, 3, 0], along = (values) => rim.map((k) => values[k]);
+      traces.push({ type: "scatter3d", mode: "lines", x: along(plane.x), y: along(plane.y), z: along(plane.z),
+        line: { color: plane.line, width: 2 }, hoverinfo: "skip" });
     }
     box3d.querySelector("svg")?.remove();
     await Plotly.newPlot(box3d, traces, { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
