@@ -78,6 +78,7 @@ class Outcome(IntEnum):
     BURIED = 10
     OVERSTRETCHED = 11
     TURNS_LOST = 12
+    WINCH_AT_END = 13
 
     @property
     def cause(self) -> str:
@@ -169,6 +170,7 @@ _CAUSE = {
     Outcome.UNSTABLE: "the only equilibrium found is unstable: the cable would buckle out of it",
     Outcome.BURIED: "the only equilibrium found lies deep in the seabed",
     Outcome.TURNS_LOST: "the equilibrium found is not twisted by the turns asked for",
+    Outcome.WINCH_AT_END: "the winch has no more line to pay out, or none to take in",
     Outcome.OVERSTRETCHED: "the cable is stretched beyond what a section bears",
 }
 
@@ -184,6 +186,7 @@ _REMEDY = {
     Outcome.TWISTED_TOO_FAR: "add cells: each can take a twist of a quarter of a turn",
     Outcome.BURIED: "start from another shape (initial.points), and check stiffness and height of the seabed",
     Outcome.TURNS_LOST: "add cells, hold the cable tauter, or turn the end in time (ends.*.motion), with damping",
+    Outcome.WINCH_AT_END: "another winch.tension, a longer payout.longest, more cells, or a shorter time.duration",
     Outcome.OVERSTRETCHED: "check axial_stiffness (N), mass (kg/m), lengths (m), loads (N); max_strain is the limit",
     Outcome.UNSTABLE: "start from another shape (initial.points, initial.direction), or run the motion with damping",
 }

@@ -10,7 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.kernels.payout import Reel
+from hybrid.kernels.reel import Reel
 from hybrid.kernels.state import Floats, Line, State, blank_state
 
 # Steps over which new cells get their true lengths, at most and at least.

@@ -29,6 +29,7 @@ from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
 ADDRESS, ASKED, NEAR = range(3)
 PREPARE, LIMIT, TOUCH, FINISH, REST = range(5)
 call_contact = caller(0.0)
+call_winch = caller(0)
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
@@ -137,7 +138,9 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
 
 
 @inner
-def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table):
+def solve(
+    plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table, winch, winch_table
+):  # fmt: skip
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
     STEP            predict `new` from `old`, solve, find the rates; was, now: a push out of the plane before and
@@ -147,6 +150,7 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
     CORRECTION      one march and the solution of its equations, into work.x
 
     contact: of a step of a line in space that may meet itself (kernels.self_contact); its address is 0 for others.
+    winch: address of kernels.payout.wind, which corrects the length of the line; 0: no winch holds a tension.
 
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
     prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
@@ -178,6 +182,8 @@ def solve(plane, space, task, line, sea, ends, old, new, was, now, work, strains
         if task.what == ASSEMBLY:
             outcome = OK
             break
+        if winch != 0:
+            call_winch(winch, winch_table)
         if space is not None:
             good = substitute(work.X, work.x)
             pass_torque(space, line, ends, new, work, CORRECT, cv)

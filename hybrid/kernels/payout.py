@@ -14,96 +14,66 @@ A run calls `pay_out` by its address (kernels.run), so that lines of a fixed len
 
 from __future__ import annotations
 
-from typing import NamedTuple
+import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from hybrid.kernels import books as b
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, WORKS
 from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
-from hybrid.kernels.references import reader
-from hybrid.kernels.report import FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE, REPORT_SIZE
+from hybrid.kernels.reel import (
+    ACCELERATION,
+    ADDED_N,
+    ADDED_T,
+    BEND_1,
+    BUOY,
+    DAMP,
+    DIAMETER,
+    DISPLACED,
+    DRAG_N,
+    DRAG_T,
+    DUE,
+    END,
+    FADING,
+    FLUX,
+    FLUX_BEFORE,
+    KAPPA_1,
+    LENGTH,
+    LONGEST,
+    MASS,
+    PER_LENGTH,
+    PLACE,
+    POLAR,
+    RATE,
+    ROTARY,
+    SHORTEST,
+    STRETCH,
+    TAU,
+    WEIGHT,
+    read,
+)
+from hybrid.kernels.report import FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
 from hybrid.kernels.rotations import add, dot, frame, log_rotation, scale, sub
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
-
-# What a piece of the material has per length; of stiffness one over it.
-(
-    MASS, WEIGHT, DAMP, STRETCH, TAU, DRAG_N, DRAG_T, ADDED_N, ADDED_T, BUOY, DISPLACED, DIAMETER, ROTARY, POLAR,
-    BEND_1, BEND_2, TWIST, KAPPA_1, KAPPA_2, KAPPA_3,
-) = range(20)  # fmt: skip
-PER_LENGTH = 20
-END = 1  # place among powers and work
-# Numbers of a reel.
-(
-    LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
-    PLACE,  # p
-    LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
-    FADING,  # s, until when lengths of cells are on their way to true ones
-    DUE,  # 1 when a node is to enter or to leave
-    FLUX,  # W, into the line by what the corrected force of the fairlead does not do
-    FLUX_BEFORE,  # and before the last step
-) = range(10)  # fmt: skip
-NUMBERS = 10
-
-
-class Reel(NamedTuple):
-    """What a line that is paid out knows beside its arrays; N cells."""
-
-    numbers: Floats  # (NUMBERS,)
-    law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
-    pieces: Floats  # (P, 1 + PER_LENGTH) m, where a piece of the material begins; what it has per length
-    rest: Floats  # (1 + PER_LENGTH,) what the cell before the last brings to the node between; its length, as hn
-    true: Floats  # (N,) m, lengths of cells
-    lack: Floats  # (N,) m, that cells lacked when they were made
-    rate: Floats  # (N,) m/s, its rate then
-    since: Floats  # (N,) s, when that was
-    span: Floats  # (N,) s, over which they get it
-    before: Floats  # (N+3, 3) before the last step: lengths; stiffness of the last element; mass, weight of the last two nodes
-    report: Floats  # (REPORT_SIZE,) this and the next: work arrays
-    amount: Floats  # (PER_LENGTH,)
-
-
-def blank_reel(cells: int, law: Floats | None = None, pieces: Floats | None = None) -> Reel:
-    """A reel of a line of so many cells."""
-    z = np.zeros
-    return Reel(
-        z(NUMBERS), z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
-        z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 3, 3)),
-        z(REPORT_SIZE), z(PER_LENGTH),
-    )  # fmt: skip
-
-
-class ReelJob(NamedTuple):
-    """Arguments of the entries: two states in turn as kernels.run has them, and its clock, counts, work and report."""
-
-    line: Line
-    sea: Sea
-    ends: Ends
-    old: State
-    new: State
-    clock: Floats
-    counts: NDArray[np.int64]
-    work: Floats  # (2, WORKS)
-    velocity: Floats  # (2, 3) m/s, of the ends
-    report: Floats  # (REPORT_SIZE,) of the step
-    reel: Reel
-
-
-def blank_reel_job() -> ReelJob:
-    """A job with the types that every one has."""
-    state, z = blank_state(1), np.zeros
-    return ReelJob(
-        blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
-        z((2, 3)), z(REPORT_SIZE), blank_reel(1),
-    )  # fmt: skip
-
-
-read = reader(blank_reel_job())
-
+from hybrid.kernels.winch import (
+    BEGIN,
+    CA,
+    CV,
+    HELD,
+    INERTIA,
+    LENGTH_NOW,
+    RATE_NOW,
+    TENSION,
+    TRUE_NOW,
+    accept,
+    at_its_end,
+    last_change,
+    losses,
+    predict,
+    softness,
+    tension_held,
+)
 
 # --- how long the line is -------------------------------------------------------------------------
 
@@ -174,10 +144,19 @@ def set_lengths(line, reel, t):
 
 
 @inner
+def find_length(reel, t):
+    """How long the line is at t, of what is prescribed, or of a winch before a step."""
+    numbers, winch = reel.numbers, reel.winch
+    if winch[TENSION] > 0.0:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW]
+    else:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
+
+
+@inner
 def prepare(line, reel, t):
-    """The line as it is at t."""
+    """The line with the length of now at t."""
     numbers = reel.numbers
-    numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
     fill_last_cell(line, reel)
     line.h[line.h.shape[0] - 1] = reel.true[line.h.shape[0] - 1]
     if numbers[FADING] > -np.inf:
@@ -204,24 +183,44 @@ def at_fairlead(line, state, rate, acceleration):
 
 
 @inner
-def correct_force(line, sea, ends, state, velocity, reel, report):
-    """The report of a state: the half cell at the fairlead has the velocity and the acceleration of the material.
-
-    What the end does of power by the difference is kept in the numbers of the reel, to be taken back.
-    """
+def of_material(line, sea, ends, state, reel):
+    """What the force of the fairlead, N, is more because its half cell moves as the material does, and r' there."""
     n, numbers = line.h.shape[0], reel.numbers
     v, K, slope = at_fairlead(line, state, numbers[RATE], numbers[ACCELERATION])
     before, after, z = chord(get3(state.e, n - 1)), Chord(Z3, 0.0, 0.0), ends.position[1, 2]
     vn, an = get3(state.v, n), get3(state.vd, n)
     with_material, _, _, _ = inertia_and_water(line, sea, n, z, v, sub(an, K), before, after, 0.0, 0.0, reel.report)
     with_fairlead, _, _, _ = inertia_and_water(line, sea, n, z, vn, an, before, after, 0.0, 0.0, reel.report)
-    more = sub(with_material, with_fairlead)
-    for k in range(3):
-        report[FORCE_B + k] += more[k]
-    pull = (report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2])
+    return sub(with_material, with_fairlead), slope
+
+
+@inner
+def force_of_fairlead(report, more):
+    return (report[FORCE_B] + more[0], report[FORCE_B + 1] + more[1], report[FORCE_B + 2] + more[2])
+
+
+@inner
+def pull_at(force, slope):
+    """Pull of the line at the fairlead, N: the size of its force, negative where it pushes."""
+    size = math.sqrt(dot(force, force))
+    return size if dot(force, slope) <= 0.0 else -size
+
+
+@inner
+def correct_force(line, sea, ends, state, velocity, reel, report):
+    """The report of a state: the half cell at the fairlead has the velocity and the acceleration of the material.
+
+    What the end does of power by the difference is kept in the numbers of the reel, to be taken back.  Returns the
+    pull of the line there, N.
+    """
+    numbers = reel.numbers
+    more, slope = of_material(line, sea, ends, state, reel)
+    force = force_of_fairlead(report, more)
+    report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = force
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
-    report[PAYOUT_POWER] = numbers[RATE] * dot(pull, slope)
+    report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
     numbers[FLUX] = dot(more, get3(velocity, 1))
+    return pull_at(force, slope)
 
 
 # --- energy ---------------------------------------------------------------------------------------
@@ -281,36 +280,78 @@ def book(line, old, new, reel, dt):
 # --- entries --------------------------------------------------------------------------------------
 
 
+@inner
+def note_pull(reel, t, pull):
+    """What the pull is when the brake of a winch opens: the last one before."""
+    if t <= reel.winch[BEGIN]:
+        reel.winch[HELD] = pull
+
+
 @kernel
 def pay_out(table):
     """What a run whose line changes its length does before a try, after it, after a step; 1: Python must look at it."""
     job = read(table)
     line, reel, clock, count = job.line, job.reel, job.clock, job.counts
-    phase = count[b.PHASE]
+    phase, numbers, winch = count[b.PHASE], reel.numbers, reel.winch
     if phase == b.SOLVE:
+        find_length(reel, clock[b.TRY_END])
+        if winch[TENSION] > 0.0:
+            dt = clock[b.TRY_END] - clock[b.NOW]
+            numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = predict(
+                winch, clock[b.RHO], clock[b.STEP_BEFORE], dt
+            )
         prepare(line, reel, clock[b.TRY_END])
         return 0
     if phase == b.JUDGE:
         tried = job.old if count[b.PARITY] else job.new
-        correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
+        pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
+        note_pull(reel, clock[b.TRY_END], pull)
         return 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
     if count[b.PARITY]:
         state, before = before, state
+    if winch[TENSION] > 0.0:
+        accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
     job.work[0, END] += book(line, before, state, reel, clock[b.LAST_DT])
     remember(line, reel)
-    numbers, last = reel.numbers, reel.true[line.h.shape[0] - 1]
+    last = reel.true[line.h.shape[0] - 1]
     if clock[b.NOW] >= numbers[FADING]:
         numbers[FADING] = -np.inf
     numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
-    return 1 if numbers[DUE] > 0.0 else 0
+    return 1 if numbers[DUE] > 0.0 or at_its_end(winch) else 0
+
+
+@kernel
+def wind(table):
+    """An iteration of Newton's method has eliminated its equations: the winch corrects the length, and them with it."""
+    job = read(table)
+    line, reel, clock = job.line, job.reel, job.clock
+    numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
+    if t <= winch[BEGIN]:
+        return 0
+    state, at = job.old if job.counts[b.PARITY] else job.new, last_change(line)
+    more, slope = of_material(line, job.sea, job.ends, state, reel)
+    pull = pull_at(force_of_fairlead(job.report, more), slope) + job.X[at]
+    lost, steep = losses(winch, numbers[RATE])
+    answer = softness(line, state, job.X)
+    left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
+    carried = line.mass[line.h.shape[0]] * math.sqrt(dot(slope, slope))
+    stiff = (winch[INERTIA] + carried) * winch[CA] + steep * winch[CV] - answer
+    change = -left / stiff
+    numbers[LENGTH] += change
+    numbers[RATE] += winch[CV] * change
+    numbers[ACCELERATION] += winch[CA] * change
+    prepare(line, reel, t)
+    job.X[at] += answer * change
+    return 0
 
 
 @kernel
 def lengthen(table):
     """The line as it is at clock[NOW], without a look at its state."""
     job = read(table)
+    find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
     remember(job.line, job.reel)
 
@@ -319,7 +360,9 @@ def lengthen(table):
 def stand_still(table):
     """The same for a state that no step has led to: the line at clock[NOW], and the force of its fairlead."""
     job = read(table)
+    find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
     state = job.new if job.counts[b.PARITY] else job.old
-    correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report)
+    pull = correct_force(job.line, job.sea, job.ends, state, job.velocity, job.reel, job.report)
+    note_pull(job.reel, job.clock[b.NOW], pull)
     remember(job.line, job.reel)

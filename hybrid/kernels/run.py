@@ -121,6 +121,7 @@ class Job(NamedTuple):
     itself: int = 0  # address of kernels.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     reel: int = 0  # address of kernels.payout.pay_out; 0: the length of the line stays
+    winch: int = 0  # of a run: address of kernels.payout.wind; 0: no winch holds a tension
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
 
@@ -240,14 +241,16 @@ def solve_job(plane, space, job):
     Returns as kernels.newton.solve.
     """
     task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
+    winch = 0
     if task.what == RUN:
+        winch = job.winch
         if job.books.counts[PARITY]:
             old, new, was, now = job.new, job.old, job.now, job.was
         dt = clock[TRY_END] - clock[NOW]
         task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
     return solve(
         plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
-        job.contact_table,
+        job.contact_table, winch, job.reel_table,
     )  # fmt: skip
 
 
@@ -283,9 +286,9 @@ def run(table):
             sea_at(clock[TRY_END], sea)
             if job.zones != 0:
                 call_zones(job.zones, job.zone_table)
+            clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
             if job.reel != 0:
                 call_reel(job.reel, job.reel_table)
-            clock[STEP_BEFORE] = clock[LAST_DT] if count[CONTROLLED] else clock[TRY_END] - clock[NOW]
             outcome, it, left, where = call_solver(job.solver, table)
             note_try(clock, count, report, outcome, it, left, where)
             count[PHASE] = JUDGE

@@ -38,7 +38,7 @@ from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.end_motion import sea_at, turn_by_vector
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.report import ASSEMBLED, REPORT_SIZE
+from hybrid.kernels.report import ASSEMBLED, LENGTH_OUT, PAYOUT_RATE, REPORT_SIZE
 from hybrid.kernels.rotations import (
     add,
     cross,
@@ -212,6 +212,11 @@ def sample_head(sea, books, x, dt, k, t, row):
         row[SAMPLE_REPORT + j] = report[0, j]
         if x < 1.0:  # what the assembly reports follows from forces; the rest may jump
             row[SAMPLE_REPORT + j] = parabola(x, k if j < ASSEMBLED else 0.0, report[2, j], report[1, j], report[0, j])
+    if x < 1.0 and report[0, LENGTH_OUT] > 0.0:
+        a, b = (report[1, LENGTH_OUT], 0.0, 0.0), (report[0, LENGTH_OUT], 0.0, 0.0)
+        ca, cb = (report[1, PAYOUT_RATE], 0.0, 0.0), (report[0, PAYOUT_RATE], 0.0, 0.0)
+        out, rate = hermite(x, dt, a, ca, b, cb)
+        row[SAMPLE_REPORT + LENGTH_OUT], row[SAMPLE_REPORT + PAYOUT_RATE] = out[0], rate[0]
     for j in range(WORKS):
         row[SAMPLE_WORK + j] = books.work[0, j]
         if x < 1.0:

@@ -9,7 +9,8 @@ from typing import NoReturn
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.payout import PER_LENGTH
+from hybrid.kernels import winch as w
+from hybrid.kernels.reel import PER_LENGTH
 from hybrid.kernels.state import Floats, Line
 from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
@@ -43,6 +44,7 @@ class PayoutPlan:
     cable: Material  # what is out and what is on the reel
     pieces: Floats  # (P, 1 + PER_LENGTH) as of kernels.payout.Reel
     from_outside: bool  # whether the length is set from Python
+    winch: Floats  # (WINCH,) as of kernels.winch, before its brake opens; of zeros where none holds a tension
 
     def count(self, length: float) -> int:
         """Material nodes of a line of that length, m, that has been paid out monotonically: the last cell is between
@@ -121,8 +123,19 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     cable = material(whole_scene(scene))
     if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-1]:
         _refuse("", "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
-    outside, s = payout.from_outside, np.array(nodes)
-    return PayoutPlan(law, s, length, longest, shortest, zones, cable, _pieces(cable), outside)
+    outside, s, winch = payout.from_outside, np.array(nodes), winch_of(payout, length)
+    winch[w.LEAST], winch[w.MOST] = shortest, longest
+    return PayoutPlan(law, s, length, longest, shortest, zones, cable, _pieces(cable), outside, winch)
+
+
+def winch_of(payout: Payout, length: float) -> Floats:
+    """Numbers of a winch that holds a tension (kernels.winch), at rest with a length, m, that is out."""
+    out, winch = np.zeros(w.WINCH), payout.winch
+    if winch is not None:
+        out[w.TENSION], out[w.BEGIN], out[w.RAMP] = winch.tension, winch.begin, winch.ramp
+        out[w.INERTIA], out[w.DAMPING], out[w.MAX_RATE] = winch.inertia, winch.damping, winch.max_rate or np.inf
+        out[w.LENGTH_NOW] = length
+    return out
 
 
 def _refuse(key: str, given: str, expected: str, fix: str) -> NoReturn:

@@ -13,11 +13,39 @@ from hybrid.scene.cable import Section
 RateRow = Annotated[tuple[NonNegative, Number], BeforeValidator(numbers(2)), Words("two numbers [t, rate]")]
 LengthRow = Annotated[tuple[NonNegative, Positive], BeforeValidator(numbers(2)), Words("two numbers [t, length]")]
 
+# What says how long the line is.
+SOURCES = ("rate", "rates", "lengths", "file", "winch")
+
+
+class Winch(Table):
+    """A winch that holds a tension: inertia times the rate of its rate is the pull of the line less that tension.
+
+    Its brake holds the length up to `begin`; from then on the tension goes, over `ramp`, from the pull of that moment
+    to `tension`.
+    """
+
+    tension: Positive = Field(description="tension that is held at the fairlead [N]")
+    inertia: Positive = Field(
+        description="inertia of the drum and its drive as a mass at the line: J / r^2, with the square of the gear "
+        "ratio for the motor [kg]"
+    )
+    damping: NonNegative = Field(default=0.0, description="force that the drive loses, per rate [N s/m]")
+    max_rate: Positive | None = Field(
+        default=None,
+        description="rate beyond which a brake acts: 1 % above it with half the tension, 2 % above it with one and a "
+        "half times the tension [m/s]; absent: none",
+    )
+    begin: NonNegative = Field(default=0.0, description="time up to which a brake holds the length [s]")
+    ramp: Positive = Field(
+        default=5.0, description="time over which the tension goes to what is held, from the pull at `begin` [s]"
+    )
+
 
 class Payout(Table):
     """Line is paid out at this end, or taken in: the length of `cable` is what is out at t = 0.
 
-    The rate is given, or rates or lengths over time, by rows or a file; with none of them it is set from Python.
+    The rate is given, or rates or lengths over time, by rows or a file, or follows from a winch that holds a tension;
+    with none of them it is set from Python.
     """
 
     rate: Number | None = Field(
@@ -45,6 +73,7 @@ class Payout(Table):
         min_length=1,
         description="CSV file with columns t,rate or t,length, as of `rates` and `lengths`; relative to the scene file",
     )
+    winch: Winch | None = Field(default=None, description="winch that holds a tension; it needs `longest`")
     reel: tuple[Section, ...] | None = Field(
         default=None,
         min_length=1,
@@ -59,7 +88,7 @@ class Payout(Table):
 
     @model_validator(mode="after")
     def _one_source(self) -> Payout:
-        given = [name for name in ("rate", "rates", "lengths", "file") if getattr(self, name) is not None]
+        given = [name for name in SOURCES if getattr(self, name) is not None]
         fix = f"keep {given[0]}, or leave it out" if given else ""
         refuse(Finding((name,), f"nothing, because {given[0]} already gives the length", fix) for name in given[1:])
         if self.rate is not None:
@@ -73,6 +102,9 @@ class Payout(Table):
             words = [("ramp", self.ramp), ("until", self.until), ("begin", self.begin or None)]
             fix = "give rate, or leave it out"
             refuse(Finding((name,), "nothing, because it is for rate", fix) for name, x in words if x is not None)
+        if self.winch is not None and self.longest is None:
+            expected = "the longest length that may be out, in m, because the winch pays out as much as it must"
+            refuse([Finding(("longest",), expected, "add `longest: ...` (m)")])
         for name in ("rates", "lengths"):
             self._rows_increase(name)
         return self
@@ -80,7 +112,7 @@ class Payout(Table):
     @property
     def from_outside(self) -> bool:
         """Whether the length is set from Python."""
-        return all(getattr(self, name) is None for name in ("rate", "rates", "lengths", "file"))
+        return all(getattr(self, name) is None for name in SOURCES)
 
     def _rows_increase(self, name: str) -> None:
         rows = getattr(self, name) or ()

@@ -29,6 +29,10 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
         detail = _slack_detail(run, tried, dt)
         if run.switching is not None:
             detail += "; model.force_catenary keeps it from becoming a rod"
+    elif tried.outcome == Outcome.WINCH_AT_END:
+        assert run.payout is not None
+        least, most = run.payout.plan.shortest, run.payout.plan.longest
+        detail = f"{run.model.line.s[-1]:.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
     elif tried.outcome == Outcome.GAINS_ENERGY:
         detail = "the fastest point is at this place"
     elif tried.outcome == Outcome.TWISTED_TOO_FAR:

@@ -10,16 +10,19 @@ import numpy as np
 
 from hybrid.adapt.payout_cells import Flow, enter, lack_at, leave
 from hybrid.kernels import books as b
-from hybrid.kernels import payout as p
+from hybrid.kernels import reel as p
+from hybrid.kernels import winch as w
 from hybrid.kernels.binding import Table
 from hybrid.kernels.energies import observe
-from hybrid.kernels.payout import Reel, blank_reel, blank_reel_job, lengthen, pay_out, stand_still
+from hybrid.kernels.payout import lengthen, pay_out, stand_still, wind
+from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state import Batch, Ends, Floats, Line, State
 from hybrid.model.build import Model
 from hybrid.model.payout import PayoutPlan, length_at, payout_of
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
+from hybrid.scene.payout import SOURCES
 from hybrid.scene.schema import Scene
 from hybrid.solve.run import CompiledRun
 from hybrid.solve.stepper import Stepper
@@ -27,7 +30,7 @@ from hybrid.store.named_arrays import matched
 
 ROUND_OFF = 1e-9  # of a length
 # What a checkpoint keeps of a reel.
-KEPT = ("numbers", "lack", "rate", "since", "span")
+KEPT = ("numbers", "lack", "rate", "since", "span", "winch")
 
 
 class PayingOut:
@@ -36,7 +39,7 @@ class PayingOut:
     def __init__(self, model: Model) -> None:
         assert model.payout is not None
         self.plan: PayoutPlan = model.payout
-        self.law = self.plan.law.copy()
+        self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out
         self.reel = self._blank(self.count)
         self.table = Table(blank_reel_job())
@@ -44,7 +47,7 @@ class PayingOut:
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(count, self.law, plan.pieces)
+        reel = blank_reel(count, self.law, plan.pieces, self.winch)
         place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
         numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
@@ -65,9 +68,15 @@ class PayingOut:
         self.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
             clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
-            report=stepper.work.report, reel=self.reel,
+            report=stepper.work.report, reel=self.reel, X=stepper.work.X,
         )  # fmt: skip
-        run.pay_out(self.table, pay_out.address(self.table.numbers))
+        numbers = self.table.numbers
+        run.pay_out(self.table, pay_out.address(numbers), wind.address(numbers) if self.holds_tension else 0)
+
+    @property
+    def holds_tension(self) -> bool:
+        """Whether a winch holds a tension."""
+        return bool(self.winch[w.TENSION])
 
     def stand_still(self) -> None:
         """The line as it is now, and the force of its fairlead in the report of a state that no step has led to."""
@@ -84,6 +93,12 @@ class PayingOut:
     def due(self) -> bool:
         """Whether a node is to enter or to leave."""
         return bool(self.reel.numbers[p.DUE])
+
+    @property
+    def at_its_end(self) -> bool:
+        """Whether a winch that holds a tension has no more line to pay out, or none to take in."""
+        winch = self.winch
+        return self.holds_tension and not winch[w.LEAST] <= winch[w.LENGTH_NOW] <= winch[w.MOST]
 
     def change(self, run: CompiledRun, model: Model) -> tuple[Model, State, float]:
         """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in."""
@@ -112,6 +127,9 @@ class PayingOut:
         am, af = (2.0 * rho - 1.0) / (rho + 1.0), rho / (rho + 1.0)
         _, rate, acceleration = length_at(self.law, t)
         later = length_at(self.law, t + (am - af) * dt)[1:]
+        if self.holds_tension:
+            _, rate, acceleration, then = self.winch[w.LENGTH_NOW : w.ALGORITHMIC_NOW + 1].tolist()
+            later = rate + (am - af) * dt * acceleration, then
         cell = self.plan.cell(self.count - 1)
         return Flow(t, dt, rate, acceleration, (later[0], later[1]), cell, run.books.tension[0].copy())
 
@@ -119,7 +137,7 @@ class PayingOut:
         """The outputs of a batch one by one, each of a line as long as it was then."""
         for k in range(batch.t.size):
             t = float(batch.t[k])
-            if t >= self.law[0, 0]:  # exactly, where samples interpolate
+            if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
                 batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
             length = float(batch.report[k, LENGTH_OUT])
             line = self.plan.line(self.count, length, model.line)
@@ -148,7 +166,7 @@ class PayingOut:
             raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")
         self.count, self.law = count, law
         self.reel = self._blank(count)
-        kept = matched(given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
+        kept = matched({"winch": self.winch} | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
         if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
             raise ValueError("a length that no line has")
         for name, x in kept.items():
@@ -198,7 +216,7 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
     if payout is None or paying is None:
         raise ValueError("the scene has no ends.end.payout: the length of its line stays")
     if not payout.from_outside:
-        raise ValueError("ends.end.payout gives the length: leave rate, rates, lengths and file out to set it")
+        raise ValueError(f"ends.end.payout gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):
         if isinstance(x, bool) or not isinstance(x, int | float | np.integer | np.floating) or not np.isfinite(x):
             raise ValueError(f"{name}: expected a finite number, found {x!r:.60}")

@@ -333,6 +333,8 @@ class Transient:
         """A step is accepted: what zones put in is booked, and what is to change decided."""
         run = self.run
         flags, end, dt = int(run.count[b.FLAGS]), self.t, float(run.clock[b.LAST_DT])
+        if self.payout is not None and self.payout.at_its_end:
+            raise StepFailed(Tried(Outcome.WINCH_AT_END, 0, 0.0, self.model.cells), dt)
         if flags & b.UNKNOWN_ERROR:
             note_unknown_error(self)
         if flags & b.STEPS_CUT:

@@ -86,6 +86,7 @@ PAYOUTS = {
     "rate": "rate: 0.5, begin: 1.0, ramp: 2.0, until: 8.0, longest: 60.0, reel: [{length: 30.0, mass: 2.0}]",
     "rates": "rates: [[0.0, 0.0], [5.0, 1.0], [9.0, -0.5]]",
     "lengths": "lengths: [[0.0, 40.0], [5.0, 44.0], [9.0, 41.0]]",
+    "winch": "longest: 60.0, winch: {tension: 390.0, inertia: 50.0, damping: 5.0, max_rate: 2.0, begin: 1.0, ramp: 2.0}",
 }
 TEXTS = (
     {name: WOUND.replace("PAYOUT", payout) for name, payout in PAYOUTS.items()}

@@ -1,0 +1,98 @@
+"""What a line that is paid out knows beside its arrays: its reel, and the table of the kernels that change its length.
+
+symbol  meaning                                                    unit
+L       unstretched length that is out                             m
+c       its rate, positive where line is paid out                  m/s
+p       arc length of the last material node                       m
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, WORKS
+from hybrid.kernels.references import reader
+from hybrid.kernels.report import REPORT_SIZE
+from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+from hybrid.kernels.winch import WINCH
+
+# What a piece of the material has per length; of stiffness one over it.
+(
+    MASS, WEIGHT, DAMP, STRETCH, TAU, DRAG_N, DRAG_T, ADDED_N, ADDED_T, BUOY, DISPLACED, DIAMETER, ROTARY, POLAR,
+    BEND_1, BEND_2, TWIST, KAPPA_1, KAPPA_2, KAPPA_3,
+) = range(20)  # fmt: skip
+PER_LENGTH = 20
+END = 1  # place among powers and work
+# Numbers of a reel.
+(
+    LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
+    PLACE,  # p
+    LONGEST, SHORTEST,  # m, the last cell: beyond the first a node enters, below the second one leaves
+    FADING,  # s, until when lengths of cells are on their way to true ones
+    DUE,  # 1 when a node is to enter or to leave
+    FLUX,  # W, into the line by what the corrected force of the fairlead does not do
+    FLUX_BEFORE,  # and before the last step
+) = range(10)  # fmt: skip
+NUMBERS = 10
+
+
+class Reel(NamedTuple):
+    """What a line that is paid out knows beside its arrays; N cells."""
+
+    numbers: Floats  # (NUMBERS,)
+    law: Floats  # (K, 8) s, from which on a row holds; coefficients of L in the time since then, highest power first
+    pieces: Floats  # (P, 1 + PER_LENGTH) m, where a piece of the material begins; what it has per length
+    rest: Floats  # (1 + PER_LENGTH,) what the cell before the last brings to the node between; its length, as hn
+    true: Floats  # (N,) m, lengths of cells
+    lack: Floats  # (N,) m, that cells lacked when they were made
+    rate: Floats  # (N,) m/s, its rate then
+    since: Floats  # (N,) s, when that was
+    span: Floats  # (N,) s, over which they get it
+    before: Floats  # (N+3, 3) before the last step: lengths; stiffness of the last element; mass, weight of the last two nodes
+    report: Floats  # (REPORT_SIZE,) this and the next: work arrays
+    amount: Floats  # (PER_LENGTH,)
+    winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.winch)
+
+
+def blank_reel(
+    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None
+) -> Reel:
+    """A reel of a line of so many cells."""
+    z = np.zeros
+    return Reel(
+        z(NUMBERS), z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
+        z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 3, 3)),
+        z(REPORT_SIZE), z(PER_LENGTH), z(WINCH) if winch is None else winch,
+    )  # fmt: skip
+
+
+class ReelJob(NamedTuple):
+    """Arguments of the entries: two states in turn as kernels.run has them, and its clock, counts, work and report."""
+
+    line: Line
+    sea: Sea
+    ends: Ends
+    old: State
+    new: State
+    clock: Floats
+    counts: NDArray[np.int64]
+    work: Floats  # (2, WORKS)
+    velocity: Floats  # (2, 3) m/s, of the ends
+    report: Floats  # (REPORT_SIZE,) of the step
+    reel: Reel
+    X: Floats  # of the line's kernels.state.Work
+
+
+def blank_reel_job() -> ReelJob:
+    """A job with the types that every one has."""
+    state, z = blank_state(1), np.zeros
+    return ReelJob(
+        blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
+        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0),
+    )  # fmt: skip
+
+
+read = reader(blank_reel_job())
