@@ -41,6 +41,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "model": _model(plan),
         "dimension": "2: all of the scene lies in a plane" if plane else "3",
         "mesh": _mesh(plan),
+        "payout": _payout(plan),
         "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
         "hockling": _hockling(plan),
         "time": _time(scene, plan),
@@ -78,6 +79,20 @@ def _mesh(plan: Plan) -> str:
     if plan.base_cells is not None:
         return f"{plan.base_cells} cells as catenary, {cells} ({plan.unknowns} unknowns) if all is rod"
     return f"{_count(cells, 'cell')}, {plan.unknowns} unknowns"
+
+
+def _payout(plan: Plan) -> str:
+    """How long the line will be, its largest rate, and its cells then."""
+    paid = plan.payout
+    if paid is None:
+        return ""
+    cells = f"up to {paid.cells} cells"
+    if paid.by:
+        return f"{paid.by}: {paid.first:.6g} m at t = 0, up to {paid.longest:.6g} m; {cells}"
+    turns = [f"{x:.6g}" for x in (paid.first, paid.last)]
+    far = [x for x in (paid.shortest, paid.longest) if min(abs(x - paid.first), abs(x - paid.last)) > 1e-3]
+    way = f" through {' and '.join(f'{x:.6g}' for x in far)} m" if far else ""
+    return f"{turns[0]} to {turns[1]} m{way}, at most {paid.rate:.3g} m/s; {cells}"
 
 
 def _hockling(plan: Plan) -> str:

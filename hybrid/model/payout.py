@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import NoReturn
+from typing import NamedTuple, NoReturn
 
 import numpy as np
 
@@ -29,6 +30,19 @@ def payout_of(scene: Scene) -> Payout | None:
     """How a line is paid out at its end, if it is."""
     found: Payout | None = getattr(scene.ends.end, "payout", None)
     return found
+
+
+class PayoutForecast(NamedTuple):
+    """What will be out; NaN: that is not known before the run."""
+
+    by: str  # what gives the length; empty: the scene
+    first: float  # m, at t = 0
+    last: float  # m, at the end
+    shortest: float  # m, on the way; where it is not known, as much as there may be
+    longest: float  # m, likewise
+    rate: float  # m/s, the largest
+    cells: int  # of the longest
+    mean_cells: float
 
 
 @dataclass(frozen=True)
@@ -61,6 +75,20 @@ class PayoutPlan:
     def limits(self, count: int) -> tuple[float, float]:
         """Lengths, m, of the last cell of a line of `count` material nodes beyond which a node enters or leaves."""
         return self.cell(count - 1) + ENTERS * self.cell(count), LEAVES * self.cell(count - 1)
+
+    def forecast(self, duration: float) -> PayoutForecast:
+        """What will be out up to a time, s."""
+        winch = self.winch[w.TENSION] > 0.0
+        if self.from_outside or winch:
+            by = f"a winch holds {self.winch[w.TENSION]:.6g} N" if winch else "set from Python"
+            cells = self.count(self.longest)
+            return PayoutForecast(by, self.first, math.nan, self.shortest, self.longest, math.nan, cells, math.nan)
+        t = np.linspace(0.0, duration, 2001)
+        lengths = np.array([length_at(self.law, x)[:2] for x in t])
+        counts = np.searchsorted(self.nodes, lengths[:, 0])
+        last, rate = float(lengths[-1, 0]), float(np.abs(lengths[:, 1]).max())
+        low, high = _extremes(self.law, self.first, duration)
+        return PayoutForecast("", self.first, last, low, high, rate, self.count(high), float(counts.mean()))
 
     def line(self, count: int, length: float, like: Line) -> Line:
         """The line of `count` material nodes and a length, m; like: another one, with the same forces."""

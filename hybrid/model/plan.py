@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import warnings
 from dataclasses import dataclass, replace
-from math import ceil
+from math import ceil, isnan
 from typing import TYPE_CHECKING, NamedTuple, overload
 
 import numpy as np
@@ -15,6 +15,7 @@ from hybrid.model.contents import Entry
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
+from hybrid.model.payout import PayoutForecast
 from hybrid.model.resolution import first_resolution, model_is_free
 from hybrid.model.run_time import processor_time
 from hybrid.model.sections import limits_along, outer_diameter
@@ -52,6 +53,7 @@ class Plan:
     choice: tuple[tuple[str, float], ...] = ()
     # None: an end turns freely, nothing resists bending, or the shape under all loads is not known without a search
     critical_torque: CriticalTorque | None = None
+    payout: PayoutForecast | None = None  # of a line that is paid out; `cells` are those at t = 0
 
     @property
     def ledger(self) -> tuple[Entry, ...]:
@@ -171,10 +173,15 @@ def _plan(scene: Scene) -> Plan:
     names = {"catenary": "corrected"} if model.corrected else {}
     zones = tuple(replace(z, kind=names.get(z.kind, z.kind)) for z in model.zones)
     outputs = scene.time.duration / output_interval(scene) if scene.time else 0.0
-    seconds = processor_time(scene, model, cells, steps, outputs)
+    paid = model.payout.forecast(scene.time.duration) if model.payout is not None and scene.time else None
+    if paid is not None and not isnan(paid.mean_cells):
+        mean = (*cells[:-1], max(cells[-1] + round(paid.mean_cells) - sum(cells), 1))
+    else:
+        mean = cells
+    seconds = processor_time(scene, model, mean, steps, outputs)
     return Plan(
         model.contents, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
-        seconds, critical_torque=_critical_torque(scene, model),
+        seconds, critical_torque=_critical_torque(scene, model), payout=paid,
     )  # fmt: skip
 
 

@@ -49,13 +49,15 @@ class Payout(Table):
     """
 
     rate: Number | None = Field(
-        default=None, description="rate at which line is paid out; negative: it is taken in [m/s]"
+        default=None, description="rate (speed, velocity) at which line is paid out; negative: it is taken in [m/s]"
     )
-    begin: NonNegative = Field(default=0.0, description="time at which the rate begins to grow [s]")
+    begin: NonNegative = Field(default=0.0, description="time at which the rate begins to grow (start) [s]")
     ramp: Positive | None = Field(
         default=None, description="time over which the rate grows from zero, and ends after `until`, smoothly [s]"
     )
-    until: Positive | None = Field(default=None, description="time at which the rate begins to end; absent: never [s]")
+    until: Positive | None = Field(
+        default=None, description="time at which the rate begins to end (stop, end); absent: never [s]"
+    )
     rates: tuple[RateRow, ...] | None = Field(
         default=None,
         min_length=2,

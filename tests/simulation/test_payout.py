@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hybrid
+from hybrid.cli.plan_tables import plan_lines
 from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
 from hybrid.scene.payout import Payout
@@ -346,3 +347,32 @@ def test_rates_and_lengths_from_a_file(tmp_path: Path) -> None:
     ):
         table.write_text(text)
         assert "payout.file" in refused(hanging({"file": str(table)}, 10.0))
+
+
+# --- the plan ---------------------------------------------------------------------------------------
+
+
+def test_the_plan_says_how_long_the_line_will_be() -> None:
+    def said(payout: dict[str, Any]) -> str:
+        scene = hybrid.validate_scene(hanging(payout, 20.0))
+        found = [x for x in plan_lines(scene, hybrid.plan(scene)) if x.startswith("payout")]
+        return found[0].split(maxsplit=1)[1]
+
+    assert said({"rate": 0.5, "begin": 2, "ramp": 4}) == "40 to 48 m, at most 0.5 m/s; up to 24 cells"
+    assert said({"lengths": [[0, 40], [8, 46], [20, 40]]}).startswith("40 to 40 m through 46")
+    assert said({"longest": 60}) == "set from Python: 40 m at t = 0, up to 60 m; up to 30 cells"
+    winch = {"tension": 900.0, "inertia": 50}
+    assert said({"winch": winch, "longest": 60}).startswith("a winch holds 900 N: 40 m at t = 0, up to 60 m")
+    plain = hanging({}, 20.0)
+    del plain["ends"]["end"]["payout"]
+    assert hybrid.plan(plain).payout is None
+    more, less = (hybrid.plan(hanging({"rate": x, "ramp": 4}, 100.0)).seconds for x in (2.0, 0.0))
+    assert more > 2.0 * less
+
+
+@pytest.mark.parametrize(
+    ("key", "meant"), [("speed", "rate"), ("velocity", "rate"), ("start", "begin"), ("stop", "until")]
+)
+def test_another_word_for_a_key_of_payout_is_understood(key: str, meant: str) -> None:
+    text = refused(hanging({key: 1.0}, 5.0))
+    assert f"did you mean {meant}" in text
