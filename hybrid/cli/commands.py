@@ -41,7 +41,7 @@ from hybrid.cli.app import (
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
 from hybrid.cli.plan_tables import contents_table, plan_lines
-from hybrid.cli.system_commands import plan_of_lines, run_lines, static_lines
+from hybrid.cli.system_commands import plan_of_lines, resume_lines, run_lines, static_lines
 from hybrid.cli.system_stiffness import refuse_for_a_cable, show_holding
 from hybrid.cli.tables import (
     equilibrium_facts,
@@ -99,10 +99,14 @@ def resume(
 ) -> None:  # fmt: skip
     """Go on with a run that was stopped, beyond its end, or with other loads."""
     with session(as_json, quiet) as console:
-        from hybrid.simulation.restart import remaining_run
+        from hybrid.simulation.restart import remaining_run, remaining_system
 
         console.source = str(result)
         target, changed = console.will_write(output or result), settings or []
+        system = remaining_system(result.resolve(), until, changed, start)
+        if system is not None:
+            resume_lines(console, system, result, target, plot, until=until, settings=changed, start=start)
+            return
         picture = picture_beside(target, plot)
         left = remaining_run(result.resolve(), until, changed, start)
         cold = console.compiling(left.scene)

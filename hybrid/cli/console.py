@@ -186,9 +186,9 @@ class Console:
         t, text = None, self.left or "nothing was written"
         if self.written:
             with hybrid.open(self.written) as result:
-                t, several = float(result.times[-1]) if len(result.times) else None, bool(result.lines)
+                t = float(result.times[-1]) if len(result.times) else None
             text = f"{self.written} " + ("holds no output yet" if t is None else f"is complete up to t = {t:.6g} s")
-            if t is not None and not several:
+            if t is not None:
                 text += f"; `hybrid resume {self.written}` goes on"
         self.json("done", file=self.written, status="interrupted", t=t)
         self._err.print(f"interrupted; {text}", style="yellow", soft_wrap=True)

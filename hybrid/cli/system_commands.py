@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time as clock
+from collections.abc import Callable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -23,13 +24,23 @@ KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outp
 
 def run_lines(console: Console, asked: System, target: Path, plot: bool, keep: bool) -> None:
     """Compute the motion of several lines."""
+    console.will_write(target)
+    _moved(console, asked, target, plot, partial(hybrid.run, asked, target, overwrite=not keep))
+
+
+def resume_lines(console: Console, asked: System, source: Path, target: Path, plot: bool, **more: Any) -> None:
+    """Go on with the motion of several lines; more: as of `hybrid.resume`."""
+    _moved(console, asked, target, plot, partial(hybrid.resume, source, target, **more))
+
+
+def _moved(console: Console, asked: System, target: Path, plot: bool, compute: Callable[..., Result]) -> None:
+    """Compute a motion, and print what it has reached."""
     from hybrid.cli.progress_line import span
 
-    console.will_write(target)
     console.compiling_kernels(KERNELS)
     begin = clock.perf_counter()
     with console.progress() as tell:
-        result = hybrid.run(asked, target, progress=tell, overwrite=not keep)
+        result = compute(progress=tell)
     wall = clock.perf_counter() - begin
     steps = len(result.lines[next(iter(result.lines))]["steps/t"])
     text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time; error not estimated"

@@ -73,7 +73,7 @@ def parts(length: float, step: float) -> int:
     return max(1, ceil(min(length / step, 1e18) * (1.0 - 1e-12) - 1e-9))
 
 
-def output_interval(scene: Scene) -> float:
+def output_interval(scene: Scene | System) -> float:
     """Time between two outputs, s; a scene that does not say how often gets OUTPUTS, or one a step."""
     time = scene.require_time()
     return scene.output.every or max(time.duration / OUTPUTS, time.step or 0.0)

@@ -43,7 +43,7 @@ from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.model_choice import choose_model, rods_instead, surveyed
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
 from hybrid.simulation.refinement import Free
-from hybrid.simulation.restart import RemainingRun, remaining_run
+from hybrid.simulation.restart import RemainingRun, remaining_run, remaining_system
 from hybrid.simulation.restore import refused
 from hybrid.simulation.run_sample import RunSample
 from hybrid.simulation.static_case import StaticCase
@@ -163,6 +163,12 @@ def resume(
     if target != path:
         check_target(target, True)
     with locked(path), locked(target if target != path else None):
+        system = remaining_system(path, until, settings, start)
+        if system is not None:
+            if criterion is not None:
+                raise TypeError("a criterion is for zones that move: several lines have none")
+            _move_lines(system, target, progress, path)
+            return open_result(target)
         remaining = remaining_run(path, until, settings, start)
         if remaining.anew and target == path:
             why = "a change before the checkpoint computes the run anew"
@@ -177,17 +183,26 @@ def _several_lines(
     system: System, output: str | Path | None, overwrite: bool, progress: bool | Listener | None
 ) -> Result:
     """The motion of several lines, or, with progress None, their equilibrium."""
-    from hybrid.simulation.system_run import run_system, static_system
+    from hybrid.simulation.system_run import static_system
 
     target = _target(output, overwrite)
-    duration = system.require_time().duration if progress is not None else 1.0
     with locked(_path(output)):
         if progress is None:
             static_system(system, target, scene_text(system))
         else:
-            with _interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
-                run_system(system, target, scene_text(system), reporter, stopped)
+            _move_lines(system, target, progress)
     return open_result(target)
+
+
+def _move_lines(
+    system: System, target: Path | io.BytesIO, progress: bool | Listener, source: Path | None = None
+) -> None:
+    """Compute the motion of several lines; source: the result to go on with."""
+    from hybrid.simulation.system_run import run_system
+
+    duration = system.require_time().duration
+    with _interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
+        run_system(system, target, scene_text(system), reporter, stopped, source)
 
 
 def _compute(

@@ -19,8 +19,9 @@ from hybrid.model.payout import longest_out, payout_of
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.scene.motion_checks import check_motions
-from hybrid.scene.read import parse_scene, scene_text
+from hybrid.scene.read import parse_either, parse_scene, scene_text
 from hybrid.scene.schema import Scene
+from hybrid.scene.system import System
 from hybrid.simulation.restore import refused, resolution_from, restored_points
 from hybrid.store.checkpoint import Checkpoint, read_before, read_checkpoint
 from hybrid.store.hdf5_file import opened
@@ -94,6 +95,39 @@ def remaining_run(
         changes, anew = (*changes, LoadChange(begin, changed)), begin < point.t
     reached, kept = (0.0, None) if anew else (point.t, points)
     return RemainingRun(scene, changes, resolution, {}, anew, reached, kept)
+
+
+def remaining_system(
+    path: Path, until: float | None = None, settings: Sequence[str] = (), start: float | None = None
+) -> System | None:
+    """The scene of a result of several lines, if it is to go on until then; None: it is of one cable.
+
+    ResultError: nothing is left to do; SceneError: what is asked cannot be.
+    """
+    with open_result(path) as result:
+        if not result.lines:
+            return None
+        found, _ = parse_either(result.scene_text)
+        if isinstance(found, Scene):
+            return None
+        status, reached = result.status, float(result.times[-1]) if len(result.times) else 0.0
+    if settings or start is not None:
+        given = ", ".join(settings) or f"from {start:g} s"
+        expected = "nothing to change, because the result is of several lines: they go on with the loads they have"
+        raise _refused("settings", given, expected, "run the changed scene from its start")
+    if until is None:
+        if status == "complete":
+            fix = "--until T goes on beyond its end"
+            raise ResultError(f"{path} is complete: there is nothing left to do\n    try:      {fix}")
+        return found
+    if not (until >= reached and math.isfinite(until)):
+        fix = "the file holds everything before: hybrid.open(path).lines[name].at(t=...)"
+        raise _refused("until", f"{until:g} s", f"a time after {reached:g} s, up to which it is computed", fix)
+    data = found.model_dump(mode="json", exclude_none=True)
+    data["time"]["duration"] = until
+    data.setdefault("output", {})["every"] = output_interval(found)
+    longer, _ = parse_either(scene_text(type(found).model_validate(data)))
+    return None if isinstance(longer, Scene) else longer
 
 
 def changes_text(changes: Sequence[LoadChange]) -> str:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.books import LOG, Books
+from hybrid.kernels.books import LOG, STORED, Books
 from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
@@ -19,7 +20,7 @@ from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.diagnostics import Diagnostics, stretch_text
+from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.result_file import result_recorder
@@ -30,17 +31,23 @@ from hybrid.store.writer import Recorder
 
 # Outputs of a line that wait for one another: quantities of all of them are computed together.
 WAITING = 64
+# Of the length: ends that are so near to where they were have not been moved.
+SAME_PLACE = 1e-9
 
 
 class LineResult:
     """What is recorded of one line."""
 
     def __init__(
-        self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium, outputs: int
-    ) -> None:
-        """number: of the line in its system; outputs: after the first, 0 of an equilibrium."""
+        self, number: int, name: str, scene: Scene, model: Model, found: SystemEquilibrium | None, state: State,
+        outputs: int,
+    ) -> None:  # fmt: skip
+        """number: of the line in its system; found: the equilibrium that it starts from, None: it goes on; state: from
+
+        which displacements count; outputs: after the first, 0 of an equilibrium.
+        """
         self.number, self.name, self.model, self.scene = number, name, model, scene
-        self.events, self.target = EventLog(), io.BytesIO()
+        self.events = EventLog()
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
         s, jumps = output_points(scene)
@@ -51,12 +58,13 @@ class LineResult:
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
         self.recorder: Recorder = result_recorder(
-            scene, model, self.observer, self.target, {"scene": scene_text(scene)}, found, self.envelope, outputs
+            scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
-        self.books = self._own_books(found.state.lines[number])
+        self.books = self._own_books(state)
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
-        self.diagnostics.begin()
+        if found is not None:
+            self.diagnostics.begin()
 
     def _own_books(self, state: State) -> Books:
         """Books that keep the extremes of all steps; displacements count from a state."""
@@ -129,14 +137,47 @@ class LineResult:
             detail = stretch_text(self.model, state) if stretched else ""
             raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
 
-    # --- the end ------------------------------------------------------------------------------------
+    # --- the file -----------------------------------------------------------------------------------
+
+    def take_events(self) -> list[tuple[float, float, float, str, str]]:
+        """Record the events since the last call; they are returned: t, s_a, s_b, kind, text."""
+        noted = self.events.waiting()
+        self.events.write_to(self.recorder)
+        return noted
+
+    def write_envelope(self, t: float) -> None:
+        """Extremes up to t (s), for the file."""
+        self.recorder.replace(self.envelope.values(self.model.line.s, self.books.extremes, t))
 
     def close(self, t: float, status: str, message: str) -> list[tuple[float, float, float, str, str]]:
-        """Write the envelope up to t (s) and close; events (t, s_a, s_b, kind, text) of the line."""
+        """Record the envelope up to t (s) and the status; events as of `take_events`."""
         values = self.envelope.values(self.model.line.s, self.books.extremes, t)
         self.recorder.replace(values)
         self.envelope.note_broken(values, self.events.event)
-        noted = self.events.waiting()
-        self.events.write_to(self.recorder)
+        noted = self.take_events()
         self.recorder.close(status, message)
         return noted
+
+    def checkpoint(self, work: Work) -> dict[str, Any]:
+        """What the rest of the run depends on beside the state, between two steps, with no output waiting."""
+        books, noted = self.books, {name: getattr(self.diagnostics, name) for name in REMEMBERED}
+        return {
+            "work": books.work[0].copy(), "power": books.power[0].copy(), "stored": float(books.clock[STORED]),
+            "report": work.report.copy(), "envelope": self.envelope.checkpoint(books.extremes), "noted": noted,
+            "ends": self.model.ends.checkpoint(), "first_energy": self.observer.first_energy or 0.0,
+        }  # fmt: skip
+
+    def restore(self, saved: Mapping[str, Any], work: Work, t: float, joints: Sequence[int]) -> None:
+        """Go on at t (s) as `checkpoint` has written; joints: as of `JoinedLine`.  ValueError: that cannot be."""
+        books, model = self.books, self.model
+        books.work[0], books.power[0], books.clock[STORED] = saved["work"], saved["power"], saved["stored"]
+        work.report[:] = saved["report"]
+        self.envelope.restore(saved["envelope"], books.extremes)
+        books.start[:] = self.envelope.start_of(model.line.s)
+        vars(self.diagnostics).update(saved["noted"])
+        self.observer.first_energy = saved["first_energy"]
+        model.ends.restore(saved["ends"], t)
+        apart = np.abs(saved["ends"]["position"] - model.ends.values.position).max(axis=1)
+        for k in (0, 1):
+            if joints[k] < 0 and apart[k] > SAME_PLACE * model.length:
+                raise ValueError(f"an end of line {self.name} is {apart[k]:.3g} m from where it was: other files?")

@@ -4,28 +4,32 @@ from __future__ import annotations
 
 import io
 import time as clock
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
 
-from hybrid.errors import ComputationError, Outcome, ResultError
+from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, blank_state
 from hybrid.model.plan import output_times, parts
 from hybrid.model.resolution import first_resolution
-from hybrid.model.system import SystemModel, balanced_places, build_system
+from hybrid.model.system import build_system
 from hybrid.scene.system import System
 from hybrid.simulation.progress import RESULT, ProgressReporter
+from hybrid.simulation.restore import refused
+from hybrid.simulation.system_checkpoint import check_files, content, files_of, other_program, restore
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import fields_of, values_of
-from hybrid.simulation.time_loop import SAME_STOP, apart
-from hybrid.solve.system import JoinedLine, SystemSolver, SystemState, SystemTaken, joined_ends
-from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
-from hybrid.store.lines import write_lines
+from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
+from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
+from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
+from hybrid.solve.system_statics import LineFailed
+from hybrid.store.checkpoint import read_checkpoint
+from hybrid.store.hdf5_file import opened
 from hybrid.store.writer import Recorder
 
 # A step that fails is repeated in halves, down to this part of it.
@@ -34,77 +38,113 @@ SHORTEST = 2.0**-12
 LOOK = 16
 
 
-def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
-    """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
-    try:
-        numbers = model.body_numbers(t)
-        return solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
-    except LineFailed as failed:
-        raise named(failed, model) from None
-
-
-def _starts(system: System, model: SystemModel) -> Iterator[Start]:
-    """Shapes from which the equilibrium is looked for."""
-    yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
-    places = balanced_places(system, model)
-    if places is not None and (model.free or model.bodies):
-        models = build_system(system, *places).models
-        yield "lines hung between places that balance", SystemState([x.start for x in models], places[1])
-
-
-def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
-    """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
-    lines = []
-    for x, joints, fairleads in zip(model.models, model.joints, model.fairleads, strict=True):
-        floor = x.slack_floor if x.slack == "stop" else -np.inf
-        ends = joined_ends(x.ends.at(t), joints)
-        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads))
-    return lines
-
-
-def named(failed: LineFailed, model: SystemModel) -> ComputationError:
-    """The same with the name of the line in its detail."""
-    where = f"line {model.names[failed.line]}" if failed.line >= 0 else "the points"
-    detail = f"{where}; {failed.detail}" if failed.detail else where
-    return ComputationError(failed.outcome, failed.t, failed.s, detail)
-
-
 class SystemRun:
     """One system, computed into a file or into memory."""
 
-    def __init__(self, system: System, target: Path | io.BytesIO, text: str, moves: bool) -> None:
-        """text: the scene as YAML; moves: whether its motion is wanted, else its equilibrium under full loads."""
+    def __init__(
+        self, system: System, target: Path | io.BytesIO, text: str, moves: bool, kept: bool = False,
+        source: Path | None = None,
+    ) -> None:  # fmt: skip
+        """text: the scene as YAML; moves: whether its motion is wanted, else its equilibrium under full loads; kept:
+
+        whether a file gets checkpoints; source: the result to go on with, from its checkpoint, in place of a start.
+        """
         self.system, self.target, self.moves = system, target, moves
+        self.kept = kept and isinstance(target, Path)
         self.model = build_system(system)
         names = self.model.names
         self.scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in names]
         self.times = output_times(self.scenes[0]) if moves else []
-        self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
+        self.found = None
+        if source is None:
+            self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
+            self.state: SystemState = self.found.state.copy()
+        else:
+            blank = [blank_state(x.cells, len(x.line.torsion)) for x in self.model.models]
+            self.state = SystemState(blank, np.zeros_like(self.model.body_places))
         self.lines = [
-            LineResult(k, name, scene, model, self.found, len(self.times))
-            for k, (name, scene, model) in enumerate(zip(names, self.scenes, self.model.models, strict=True))
+            LineResult(k, name, scene, model, self.found, state, len(self.times))
+            for k, (name, scene, model, state) in enumerate(
+                zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
+            )
         ]
-        self.t, self.steps = 0.0, 0
-        self._dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.t, self.steps, self.last_step, self.cpu = 0.0, 0, 0.0, 0.0
+        self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
+        self.dry: set[str] = set()  # bodies that have been said to be out of the water
         self.loaded = 0.0  # s, loads that have stopped by then act no more
-        self.state: SystemState = self.found.state.copy()
-        self.recorder = self._points_recorder(text)
+        self._checked = -1  # steps at the last checkpoint
+        self._between = False  # whether the state is that between two steps
+        self._begin = clock.process_time()
+        if source is None:
+            self.recorder = self._new_recorder(text)
+        else:
+            self.recorder = self._go_on(source, text)
 
     # --- the file -----------------------------------------------------------------------------------
 
-    def _points_recorder(self, text: str) -> Recorder:
-        """The result of the points and bodies."""
+    @property
+    def _parts(self) -> dict[str, Recorder]:
+        return {line.name: line.recorder for line in self.lines}
+
+    def _new_recorder(self, text: str) -> Recorder:
+        """The result of the points and bodies, with those of the lines in it."""
+        assert self.found is not None
         attributes: dict[str, str | float | int] = {
             "title": self.system.title, "cells": self.model.cells, "lines": len(self.model.names),
             "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
             "static_residual": self.found.residual,
         }  # fmt: skip
-        target = io.BytesIO() if isinstance(self.target, io.BytesIO) else self.target
-        self._root = target
-        return Recorder(
-            target, grid_s=np.zeros(1), fields=fields_of(self.system), step_fields=(), attributes=attributes,
-            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, templates=cache_folder().parent,
+        recorder = Recorder(
+            self.target, grid_s=np.zeros(1), fields=fields_of(self.system), step_fields=(), attributes=attributes,
+            texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, before={} if self.kept else None,
+            templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
+        recorder.files = files_of(self.system)
+        return recorder
+
+    def _go_on(self, source: Path, text: str) -> Recorder:
+        """Be where the checkpoint of a result is, and write behind its rows; ResultError: that cannot be."""
+        assert isinstance(self.target, Path)
+        with opened(source) as file:
+            point = read_checkpoint(file)
+            check_files(self.system, point, source)
+            self._solver()
+            with refused(source):
+                restore(self, point.state)
+                near = SAME_STOP * (self.system.require_time().step or 1.0)
+                if not point.t - near <= self.t <= self.system.require_time().duration + near:
+                    raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
+            self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
+            self._other, self._between = self.state.copy(), True
+            fields = fields_of(self.system)
+            recorder = Recorder.again(file, self.target, fields, (), point, {"scene": text}, {}, (), self._parts)
+        recorder.files = files_of(self.system)
+        if why := other_program(point):
+            recorder.event(point.t, 0.0, 0.0, OTHER_PROGRAM, why)
+        self._begin, self._checked = clock.process_time() - self.cpu, self.steps
+        return recorder
+
+    def keep(self, last: bool = False) -> None:
+        """Keep a checkpoint where one is due, by the work done, and bring the file up to date; last: it is the end."""
+        due = self._checked < 0 or last or (self.steps - self._checked) * self.model.cells >= WORK
+        new = self.kept and self._between and due and self.steps != self._checked
+        if not (new or self.recorder.due):
+            return
+        for line in self.lines:
+            line.write_down()
+            line.write_envelope(self.t)
+        self._gather_events()
+        if new:
+            self.cpu, self._checked = clock.process_time() - self._begin, self.steps
+            self.recorder.checkpoint(lambda: content(self))
+        if not last:
+            self.recorder.flush()
+
+    def _gather_events(self) -> None:
+        """Record the events of the lines, in the result of the system with their names."""
+        for line in self.lines:
+            for t, s_a, s_b, kind, text in line.take_events():
+                self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
 
     def _output(self, solver: SystemSolver) -> None:
         """Record points, bodies and lines as they are."""
@@ -123,27 +163,24 @@ class SystemRun:
             given = self.system.free_bodies[body.name]
             centre = row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(given.centre_of_buoyancy)
             above = float(centre[2]) - fluid.surface
-            if given.volume and above > 0.0 and body.name not in self._dry:
-                self._dry.add(body.name)
+            if given.volume and above > 0.0 and body.name not in self.dry:
+                self.dry.add(body.name)
                 text = f"body {body.name}: the centre of its volume is {above:.4g} m above the surface, but all of its"
                 self.recorder.event(self.t, 0.0, 0.0, "body out of water", f"{text} buoyancy still lifts it")
 
     def _close(self, status: str, message: str) -> None:
-        """Close all, with the events of the lines in the result of the points too, and put the lines into its file."""
-        images = {}
+        """Close all, with the events of the lines in the result of the points too."""
+        self._gather_events()
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.close(self.t, status, message):
                 self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
-            images[line.name] = line.target.getvalue()
         self.recorder.close(status, message)
-        write_lines(self._root, images)
-        if isinstance(self.target, io.BytesIO) and isinstance(self._root, io.BytesIO):
-            self.target.write(self._root.getvalue())
 
     # --- what is computed ---------------------------------------------------------------------------
 
     def record_equilibrium(self) -> None:
         """Record the equilibrium that was found."""
+        assert self.found is not None
         try:
             solver = self.found.solver
             solver.keep_books([line.books for line in self.lines])
@@ -159,10 +196,12 @@ class SystemRun:
     def record_motion(self, reporter: ProgressReporter, interrupted: Callable[[], bool]) -> None:
         """Compute the motion and record it; KeyboardInterrupt after `interrupted`, with the file complete till then."""
         try:
-            self.begin_motion()
+            if self.found is not None:
+                self.begin_motion()
 
             def look() -> None:
                 reporter(self.t, self.steps, 0, self.model.models[0].zones)
+                self.keep()
                 if interrupted():
                     raise KeyboardInterrupt
 
@@ -176,12 +215,14 @@ class SystemRun:
             self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
 
+    def _solver(self) -> None:
+        self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
+        self.solver.keep_books([line.books for line in self.lines])
+
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
-        self._begin, self._last_step = clock.process_time(), 0.0
-        self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
-        self.solver.keep_books([line.books for line in self.lines])
+        self._solver()
         self._settle(self.solver)
         if self.system.environment.waves is not None:
             text = "waves act on lines and points, not on the body"
@@ -191,32 +232,44 @@ class SystemRun:
             line.note_equilibrium(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
-        self._other = self.state.copy()
+        self._gather_events()
+        self._other, self._between = self.state.copy(), True
+        self.keep()
 
     def stops(self) -> list[float]:
         """Times (s) at which a step ends: outputs, and where loads jump."""
         time = self.system.require_time()
         given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
         self._breaks = sorted({x for each in given for x in each if x < time.duration})
-        return apart([*self.times, *self._breaks], 0.0, time.step or time.duration)
+        return apart([*self.times, *self._breaks], self.t, time.step or time.duration)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
         """Steps to `stop` (s), equal ones, with what is due there; look: called every LOOK steps."""
         time = self.system.require_time()
         step = time.step or time.duration
-        span, first = stop - self.t, self.t
+        first, done = self.leg
+        span = stop - first
         count = parts(span, step)
-        for k in range(count):
+        for k in range(done, count):
+            self._between = False
             self._step(stop if k == count - 1 else first + (k + 1) * span / count, time.rho_inf)
+            self.leg = (first, k + 1) if k + 1 < count else (self.t, 0)
             if self.steps % LOOK == 0:
                 self._look(self.solver)
+            if k == count - 1:
+                self._arrive(stop, step)
+            self._between = True
+            if self.steps % LOOK == 0:
                 look()
+
+    def _arrive(self, stop: float, step: float) -> None:
+        """What is due at a stop (s): other loads, and an output."""
         if any(abs(x - stop) <= SAME_STOP * step for x in self._breaks):
             self.loaded = self.t
             for model in self.model.models:
                 model.ends.set_loads(self.t)
             self._settle(self.solver)
-            self._last_step = 0.0
+            self.last_step = 0.0
         if any(abs(x - stop) <= SAME_STOP * step for x in self.times):
             self._look(self.solver)
             self._output(self.solver)
@@ -229,6 +282,8 @@ class SystemRun:
             else:
                 with suppress(LineFailed):
                     line.write_down()
+        if status != "failed":
+            self.keep(last=True)
         self._close(status, message or f"{self.steps} steps")
 
     def failed(self, failed: LineFailed) -> ComputationError:
@@ -268,18 +323,18 @@ class SystemRun:
                 model.sea.at(t)
                 line.books.velocity[:] = model.ends.velocity
             self.model.load_bodies(t, solver.bodies, self.loaded)
-            taken = solver.step(self.state, self._other, t - self.t, rho, self._last_step, t)
+            taken = solver.step(self.state, self._other, t - self.t, rho, self.last_step, t)
             if taken.outcome != Outcome.OK:
                 dt, repeats = 0.5 * dt, repeats + 1
                 if dt < shortest:
                     raise self._stopped(solver, taken, 2.0 * dt)
                 continue
-            self._last_step = t - self.t
+            self.last_step = t - self.t
             self.t, self.state, self._other = t, self._other, self.state
             self.steps += 1
             cpu = clock.process_time() - self._begin
             for line, work in zip(self.lines, solver.work, strict=True):
-                line.log(t, self._last_step, taken, repeats, work, cpu)
+                line.log(t, self.last_step, taken, repeats, work, cpu)
             repeats = 0
 
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:
@@ -300,10 +355,11 @@ class SystemRun:
 
 
 def run_system(
-    system: System, target: Path | io.BytesIO, text: str, reporter: ProgressReporter, interrupted: Callable[[], bool]
-) -> None:
-    """Compute the motion of a system into a file or into memory."""
-    run = SystemRun(system, target, text, moves=True)
+    system: System, target: Path | io.BytesIO, text: str, reporter: ProgressReporter, interrupted: Callable[[], bool],
+    source: Path | None = None,
+) -> None:  # fmt: skip
+    """Compute the motion of a system into a file or into memory; source: the result to go on with."""
+    run = SystemRun(system, target, text, moves=True, kept=True, source=source)
     reporter.begin(RESULT, first_resolution(run.scenes[0]))
     run.record_motion(reporter, interrupted)
 

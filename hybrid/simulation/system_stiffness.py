@@ -19,7 +19,7 @@ from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
 from hybrid.scene.system import System
-from hybrid.simulation.system_run import equilibrium_of_system
+from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.system import SystemSolver, SystemState
 from hybrid.solve.system_statics import SystemEquilibrium
 

@@ -10,7 +10,7 @@ the checkpoint (store.copying), put in its place when it is whole.
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from importlib.metadata import version
 from pathlib import Path
 from typing import NamedTuple
@@ -19,8 +19,9 @@ import h5py
 import numpy as np
 
 from hybrid.errors import ResultError
-from hybrid.store.format import plain_text
+from hybrid.store.format import Field, check_column, plain_text
 from hybrid.store.integrity import stored
+from hybrid.store.lines import of_all
 from hybrid.store.named_arrays import DIGEST, Tree, matched, pack, unpack
 
 # What was found before the run (the error controller's runs), beside the two slots.
@@ -146,6 +147,28 @@ def _has_rows(file: h5py.File, point: Checkpoint) -> bool:
         if data.shape[0] < count:
             return False
     return True
+
+
+def check_tables(
+    source: h5py.File, groups: Mapping[str, h5py.Group], all_tables: Mapping[str, Mapping[str, Sequence[Field]]],
+    at: Checkpoint,
+) -> None:  # fmt: skip
+    """ResultError unless a file has these tables, and a checkpoint their rows; groups: "" and of lines."""
+    expected = {}
+    for part, tables in all_tables.items():
+        within = groups[part]
+        missing = [
+            f.name for group, each in tables.items() for f in each if f"{group}/{f.name}".lstrip("/") not in within
+        ]
+        if missing:
+            raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
+        for group, columns in tables.items():
+            for field in columns:
+                check_column(within, group, field)
+        expected[part] = {f"{group}/{columns[0].name}".lstrip("/"): 0 for group, columns in tables.items() if columns}
+    if list(at.rows) != list(of_all(expected)) or not at.rows["t"] or source["t"][at.rows["t"] - 1] != at.t:
+        advice = "its rows are not those of the file\n    try:      run its scene again"
+        raise ResultError(f"{source.filename} has a checkpoint that does not fit\n    detail:   {advice}")
 
 
 def digest_of(path: Path) -> str:

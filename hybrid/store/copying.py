@@ -20,10 +20,13 @@ from hybrid.store.integrity import check_stored
 _BLOCK = 1 << 22  # bytes that are copied at a time
 
 
-def copied(old: h5py.File, new: h5py.File, rows: Mapping[str, int] | None, without: Iterable[str] = ()) -> None:
-    """Copy a result to a new file; rows: of every table that are taken, by its scale (None: all that are complete)."""
+def copied(old: h5py.Group, new: h5py.Group, rows: Mapping[str, int] | None, without: Iterable[str] = ()) -> None:
+    """Copy a result to a new file; rows: of every table that are taken, by its scale (None: all that are complete).
+
+    old, new: files, or groups of them; without: datasets, or groups at the top.
+    """
     left = set(without)
-    whole = [(name, data) for name, data in _datasets(old) if name not in left]
+    whole = [(name, data) for name, data in _datasets(old) if not left & {name, name.split("/")[0]}]
     scales = [name for name, data in whole if data.attrs.get("CLASS") == b"DIMENSION_SCALE"]
     kept = {name: int(old[name].shape[0]) for name in scales} | dict(rows or {})
     _annotations(old, new)
@@ -38,21 +41,21 @@ def copied(old: h5py.File, new: h5py.File, rows: Mapping[str, int] | None, witho
                 new[name].dims[k].attach_scale(new[dim.label])
 
 
-def names_in(file: h5py.File, group: str) -> list[str]:
+def names_in(file: h5py.Group, group: str) -> list[str]:
     """Names of all datasets in a group."""
     return [name for name, _ in _datasets(file) if name.startswith(f"{group}/")]
 
 
-def _datasets(file: h5py.File) -> Iterator[tuple[str, h5py.Dataset]]:
+def _datasets(file: h5py.Group) -> Iterator[tuple[str, h5py.Dataset]]:
     found: list[tuple[str, h5py.Dataset]] = []
     file.visititems(lambda name, item: found.append((name, item)) if isinstance(item, h5py.Dataset) else None)
-    if file.swmr_mode:
+    if file.file.swmr_mode:
         for _, data in found:
             data.refresh()
     return iter(found)
 
 
-def _copied_dataset(data: h5py.Dataset, new: h5py.File, name: str, kept: Mapping[str, int]) -> None:
+def _copied_dataset(data: h5py.Dataset, new: h5py.Group, name: str, kept: Mapping[str, int]) -> None:
     first = data.dims[0].label if data.ndim else ""
     count = min(kept.get(first, data.shape[0]), data.shape[0]) if data.ndim else 0
     shape = (count, *data.shape[1:]) if data.ndim else ()

@@ -212,7 +212,7 @@ def annotate(data: h5py.Dataset | h5d.DatasetID, unit: str, description: str, fr
         h5a.create(to, name.encode(), kind, space).write(np.array(text, dtype=dtype))
 
 
-def check_column(file: h5py.File, group: str, field: Field) -> None:
+def check_column(file: h5py.Group, group: str, field: Field) -> None:
     """ResultError unless a dataset is one that `create_table` makes for the field, to which rows can be appended.
 
     HDF5 never comes back from closing a file in which it could not append.
@@ -228,8 +228,9 @@ def check_column(file: h5py.File, group: str, field: Field) -> None:
     else:
         return
     expected = f"{np.dtype(field.dtype)} of shape {('rows', *field.shape)}, that grows"
+    where = getattr(file, "filename", "") or file.file.filename
     raise ResultError(
-        f"{file.filename} cannot be resumed\n    given:    {name}: {found}\n    expected: {expected}\n"
+        f"{where} cannot be resumed\n    given:    {name}: {found}\n    expected: {expected}\n"
         "    try:      the file as hybrid wrote it, or run its scene again"
     )
 
@@ -281,7 +282,7 @@ def cut(text: str, width: int) -> bytes:
     return str(text).encode()[:width].decode("utf-8", "ignore").encode()
 
 
-def set_status(file: h5py.File, status: str, message: str) -> None:
+def set_status(file: h5py.Group, status: str, message: str) -> None:
     for name, text in (("status", status), ("message", message)):
         file.attrs.modify(name, fixed_text(text, file.attrs.get_id(name).dtype))
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-import io
 from collections.abc import Iterator, Mapping
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 import h5py
-
-from hybrid.store.amend import change_complete
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -17,17 +13,25 @@ if TYPE_CHECKING:
 GROUP = "lines"
 
 
-def write_lines(target: Path | io.BytesIO, images: Mapping[str, bytes]) -> None:
-    """Put results, each the bytes of a file, into a complete result; ResultError where it cannot be written."""
-    change_complete(target, lambda file: _add(file, images))
-
-
-def _add(file: h5py.File, images: Mapping[str, bytes]) -> None:
+def add_parts(file: h5py.File, parts: Mapping[str, h5py.File]) -> None:
+    """Put the results of lines, each a file in memory, into a new file of a system."""
     group = file.require_group(GROUP)
-    group.attrs["order"] = list(images)
-    for name, image in images.items():
-        with h5py.File.in_memory(image) as line:
-            line.copy(line["/"], group, name=name, expand_refs=True)
+    group.attrs["order"] = list(parts)
+    for name, part in parts.items():
+        part.copy("/", group, name=name, expand_refs=True)
+
+
+def of_part(name: str, counts: Mapping[str, int]) -> dict[str, int]:
+    """What a line is told of counts by name, where those of lines begin with where their results are."""
+    begin = f"{GROUP}/{name}/"
+    return {key.removeprefix(begin): count for key, count in counts.items() if key.startswith(begin)}
+
+
+def of_all(counts: Mapping[str, Mapping[str, int]]) -> dict[str, int]:
+    """Counts by name of a system (under the name "") and of its lines as one table."""
+    return {
+        f"{GROUP}/{name}/{key}" if name else key: count for name, each in counts.items() for key, count in each.items()
+    }
 
 
 class Lines(Mapping[str, "Result"]):

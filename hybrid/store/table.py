@@ -20,14 +20,22 @@ class Table:
     Rows wait as arrays until they are written through HDF5's own interface: h5py's slices take twice as long.
     """
 
-    def __init__(self, file: h5py.File, group: str, fields: Sequence[Field]) -> None:
-        names = [f"{group}/{field.name}".lstrip("/") for field in fields]
-        self.fields, self._datasets = tuple(fields), [h5d.open(file.id, name.encode()) for name in names]
+    def __init__(self, file: h5py.Group, group: str, fields: Sequence[Field]) -> None:
+        self.fields, self._names = tuple(fields), [f"{group}/{field.name}".lstrip("/") for field in fields]
+        self.move(file)
         self._types = [NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
-        self.scale = names[0] if names else ""  # the first dataset says how many rows are complete
+        self.scale = self._names[0] if fields else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
         self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
         self.count = 0  # written rows
+
+    def move(self, file: h5py.Group) -> None:
+        """Write to the datasets of the same names of another file, or of a group of it."""
+        self._datasets = [h5d.open(file.id, name.encode()) for name in self._names]
+
+    def drop(self) -> None:
+        """Forget the rows that wait."""
+        self._blocks, self.waiting, self.bytes_waiting = [], 0, 0
 
     def add(self, columns: Sequence[np.ndarray]) -> None:
         """Let rows wait: one array (n, ...) per field, which nobody changes any more."""
@@ -58,7 +66,7 @@ class Table:
             self._write_column(0)
             self._datasets[0].flush()
             self.count += self.waiting
-            self._blocks, self.waiting, self.bytes_waiting = [], 0, 0
+            self.drop()
 
     def _write_column(self, k: int) -> None:
         parts, data = [block[k] for block in self._blocks], self._datasets[k]

@@ -30,14 +30,14 @@ import numpy as np
 from h5py import h5d
 
 from hybrid.errors import OMITTED, ResultError
-from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, create_slots, write_before, write_slot
+from hybrid.store.checkpoint import BEFORE, SLOTS, Checkpoint, check_tables, create_slots, write_before, write_slot
 from hybrid.store.copying import copied, names_in
 from hybrid.store.format import (
     BLOCK,
     Field,
     add_fixed,
-    check_column,
     check_names,
+    plain_text,
     set_status,
     tables_of,
     unsound,
@@ -48,6 +48,7 @@ from hybrid.store.format import (
 )
 from hybrid.store.hdf5_file import check_target, created, drafted, give_up, in_memory, unwritable
 from hybrid.store.integrity import sign
+from hybrid.store.lines import GROUP, add_parts, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.table import Table
 from hybrid.store.template import template
@@ -75,6 +76,7 @@ class Recorder:
     overwrite: replace an existing result.  Another program's file is never replaced.
     before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
     templates: folder where templates of files are kept (store.template); None: in this process alone.
+    parts: results of lines, begun in memory, that are groups of this file from now on and are written with it.
     """
 
     def __init__(
@@ -91,6 +93,7 @@ class Recorder:
         overwrite: bool = False,
         before: Tree | None = None,
         templates: Path | None = None,
+        parts: Mapping[str, Recorder] | None = None,
     ) -> None:
         check_names(fields, step_fields, fixed)
         self._memory = target if isinstance(target, io.BytesIO) else None
@@ -104,35 +107,32 @@ class Recorder:
         write_texts(file, texts)
         write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
         write_before(file, before)
+        if parts:
+            add_parts(file, {name: part._file for name, part in parts.items()})
         if path is not None:
             file.flush()
             image = bytes(file.id.get_file_image())
             file.close()
             file = created(path, image)
         self._write_to(file, path, tables_of(fields, step_fields))
+        self._take(parts or {})
 
     @classmethod
     def again(
         cls, source: h5py.File, path: Path, fields: Sequence[Field], step_fields: Sequence[Field], at: Checkpoint,
         texts: Mapping[str, str], before: Tree, fixed: Sequence[tuple[Field, np.ndarray]] = (),
+        parts: Mapping[str, Recorder] | None = None,
     ) -> Recorder:  # fmt: skip
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
-        fixed: quantities that do not depend on time, with values for those that the file does not have.
+        fixed: quantities that do not depend on time, with values for those that the file does not have.  parts: results
+        of lines, begun in memory, which go on with the groups of the file that have their names.
         ResultError if the file holds other fields, or cannot be written.
         """
         self, tables = cls.__new__(cls), tables_of(fields, step_fields)
-        missing = [f.name for group, columns in tables.items() for f in columns if f"{group}/{f.name}" not in source]
-        if missing:
-            raise ResultError(f"the result has no {', '.join(missing)}: another program has written it")
-        for group, columns in tables.items():
-            for field in columns:
-                check_column(source, group, field)
-
-        scales = [f"{group}/{columns[0].name}".lstrip("/") for group, columns in tables.items()]
-        if list(at.rows) != scales or not at.rows["t"] or source["t"][at.rows["t"] - 1] != at.t:
-            advice = "its rows are not those of the file\n    try:      run its scene again"
-            raise ResultError(f"{source.filename} has a checkpoint that does not fit\n    detail:   {advice}")
+        groups = {"": source, **{name: source[f"{GROUP}/{name}"] for name in parts or {}}}
+        all_tables = {"": tables, **{name: part._tables for name, part in (parts or {}).items()}}
+        check_tables(source, groups, all_tables, at)
         ours = {f.name for f in fields}
         later = {x for x in names_in(source, "errors") if x not in ours} | {
             BEFORE,
@@ -141,26 +141,36 @@ class Recorder:
 
         def make(new: Path) -> None:
             with drafted(new) as file:
-                copied(source, file, at.rows, {*later, BEFORE, *SLOTS})
+                copied(source, file, at.rows, {*later, GROUP})
+                for group in tables:
+                    file.require_group(group)
                 add_fixed(file, fixed)
-                set_status(file, "running", "")
                 write_texts(file, texts)
                 create_slots(file)
                 write_before(file, before)
                 write_slot([file[name] for name in SLOTS], at.number, pack(at._asdict()))
-                for name in [x for x in file.attrs if x.startswith(AFTERWARDS)]:
-                    del file.attrs[name]
+                if parts:
+                    file.require_group(GROUP).attrs["order"] = list(parts)
+                for name in parts or {}:
+                    copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows))
+                for each in (file, *(file[f"{GROUP}/{name}"] for name in parts or {})):
+                    set_status(each, "running", "")
+                    for name in [x for x in each.attrs if x.startswith(AFTERWARDS)]:
+                        del each.attrs[name]
 
         self._memory = None
         self._write_to(created(path.expanduser().resolve(), make), path, tables)
-        for table, count in zip(self._all, at.rows.values(), strict=True):
-            table.count = count
-        self._happened.update(at.happened)
-        self._zones, self._number, self.last = list(at.zones), at.number + 1, float(self._file["t"][-1])
+        self._go_on(at.rows, at.happened)
+        self._zones, self._number = list(at.zones), at.number + 1
+        self._take(parts or {})
+        for name, part in self._parts.items():
+            part._go_on(of_part(name, at.rows), of_part(name, at.happened))
         return self
 
     def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
-        self._file, self.path = file, path
+        self._file: Any = file  # a group of the file of `_owner`, where this is a part of that
+        self.path, self._tables = path, tables
+        self._owner, self._parts = self, dict[str, Recorder]()
         self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
         self._outputs, self._steps, self._zone_rows, self._events = self._all
         self._slots = [file[name] for name in SLOTS if name in file]
@@ -178,6 +188,27 @@ class Recorder:
         self._packed = b""  # a checkpoint that waits
         self._flushed, self._took = -np.inf, 0.0  # when the file was last brought up to date, and how long it took, s
         self.closed = self._broken = False
+
+    def _go_on(self, rows: Mapping[str, int], happened: Mapping[str, int]) -> None:
+        """Behind rows that are there; happened: events by kind."""
+        for table in self._all:
+            table.drop()
+            table.count = rows[table.scale] if table.fields else 0
+        self._happened = Counter(happened)
+        self.last = float(self._file["t"][-1])
+        zones = self._file["zones"]
+        last = zones["output"][:] == zones["output"][-1] if rows["zones/t"] else np.zeros(0, bool)
+        kinds = [plain_text(x) for x in zones["kind"][:][last]]
+        self._zones = list(zip(kinds, zones["s_a"][:][last].tolist(), zones["s_b"][:][last].tolist(), strict=True))
+
+    def _take(self, parts: Mapping[str, Recorder]) -> None:
+        """Write results that were begun in memory into groups of this file."""
+        self._parts = dict(parts)
+        for name, part in parts.items():
+            part._file.close()
+            part._owner, part._memory, part._file = self, None, self._file[f"{GROUP}/{name}"]
+            for table in part._all:
+                table.move(part._file)
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
@@ -225,7 +256,7 @@ class Recorder:
     def due(self) -> bool:
         """Whether outputs have been held back long enough, or are many."""
         late = monotonic() - self._flushed > max(_PAUSE, _PART * self._took)
-        return late or self._outputs.bytes_waiting > _MOST_WAITING
+        return late or sum(x._outputs.bytes_waiting for x in (self, *self._parts.values())) > _MOST_WAITING
 
     def log(self, values: Mapping[str, float | int]) -> None:
         """Append a row to the log of the steps; errors as of `log_rows`."""
@@ -243,8 +274,8 @@ class Recorder:
             raise ResultError(f"'{name}' of the step log is not finite: {rows[i].tolist()}")
         self._steps.add(list(rows.T.copy()))
         if self._steps.waiting >= BLOCK:  # alone: outputs are written together with their checkpoint
-            with self._writing():
-                self._write([self._steps])
+            with self._owner._writing():
+                self._owner._write([self._steps])
 
     def event(
         self,
@@ -282,15 +313,20 @@ class Recorder:
     def checkpoint(self, content: Callable[[], Mapping[str, Any]]) -> None:
         """Keep a checkpoint at the last output, written with the next flush; content: makes `program`, `asks`,
         `resolution` and `state` of it."""
-        rows = {table.scale: table.count + table.waiting for table in self._all}
+        parts = {"": self, **self._parts}
+        rows = of_all(
+            {name: {x.scale: x.count + x.waiting for x in part._all if x.fields} for name, part in parts.items()}
+        )
+        happened = of_all({name: part._happened for name, part in parts.items()})
         here = {"number": self._number, "t": self.last, "files": self.files, "rows": rows}
-        self._packed = pack({**here, "happened": self._happened, "zones": self._zones or [], **content()})
+        self._packed = pack({**here, "happened": happened, "zones": self._zones or [], **content()})
 
     def flush(self) -> None:
         """Write what is held back, for readers to see."""
         begin = monotonic()
         with self._writing():
-            self._write([self._events, self._zone_rows, self._steps, self._outputs], self._packed)
+            parts = [*self._parts.values(), self]
+            self._write([x for part in parts for x in reversed(part._all)], self._packed)
             if self._packed and self.path is not None:
                 os.fsync(self._file.id.get_vfd_handle())  # a machine that goes down then loses no more than a kill does
         self._number += bool(self._packed)
@@ -313,33 +349,37 @@ class Recorder:
         waiting = [table for table in tables if table.waiting]
         for table in waiting:
             table.write()
-        for name, values in self._replaced.items():
-            if name not in self._fixed:
-                self._fixed[name] = h5d.open(self._file.id, name.encode())
-            write_all(self._fixed[name], values)
-        self._replaced.clear()
+        for part in (self, *self._parts.values()):
+            for name, values in part._replaced.items():
+                if name not in part._fixed:
+                    part._fixed[name] = h5d.open(part._file.id, name.encode())
+                write_all(part._fixed[name], values)
+            part._replaced.clear()
         if packed:
             write_slot(self._slots, self._number, packed)
         # HDF5 may write in any order between two flushes.  So: the data, then the scales that
-        # say it is there, and t last, which says that the zones of the output are there too.
+        # say it is there, and t last, which says that the zones of the output are there too; that of the parts before.
         self._file.flush()
-        others = [table for table in waiting if table is not self._outputs]
-        for table in others:
-            table.commit()
-        if others:
-            self._file.flush()
-        if self._outputs in waiting:
-            self._outputs.commit()
-            self._file.flush()
+        last = [part._outputs for part in self._parts.values()], [self._outputs]
+        first = [table for table in waiting if not any(table in x for x in last)]
+        for tables in (first, *([x for x in each if x in waiting] for each in last)):
+            for table in tables:
+                table.commit()
+            if tables:
+                self._file.flush()
 
     def close(self, status: str = "complete", message: str = "") -> None:
         """Write the status and close the file; a second call does nothing."""
-        if self.closed or self._broken:
+        if self.closed or self._owner._broken:
             return
         if status not in _STATUS:
             raise ValueError(f"status {status!r} is none of {', '.join(_STATUS)}")
         self.closed = True
         self._count_left_out()
+        if self._owner is not self:
+            with self._owner._writing():
+                set_status(self._file, status, message)
+            return
         self.flush()
         with self._writing():
             set_status(self._file, status, message)

@@ -128,7 +128,7 @@ def test_a_file_is_what_memory_is(tmp_path: Path, moved: hybrid.Result) -> None:
     assert hybrid.load_system(tmp_path / "again.yaml") == hybrid.System.model_validate(mooring())
     hybrid.export(written.lines["hose"], tmp_path / "hose.csv")
     assert (tmp_path / "hose.csv").stat().st_size > 5_000
-    with pytest.raises(ResultError, match="no checkpoint"):
+    with pytest.raises(ResultError, match="nothing left to do"):
         hybrid.resume(target)
 
 

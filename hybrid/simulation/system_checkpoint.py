@@ -1,0 +1,88 @@
+"""The checkpoint of several lines in motion: what the next steps depend on, and how they go on from it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.scene.bodies import FixedBody, FreeBody
+from hybrid.scene.system import System
+from hybrid.simulation.restore import program
+from hybrid.store.checkpoint import Checkpoint, digest_of
+from hybrid.store.named_arrays import matched
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+
+def checkpoint(run: SystemRun) -> dict[str, Any]:
+    """What the next steps depend on, between two steps, with no output waiting: named arrays and plain values."""
+    lines = {
+        line.name: line.checkpoint(work) | {"state": state._asdict()}
+        for line, work, state in zip(run.lines, run.solver.work, run.state.lines, strict=True)
+    }
+    return {
+        "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
+        "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
+        "lines": lines,
+    }  # fmt: skip
+
+
+def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
+    """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
+    template = checkpoint(run) | {"dry": None}
+    for line in template["lines"].values():
+        line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
+    found = matched(dict(saved), template)
+    if not (isinstance(found["dry"], list) and set(found["dry"]) <= set(run.system.bodies)):
+        raise ValueError("dry: names of bodies were expected")
+    if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
+        raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
+    run.t, run.steps, run.last_step, run.loaded = found["t"], found["steps"], found["last"], found["loaded"]
+    run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
+    run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]
+    for line, x, work, state in zip(run.lines, run.solver.lines, run.solver.work, run.state.lines, strict=True):
+        mine = found["lines"][line.name]
+        for name, values in mine["state"].items():
+            getattr(state, name)[:] = values
+        line.restore(mine, work, run.t, x.joints)
+
+
+def content(run: SystemRun) -> dict[str, Any]:
+    """What the writer keeps of a checkpoint."""
+    return {"program": program(), "asks": False, "resolution": {}, "state": checkpoint(run)}
+
+
+def files_of(system: System) -> dict[str, str]:
+    """Digests of the files that motions and loads are read from, by path."""
+    scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in system.lines]
+    found = {path for scene in scenes for path in scene.ends.files()}
+    for body in system.bodies.values():
+        if isinstance(body, FixedBody) and body.motion is not None:
+            vessel = body.motion.vessel
+            found |= {x for x in (body.motion.file, vessel.rao if vessel is not None else None) if x is not None}
+        elif isinstance(body, FreeBody):
+            found |= {given.load.file for given in body.end.loads if given.load.file is not None}
+    return {path: digest_of(Path(path)) for path in sorted(found)}
+
+
+def check_files(system: System, point: Checkpoint, source: Path) -> None:
+    """ResultError: files that a run reads have changed."""
+    now = files_of(system)
+    changed = [path for path, digest in point.files.items() if now.get(path) != digest]
+    if changed:
+        detail = f"{', '.join(changed)}: other than when the run began"
+        raise ResultError(f"{source} cannot go on\n    detail:   {detail}\n    try:      run its scene again")
+
+
+def other_program(point: Checkpoint) -> str:
+    """Text of the event of a run that another program has begun; empty if this one has."""
+    if point.program == program():
+        return ""
+    wrote, this = (x.split()[0] for x in (point.program, program()))
+    text = f"begun by hybrid-cable {wrote}, from here on by {this}" + " in another state" * (wrote == this)
+    return f"{text}: the last digits may be others"

@@ -1,0 +1,168 @@
+"""A run of several lines that was stopped, however often, is the run that was not: bit for bit."""
+
+from __future__ import annotations
+
+import random
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import Stopping, differences
+
+import hybrid
+import hybrid.simulation.system_run
+from hybrid.errors import ResultError, SceneError
+
+WAVES = {"kind": "regular", "height": 1.0, "period": 7.0, "ramp": 5.0}
+SEA = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0, "waves": WAVES}}
+LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
+HOSE = {
+    "length": 100,
+    "mass": 6,
+    "diameter": 0.08,
+    "axial_stiffness": 5e6,
+    "bending_stiffness": 300,
+    "max_tension": 800,
+}
+
+
+def mooring(**tables: Any) -> dict[str, Any]:
+    """Two legs with friction on the bed, a float with a force that stops, and a rod to a vessel that heaves."""
+    heave = {"heave": {"amplitude": 1.5, "period": 8}, "ramp": 6}
+    force = {"value": [200, 0, 0], "until": 3.1}
+    return {
+        "title": "float", "environment": SEA | {"seabed": {"z": -100, "stiffness": 5000, "friction": 0.5}},
+        "points": {
+            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 6, "drag_area": 3,
+                      "force": force},
+            "vessel": {"position": [70, 0, 2], "motion": heave},
+        },
+        "lines": {
+            "west": {"start": "west", "end": "float", "sections": [LEG], "mesh": {"cells": 30}},
+            "east": {"start": "float", "end": "east", "sections": [LEG], "mesh": {"cells": 30}},
+            "hose": {"start": "float", "end": "vessel", "mesh": {"cells": 30}, "sections": [HOSE]},
+        },
+        "time": {"duration": 8.0, "step": 0.05},
+    } | tables  # fmt: skip
+
+
+def spar() -> dict[str, Any]:
+    """A body that floats and one that is moved, between lines."""
+    line = {
+        "sections": [LEG | {"length": 425, "mass": 80, "diameter": 0.1, "axial_stiffness": 4e8}],
+        "mesh": {"cells": 20},
+    }
+    places = {"east": (400, 0), "north": (-200, 346), "south": (-200, -346)}
+    return {
+        "environment": {"fluid": {"density": 1025, "current": [0.4, 0, 0]}},
+        "points": {name: {"position": [x, y, -150]} for name, (x, y) in places.items()}
+        | {f"to_{name}": {"body": "spar", "place": [x / 80, y / 80, -20]} for name, (x, y) in places.items()},
+        "bodies": {
+            "spar": {
+                "initial_guess": [0, 0, 0], "mass": 3e6, "centre": [0, 0, -25], "inertia": [8e8, 8e8, 4e7],
+                "added_mass": [2.6e6, 2.6e6, 3e5, 1.5e9, 1.5e9, 0], "damping": [2e5, 2e5, 1e5, 2e7, 2e7, 1e7],
+                "hydrostatics": {"heave": 7.8e5, "roll": 1.2e8, "pitch": 1.2e8},
+                "force": {"value": [3e5, 0, 0], "until": 5},
+            }
+        },
+        "lines": {name: {"start": name, "end": f"to_{name}"} | line for name in places},
+        "time": {"duration": 12, "step": 0.1},
+    }  # fmt: skip
+
+
+LONG = {"duration": 60.0, "step": 0.02}
+SCENES = {"mooring": mooring(), "spar": spar()}
+
+
+@pytest.fixture
+def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
+    """Hears of every step, with a checkpoint at each."""
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)
+    return Stopping(monkeypatch)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_a_stopped_run_goes_on_bit_for_bit(name: str, tmp_path: Path, stopping: Stopping) -> None:
+    scene, whole, path = SCENES[name], tmp_path / "whole.h5", tmp_path / "run.h5"
+    hybrid.run(scene, whole, progress=stopping).close()
+    steps = stopping.heard
+    for k, stop in enumerate([steps // 3, steps // 5, 2, -1]):
+        stopping.left = stop
+        try:
+            (hybrid.resume(path, progress=stopping) if k else hybrid.run(scene, path, progress=stopping)).close()
+            break
+        except KeyboardInterrupt:
+            with hybrid.open(path) as part:
+                assert part.status == "interrupted" and len(part.times) == len(next(iter(part.lines.values())).times)
+    assert k == 3
+    assert differences(whole, path) == []
+    assert {x.suffix for x in tmp_path.iterdir()} == {".h5"}, "something is left behind"
+
+
+def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path) -> None:
+    every = {"output": {"every": 0.2}}
+    hybrid.run(mooring(**every), tmp_path / "long.h5").close()
+    hybrid.run(mooring(**every, time={"duration": 4.0, "step": 0.05}), tmp_path / "run.h5").close()
+    with pytest.raises(ResultError, match="nothing left"):
+        hybrid.resume(tmp_path / "run.h5")
+    with pytest.raises(SceneError, match="4 s"):
+        hybrid.resume(tmp_path / "run.h5", until=2.0)
+    with pytest.raises(SceneError, match="several lines"):
+        hybrid.resume(tmp_path / "run.h5", until=8.0, settings=["environment.fluid.current=[0, 0, 0]"])
+    hybrid.resume(tmp_path / "run.h5", tmp_path / "more.h5", until=8.0).close()
+    with hybrid.open(tmp_path / "long.h5") as long, hybrid.open(tmp_path / "more.h5") as more:
+        for name, line in long.lines.items():
+            assert np.array_equal(line.times, more.lines[name].times)
+            assert np.array_equal(line.tension, more.lines[name].tension)
+            assert np.array_equal(line.envelope["tension_max"], more.lines[name].envelope["tension_max"])
+        assert [e for e in long.events if e.kind == "tension above limit"]
+        assert [tuple(e) for e in long.events] == [tuple(e) for e in more.events]
+
+
+def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping) -> None:
+    """Every line has an output as soon as the points have it; extremes are those up to now."""
+    path, seen = tmp_path / "run.h5", []
+
+    def look(progress: Any) -> None:
+        if progress.step == 80:
+            with hybrid.open(path) as result:
+                lines = result.lines.values()
+                seen.append((result.status, len(result.times), [len(x.times) for x in lines]))
+                assert all(np.isfinite(x.envelope["tension_max"]).all() for x in lines)
+                assert all(x.status == "running" for x in lines)
+
+    hybrid.run(mooring(), path, progress=look).close()
+    assert seen == [("running", 40, [40, 40, 40])]
+
+
+def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path) -> None:
+    code = (
+        "import sys, hybrid, hybrid.simulation.system_run as r; r.WORK = 3000; "
+        "hybrid.run(sys.argv[1], sys.argv[2]) if len(sys.argv) > 2 else hybrid.resume(sys.argv[1])"
+    )
+    scene, whole, path = tmp_path / "float.yaml", tmp_path / "whole.h5", tmp_path / "run.h5"
+    scene.write_text(hybrid.scene_text(hybrid.System.model_validate(mooring(time=LONG))))
+    for _ in range(2):  # kernels may have to be compiled
+        begin = time.monotonic()
+        subprocess.run([sys.executable, "-c", code, str(scene), str(whole)], check=True)
+        wall = time.monotonic() - begin
+    draw, killed = random.Random(7), 0
+    while killed < 3:
+        process = subprocess.Popen([sys.executable, "-c", code, str(scene), str(path)])
+        time.sleep(draw.uniform(0.5, 0.95) * wall)
+        process.kill()
+        process.wait()
+        if path.exists():
+            with hybrid.open(path) as part:
+                good = part.status == "running" and len(part.times)
+            if good:
+                subprocess.run([sys.executable, "-c", code, str(path)], check=True)
+                assert differences(whole, path) == []
+                killed += 1
+            path.unlink()
