@@ -117,6 +117,7 @@ EVENTS_BY_WEIGHT = (
     "vibrations damped",
     "snap",
     "coarse step",
+    "iterations cut",
     "steps cut",
     "torque neglected",
     "ignored",

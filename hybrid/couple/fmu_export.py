@@ -18,7 +18,8 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.scene.read import SceneLike, as_scene, scene_text
 from hybrid.scene.schema import Scene
-from hybrid.simulation.stepping import ENDS, Simulation
+from hybrid.simulation.stepped_ends import ENDS
+from hybrid.simulation.stepping import Simulation
 from hybrid.store.selection import check_target, write_atomically
 
 # In the folder `resources` of the unit.

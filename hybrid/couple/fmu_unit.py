@@ -29,7 +29,8 @@ from hybrid.errors import ComputationError, HybridError
 from hybrid.kernels.state import Floats
 from hybrid.model.driven_end import rotation
 from hybrid.scene.read import load_scene
-from hybrid.simulation.stepping import ENDS, Simulation
+from hybrid.simulation.stepped_ends import ENDS
+from hybrid.simulation.stepping import Simulation
 
 UNITS = (
     Unit("m", m=1), Unit("s", s=1), Unit("m/s", m=1, s=-1), Unit("rad", rad=1), Unit("N", kg=1, m=1, s=-2),

@@ -13,6 +13,7 @@ from hybrid.kernels.books import (
     CORRECTION,
     EARLIER_DT,
     FLOOR,
+    IS_CUT,
     ITERATIONS,
     JUMPED,
     LARGEST_PEAK,
@@ -44,6 +45,7 @@ from hybrid.kernels.books import (
     STEPS,
     STIFF,
     STRETCHED,
+    TAKEN,
     TRIED_DT,
     TRIES,
     TRY,
@@ -56,7 +58,7 @@ from hybrid.kernels.books import (
 )
 from hybrid.kernels.compile import inner
 from hybrid.kernels.forces import SEABED, SELF_FRICTION
-from hybrid.kernels.newton import OK, SLACK
+from hybrid.kernels.newton import CUT_SHORT, OK, SLACK
 from hybrid.kernels.powers import book_work, find_powers, pull
 from hybrid.kernels.report import (
     BEND,
@@ -84,6 +86,10 @@ DIED = 1e-3
 @inner
 def note_try(clock, count, report, outcome, iterations, left, where):
     """Keep how a try ended; one that leaves a catenary cell at the floor of tension or below has failed."""
+    count[TAKEN] += iterations
+    count[IS_CUT] = 0
+    if outcome == CUT_SHORT:
+        outcome, count[IS_CUT] = OK, 1
     if outcome == OK and not report[SLACKEST] > clock[FLOOR]:
         outcome, where = SLACK, int(report[SLACKEST_CELL])
     count[OUTCOME], count[TRIES], count[WHERE] = outcome, iterations, where

@@ -75,8 +75,11 @@ CLOCK_SIZE = 40
     NEW_STATE,  # 1 where the state of a START counts among the extremes
     SLACK_CELL,  # of the step of SLACK_STEP
     VARIES,  # 1 where samples have the lengths of cells and the stiffness of elements, which change in a run
-) = range(26)  # fmt: skip
-COUNT_SIZE = 26
+    MOST_ITERATIONS,  # Newton iterations that a step may take in all its tries; 0: as many as converge
+    TAKEN,  # iterations of all tries since `BEGIN`
+    IS_CUT, CUT_SHORT,  # whether the last try was taken though it had not converged, and steps so far that were
+) = range(30)  # fmt: skip
+COUNT_SIZE = 30
 
 # Phases.
 START, BEGIN_STEP, TRY, SOLVE, JUDGE, SAMPLE, END_STEP = range(7)
@@ -89,6 +92,7 @@ STRETCHED, BENT, JUMPED, SLACKENED, LEAVES_PLANE, PUSH_DIED, STEPS_CUT, STEPS_SL
 UNKNOWN_ERROR = 256
 IS_BENT, MEETS_ITSELF = 512, 1024
 LETS_GO = 2048
+ITERATIONS_CUT = 4096
 
 # --- powers and work --------------------------------------------------------------------------------
 

@@ -121,6 +121,13 @@ def correction(line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: fl
     return _one_march(CORRECTION, line, sea, ends, state, cv, ca, work)
 
 
+def assembly_of_step(line: Line, sea: Sea, ends: Ends, old: State, new: State, cv: float, ca: float, work: Work) -> int:
+    """As `assembly`, of a step from `old` by work.u to `new`, whose friction and rates count from there."""
+    task = Task(ASSEMBLY, cv=cv, ca=ca, limits=ONE_MARCH)
+    outcome, _, _, where = _solve(task, line, sea, ends, old, new, NO_PUSH, NO_PUSH, work)
+    return -1 if outcome == OK else max(where, 0)
+
+
 def _one_march(what: int, line: Line, sea: Sea, ends: Ends, state: State, cv: float, ca: float, work: Work) -> int:
     task = Task(what, cv=cv, ca=ca, limits=ONE_MARCH)
     outcome, _, _, where = _solve(task, line, sea, ends, state, state, NO_PUSH, NO_PUSH, work)

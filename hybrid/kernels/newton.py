@@ -32,6 +32,7 @@ call_contact = caller(0.0)
 call_winch = caller(0)
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
+CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
 STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION, RUN = 0, 1, 2, 3, 4
 
 
@@ -54,6 +55,7 @@ class Task(NamedTuple):
     ca: float = 0.0  # 1/s2, dvd'/dr'
     turning: bool = False  # whether chords are turned instead of shifted (kernels.newton.update)
     limits: Limits = Limits(1.0, 1.0, 1)
+    cut: bool = False  # whether a step is taken as the last iteration has left it, converged or not
 
 
 # Newton stops when the next correction, predicted from the last two by quadratic
@@ -131,7 +133,7 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
         safe = ask_contact(contact, contact_table, PREPARE)
         if contact[NEAR] != 0:
             rho = 0.0
-    task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits)
+    task = Task(task.what, task.dt, task.before, rho, task.cv, task.ca, task.turning, task.limits, task.cut)
     s = scheme(rho, task.before, task.dt)
     turn, where = begin_step(plane, space, line, sea, old, new, work.u, s, safe)
     return task, s, turn, where
@@ -154,7 +156,8 @@ def solve(
 
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
     prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
-    may end on a branch that has nothing to do with it.
+    may end on a branch that has nothing to do with it.  With task.cut a step whose last iteration made a full correction
+    is taken though it has not converged (CUT_SHORT); its report is of the iterate before that correction.
     """
     reach, scale, most = task.limits
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
@@ -196,6 +199,7 @@ def solve(
             outcome = OK
             break
         if contact[ADDRESS] != 0 and not ask_contact(contact, contact_table, TOUCH) > 0.0:
+            before = math.inf
             break
         shift, turn, where, pull, big = measure(new.e, new.T, work.x)
         part = 1.0
@@ -212,6 +216,9 @@ def solve(
         size = turn if pull < noise else max(turn, pull / max(big, LOW_TENSION * scale))
         outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
+    cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
+    if cut_short:
+        outcome = OK
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
@@ -222,4 +229,6 @@ def solve(
             turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
             if not turn < LARGEST_STEP_TURN:
                 outcome, where = TURNED_TOO_FAR, cell
+            elif cut_short:
+                outcome = CUT_SHORT
     return outcome, it, left, where

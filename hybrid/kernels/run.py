@@ -29,14 +29,18 @@ from hybrid.kernels.books import (
     CONTROLLED,
     COUNT_SIZE,
     CUT_ANGLE,
+    CUT_SHORT,
     END_STEP,
     FAILED,
     FLAGS,
     IS_BENT,
+    IS_CUT,
+    ITERATIONS_CUT,
     JUDGE,
     LAST_DT,
     LOG,
     MEETS_ITSELF,
+    MOST_ITERATIONS,
     MUTE_CUTS,
     MUTE_SLACK,
     NEW_STATE,
@@ -59,6 +63,7 @@ from hybrid.kernels.books import (
     STEPS_CUT,
     STEPS_SLACK,
     STOP,
+    TAKEN,
     TRIED,
     TRY,
     TRY_END,
@@ -177,6 +182,10 @@ def conclude(job, old, new):
     if verdict > 0:
         accept(line, ends, old, new, books, work, clock[TRY_END], dt)
         count[FLAGS] = watch(line, ends, old, new, books, work.report, clock[NOW], dt)
+        if count[IS_CUT]:
+            count[CUT_SHORT] += 1
+            if count[CUT_SHORT] == 1:
+                count[FLAGS] |= ITERATIONS_CUT
         if job.was.shape[0] > 0:
             count[FLAGS] |= watch_push(clock, work.report)
         if clock[CUT_ANGLE] > 0.0 and clock[MUTE_CUTS] == 0.0:
@@ -247,7 +256,11 @@ def solve_job(plane, space, job):
         if job.books.counts[PARITY]:
             old, new, was, now = job.new, job.old, job.now, job.was
         dt = clock[TRY_END] - clock[NOW]
-        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, task.limits)
+        limits, cut = task.limits, job.books.counts[MOST_ITERATIONS] > 0
+        if cut:
+            left = job.books.counts[MOST_ITERATIONS] - job.books.counts[TAKEN]
+            limits = Limits(limits.reach, limits.scale, min(left, limits.most))
+        task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut)
     return solve(
         plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
         job.contact_table, winch, job.reel_table,

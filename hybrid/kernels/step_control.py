@@ -23,6 +23,7 @@ from hybrid.kernels.books import (
     REPEATS,
     SHORTEST,
     STOP,
+    TAKEN,
     TOLERANCE,
     TRIED_DT,
     UNTIL,
@@ -50,7 +51,7 @@ def begin_step(clock, count):
     clock[TRIED_DT] = clock[UNTIL] - clock[NOW]
     if not count[CONTROLLED]:
         clock[SHORTEST] = clock[TRIED_DT] * 0.5**HALVINGS
-    count[REPEATS] = 0
+    count[REPEATS] = count[TAKEN] = 0
 
 
 @inner

@@ -43,12 +43,20 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
         detail = "no accelerations are consistent with the shape and the loads"
     else:
         detail = f"smallest step tried {dt:.3g} s; {tried.iterations} Newton iterations in the last try"
+    if _used_up(run):
+        detail += f"; the {int(run.run.count[b.MOST_ITERATIONS])} iterations that a step may take are used up"
     ends = model.ends.at(run.t + dt)
     apart = float(np.linalg.norm(ends.position[1] - ends.position[0]))
     if ends.held.all() and model.inextensible and apart >= model.length:
         longest = f"the cable does not stretch beyond {model.length:.6g} m"
         detail += f"; the ends are then {apart:.6g} m apart, and {longest}"
     return detail
+
+
+def _used_up(run: Transient) -> bool:
+    """Whether the step that fails has used up the Newton iterations that it may take."""
+    count = run.run.count
+    return bool(0 < count[b.MOST_ITERATIONS] <= count[b.TAKEN])
 
 
 def _slack_detail(run: Transient, tried: Tried, dt: float) -> str:
@@ -74,6 +82,8 @@ def _planned(run: Transient) -> float:
 
 def first_remedy(run: Transient, tried: Tried) -> str:
     """What to try before the remedy of an outcome; empty: nothing."""
+    if _used_up(run):
+        return "restore() and a shorter step, or more iterations (most_iterations)"
     if tried.outcome != Outcome.SLACK or not _steps_too_long(run):
         return ""
     step = max(_planned(run) / SHORTER, float(run.run.clock[b.WAVE_STEP]))

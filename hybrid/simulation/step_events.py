@@ -29,6 +29,27 @@ def note_slack(moving: Transient) -> None:
     moving.slackened, clock[b.MUTE_SLACK] = True, 1.0
 
 
+def note_iterations(moving: Transient) -> None:
+    """A step was taken in all the Newton iterations that it may take though these had not converged: the first."""
+    clock, most = moving.run.clock, int(moving.run.count[b.MOST_ITERATIONS])
+    text = (
+        f"a step was taken after {most} Newton iterations though the next would still have changed it by "
+        f"{float(clock[b.CORRECTION]):.2g} (relative), and so are others like it: most_iterations bounds their cost; "
+        f"steps/correction has what each left out; a shorter time.step or more iterations leave less"
+    )
+    moving.events.event(moving.t, 0.0, moving.model.length, "iterations cut", text, threshold=float(most))
+
+
+def count_iterations(moving: Transient) -> None:
+    """How many steps were taken so: an event with their number, at the end of the run."""
+    short, most = int(moving.run.count[b.CUT_SHORT]), int(moving.run.count[b.MOST_ITERATIONS])
+    if short:
+        text = f"{short} of {moving.steps} steps were taken after {most} Newton iterations that had not converged"
+        moving.events.event(
+            moving.t, 0.0, moving.model.length, "iterations cut", text, value=float(short), threshold=float(most)
+        )
+
+
 def note_unknown_error(moving: Transient) -> None:
     """The error of neglecting bending could not be followed through the last step: an event, once in a while."""
     assert moving.correction is not None

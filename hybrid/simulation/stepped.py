@@ -73,6 +73,7 @@ class Saved(NamedTuple):
     model: Model
     owner: object  # what tells one Simulation from another
     number: int  # of the save, from 1
+    cut_short: int  # steps so far
 
 
 def vector(x: Sequence[float] | Floats, name: str) -> Floats:
@@ -91,3 +92,12 @@ def numbers(x: Any, name: str) -> Floats:
 
 def in_space(scene: Scene) -> Scene:
     return scene if scene.dimension is not None else scene.model_copy(update={"dimension": 3})
+
+
+def iterations_allowed(most: Any) -> int:
+    """Newton iterations that a step may take; 0: no bound."""
+    if most is None:
+        return 0
+    if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 1:
+        raise ValueError(f"most_iterations: expected a whole number of at least 1, found {most!r:.60}")
+    return int(most)

@@ -33,7 +33,13 @@ from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import let_touch_itself, refuse_start_in_itself
-from hybrid.simulation.step_events import look_at_itself, note_cut, note_slack, note_unknown_error
+from hybrid.simulation.step_events import (
+    look_at_itself,
+    note_cut,
+    note_iterations,
+    note_slack,
+    note_unknown_error,
+)
 from hybrid.simulation.zone_switching import ZoneSwitching, note_change
 from hybrid.solve.run import CompiledRun, Tried
 from hybrid.solve.statics import Equilibrium
@@ -341,6 +347,8 @@ class Transient:
             note_cut(self)
         if flags & b.STEPS_SLACK:
             note_slack(self)
+        if flags & b.ITERATIONS_CUT:
+            note_iterations(self)
         if flags & (b.IS_BENT | b.MEETS_ITSELF):
             look_at_itself(self, flags, self._cells is not None)
         if flags & b.PUSH_DIED:

@@ -1,0 +1,214 @@
+"""What a program outside sets of the ends of one cable, and what it reads there: the part of `hybrid.Simulation`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from hybrid.kernels.report import FORCE_A, FORCE_B, MOMENT_A, MOMENT_B
+from hybrid.kernels.state import Floats
+from hybrid.model.driven_end import DrivenEnd, rotation_vector
+from hybrid.scene.schema import Scene
+from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.interface_stiffness import interface_stiffness
+from hybrid.simulation.payout import length_asked
+from hybrid.simulation.stepped import EndForces, numbers, one_thread, vector
+from hybrid.simulation.time_loop import TimeLoop
+from hybrid.simulation.transient import StepFailed
+
+ENDS = ("start", "end")
+# Of the largest component: what is out of a plane by no more is in it.
+IN_PLANE = 1e-9
+STILL: Floats = np.zeros(3)
+
+
+class SteppedEnds:
+    """The ends of a cable that is stepped from outside."""
+
+    scene: Scene
+    lock: Any
+    _loop: TimeLoop
+    _recorder: DeferredRecorder
+    _closed: bool
+    _driven: dict[int, DrivenEnd]
+    _next: dict[int, tuple[Floats, Floats, Floats | None]]  # what ends are set to, for the next step
+    _wound: tuple[float | None, float] | None  # length and rate that are set for the next step
+
+    @property
+    def t(self) -> float:
+        """Time of the state, s."""
+        return self._loop.run.t
+
+    def _check_open(self) -> None:
+        if self._closed:
+            raise ValueError("the simulation is over: its result has been written")
+
+    @one_thread
+    def set_end(
+        self, end: str, position: Sequence[float] | Floats | None, velocity: Sequence[float] | Floats | None = None,
+        frame: Floats | None = None,
+    ) -> None:  # fmt: skip
+        """Where a held end is to be at the end of the next `step` or `advance`, which it reaches smoothly.
+
+        end: "start" or "end"; position: (3,) m, inertial, None: where it is (of a guided end, which only turns);
+        velocity: (3,) m/s there, None: at rest; frame: (3, 3), columns a1, a2 and the tangent along increasing s, of an
+        end that holds a direction.  An end that is not set again stays where it is.  ValueError: the end is free, has a
+        motion in the scene, holds no direction, or would leave the plane of `dimension: 2`.
+        """
+        self._check_open()
+        k = self._end(end)
+        conditions = self._loop.run.model.ends
+        if not conditions.values.held[k] and (position is not None or not self._turns(k)):
+            raise ValueError(f"ends.{end} is not held: set_force acts on it")
+        if frame is not None and not self._turns(k):
+            raise ValueError(f"ends.{end} holds no direction: it has no frame")
+        if k not in self._driven:
+            if k in conditions.motions:
+                raise ValueError(f"ends.{end} has a motion in the scene: leave it out to set the end from outside")
+            self._driven[k] = conditions.drive(k)
+            self._loop.run.run.move(conditions.moves())
+        there = self._driven[k].at(self.t)[0] if position is None else vector(position, "position")
+        speed, turn = vector(STILL if velocity is None else velocity, "velocity"), None
+        if self.scene.dimension == 2:
+            self._check_plane(end, "position", there - self._driven[k].at(self.t)[0])
+        if frame is not None:
+            now = self._driven[k].at(self.t)[2]
+            wanted = numbers(frame, "frame")
+            proper = wanted.shape == (3, 3) and np.allclose(wanted.T @ wanted, np.eye(3), atol=1e-6)
+            if not (proper and np.linalg.det(wanted) > 0.0):
+                raise ValueError("frame: expected a rotation matrix (3, 3), right-handed")
+            turn = rotation_vector(now.T @ wanted)
+        self._next[k] = there, speed, turn
+
+    @property
+    def length(self) -> float:
+        """Unstretched length that is out now, m."""
+        return float(self._loop.run.model.line.s[-1])
+
+    @one_thread
+    def set_length(self, length: float, rate: float = 0.0) -> None:
+        """How long the line is to be at the end of the next `step` or `advance`, m, and its rate there, m/s.
+
+        It reaches that smoothly, and keeps the rate until it is set again.  ValueError: the scene has no
+        ``ends.end.payout``, or that gives the length itself; a length that cannot be.
+        """
+        self._check_open()
+        self._wound = length_asked(self.scene, self._loop.run.payout, math.nan if length is None else length, rate)
+
+    @one_thread
+    def set_payout(self, rate: float) -> None:
+        """At which rate, m/s, line is to be paid out at the end of the next `step` or `advance`; negative: taken in.
+
+        The rate changes evenly until then, and stays until it is set again.  ValueError: as of `set_length`.
+        """
+        self._check_open()
+        self._wound = length_asked(self.scene, self._loop.run.payout, None, rate)
+
+    @one_thread
+    def set_force(
+        self, end: str, force: Sequence[float] | Floats, moment: Sequence[float] | Floats | None = None
+    ) -> None:
+        """From the next step on this force (3,) N, and moment (3,) N m, act on an end that is free to move."""
+        k, conditions = self._end(end), self._loop.run.model.ends
+        self._check_open()
+        if conditions.values.held[k]:
+            raise ValueError(f"ends.{end} is held: set_end moves it")
+        if moment is not None and not self._loop.run.model.line.spin[-k]:
+            raise ValueError(f"moment: the cable is a catenary at ends.{end}, which takes no moment")
+        wanted, turning = vector(force, "force"), vector(STILL if moment is None else moment, "moment")
+        self._check_plane(end, "force", wanted)
+        conditions.load("force", k, wanted, self.t)
+        if moment is not None:
+            conditions.load("moment", k, turning, self.t)
+        self._loop.run.run.move(conditions.moves())
+
+    @one_thread
+    def release(self, end: str) -> None:
+        """Let a held end go now: it is free from here on, and `set_force` acts on it.
+
+        end: "start" or "end".  ValueError: it is not held, or a torque passes through it into catenary zones.
+        """
+        self._check_open()
+        k, model = self._end(end), self._loop.run.model
+        if not model.ends.values.held[k]:
+            raise ValueError(f"ends.{end} is not held: there is nothing to release")
+        if len(model.line.torsion):
+            raise ValueError(f"ends.{end} is the end of a twisted catenary: give it swivel: true in the scene")
+        self._recorder.commit_old()
+        try:
+            self._loop.release(k, "by Simulation.release")
+        except StepFailed as failed:
+            self._loop.fail(failed.tried, failed.dt)
+        self._forget_released()
+
+    def _forget_released(self) -> None:
+        """Ends that are free now are no longer set."""
+        held = self._loop.run.model.ends.values.held
+        for k in [k for k, end in self._driven.items() if end.held and not held[k]]:
+            self._driven.pop(k)
+            self._next.pop(k, None)
+
+    def settable(self, end: str) -> frozenset[str]:
+        """What may be set of an end: "position" and "frame" by `set_end`, "force" and "moment" by `set_force`.
+
+        An end that moves by a motion of the scene has neither.
+        """
+        k, conditions = self._end(end), self._loop.run.model.ends
+        if k in conditions.motions and k not in self._driven:
+            return frozenset()
+        names = {"position" if conditions.values.held[k] else "force"}
+        if self._turns(k):
+            names.add("frame")
+        elif "force" in names and self._loop.run.model.line.spin[-k]:
+            names.add("moment")
+        return frozenset(names)
+
+    def frames(self) -> Floats:
+        """Frames (2, 3, 3) of the ends, inertial: columns a1, a2 and the tangent along increasing s; NaN where an end
+        holds no direction."""
+        frames = self._loop.run.model.ends.values.frame.reshape(2, 3, 3).copy()
+        frames[[k for k in (0, 1) if not self._turns(k)]] = np.nan
+        return frames
+
+    @one_thread
+    def forces(self) -> EndForces:
+        """Forces and moments of the cable on what holds its ends, now."""
+        report, held = self._loop.run.run.report, self._loop.run.model.ends.values.held
+        start, end = (report[k : k + 3] * held[j] for j, k in enumerate((FORCE_A, FORCE_B)))
+        first, last = report[MOMENT_A : MOMENT_A + 3], report[MOMENT_B : MOMENT_B + 3]
+        return EndForces(start, end, first * self._turns(0), -last * self._turns(1))
+
+    @one_thread
+    def stiffness(self, end: str) -> Floats:
+        """Interface stiffness (3, 3) N/m, inertial: the force it takes to shift a held end at the end of the last step.
+
+        By minus that, times a shift of the place that was set, `forces` changes where the step is taken again: Newton's
+        method of an implicit coupling.  It has the inertia and the damping of the step in it (of its last part, where
+        it was cut), and is not the static stiffness; directions that the end holds stay.  Before the first step: as of
+        a step of time.step.  ValueError: the end is not held.
+        """
+        self._check_open()
+        k, run = self._end(end), self._loop.run
+        if not run.model.ends.values.held[k]:
+            raise ValueError(f"ends.{end} is not held: it has no stiffness that is felt from outside")
+        return interface_stiffness(run, k, run.resolution.step)
+
+    def _turns(self, k: int) -> bool:
+        """Whether end k holds the direction of a rod."""
+        return bool(self._loop.run.model.line.element[-k])
+
+    def _check_plane(self, end: str, what: str, vector: Floats) -> None:
+        plane = self._loop.run.model.plane
+        if self.scene.dimension == 2 and plane is not None:
+            across = float(vector @ plane[2])
+            if abs(across) > IN_PLANE * float(np.abs(vector).max(initial=1.0)):
+                out = "out of the plane that dimension: 2 keeps the cable in"
+                raise ValueError(f"{what} of ends.{end}: {across:.3g} {out}; leave dimension out of the scene")
+
+    def _end(self, end: str) -> int:
+        if end not in ENDS:
+            raise ValueError(f"end: expected 'start' or 'end', found {end!r}")
+        return ENDS.index(end)
