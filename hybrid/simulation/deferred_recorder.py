@@ -21,6 +21,7 @@ class DeferredRecorder:
         self._waiting: list[tuple[str, tuple[Any, ...], dict[str, Any]]] = []
         self._handed_on = 0  # of all that came
         self._marked = False
+        self._unseen = False  # whether readers have not yet seen what was handed on last
         self.last = recorder.last  # time of the last output, s
 
     # --- what a TimeLoop gives it ---------------------------------------------------------------
@@ -61,6 +62,7 @@ class DeferredRecorder:
 
     def commit(self) -> None:
         """Hand on all that waits."""
+        self._unseen |= bool(self._waiting)
         for name, given, more in self._waiting:
             getattr(self._recorder, name)(*given, **more)
         self._handed_on += len(self._waiting)
@@ -70,8 +72,9 @@ class DeferredRecorder:
         """Hand on what waits where nothing was marked, or too much waits."""
         if not self._marked or len(self._waiting) > MOST_WAITING:
             self.commit()
-            if self._recorder.due:
+            if self._unseen and self._recorder.due:
                 self._recorder.flush()
+                self._unseen = False
 
     def close(self, status: str, message: str) -> None:
         """Close the file."""

@@ -9,6 +9,7 @@ import io
 import threading
 from contextlib import ExitStack
 from pathlib import Path
+from time import monotonic
 from types import TracebackType
 from typing import Any
 
@@ -37,6 +38,8 @@ from hybrid.store.reader import Result, open_result
 
 # Of a step: a step so short is round-off of the times of others.
 SLIVER = 1e-6
+# s, of the wall: what waits is written down after so long, though there is room for more.
+WRITE_EVERY = 60.0
 NUMBER = (int, float, np.integer, np.floating)
 
 
@@ -89,6 +92,8 @@ class Simulation(SteppedEnds):
         self._next: dict[int, tuple[Floats, Floats, Floats | None]] = {}  # what ends are set to, for the next step
         self._loop.patient = self._plain
         self._loop.run.run.count[b.MOST_ITERATIONS] = self._most
+        self._loop.run.run.wait_longer()
+        self._written = monotonic()
         try:
             self._loop.begin(equilibrium)
         except BaseException as error:
@@ -148,6 +153,9 @@ class Simulation(SteppedEnds):
             self._failed = str(error)
             raise
         self._forget_released()
+        if monotonic() - self._written > WRITE_EVERY:
+            self._loop.write_down(everything=True)
+            self._written = monotonic()
         return self.t
 
     def _step_to(self, until: float) -> None:
@@ -173,7 +181,7 @@ class Simulation(SteppedEnds):
         What has been computed until now is final; what follows is recorded when the next `save` is made.
         """
         self._check_open()
-        if not self._plain:
+        if not self._plain or self._loop.run.run.waits_much:
             self._loop.write_down(everything=True)
         self._recorder.commit()
         run, watch = self._loop.run, self._loop.remembered()

@@ -27,6 +27,10 @@ from hybrid.solve.self_contact import SelfContact
 
 # Steps and samples that a call may take before Python writes them down.
 ROWS = 512
+# The same of a run that is stepped from outside in real time, where writing must be rare.
+ROWS_OUTSIDE = 4096
+# Numbers of samples, and rows of the log, that are copied for a state to come back to; more is written down before.
+MOST_KEPT, ROWS_KEPT = 200_000, 512
 # Cells times steps of a call: about 0.1 s, after which interrupts are heard and progress is reported.
 CELL_STEPS = 200_000
 # Numbers that the buffer of samples may hold, 16 MB.
@@ -51,7 +55,7 @@ class CompiledRun:
 
         whether lengths and stiffness change, and samples have them.
         """
-        self.table = Table(blank_job())
+        self.table, self._rows = Table(blank_job()), ROWS
         self.books = blank_books()._replace(outputs=outputs, log=np.zeros((ROWS, len(b.LOG))))
         self.clock, self.count = self.books.clock, self.books.counts
         self.keeps_extremes, self._room = extremes, np.zeros(0)
@@ -83,8 +87,8 @@ class CompiledRun:
         touches = bool(line.bits & SELF_CONTACT)
         size = sample_size(cells, bool(self.count[b.VARIES]), len(line.torsion), touches) + followed.shape[1]
         if not self._room.size:
-            self._room = np.zeros(max(1, min(ROWS, MOST_SAMPLED // size)) * size)
-        rows = max(1, min(ROWS, self._room.size // size))
+            self._room = np.zeros(max(1, min(self._rows, MOST_SAMPLED // size)) * size)
+        rows = max(1, min(self._rows, self._room.size // size))
         nodes, some = cells + 1, self.keeps_extremes
         marked = np.flatnonzero(marks)
         right = np.arange(nodes)
@@ -170,6 +174,18 @@ class CompiledRun:
         if code in (b.PAUSED, b.AT_STOP):
             self.count[b.QUOTA] = self.quota
         return code
+
+    def wait_longer(self) -> None:
+        """Before a line is attached for a run that is stepped from outside: more steps and samples may wait."""
+        self._rows, self._room = ROWS_OUTSIDE, np.zeros(0)
+        self.books = self.books._replace(log=np.zeros((ROWS_OUTSIDE, len(b.LOG))))
+
+    @property
+    def waits_much(self) -> bool:
+        """Whether so much waits to be written down that copies of it would cost more than a step."""
+        return bool(
+            self.count[b.ROWS] > ROWS_KEPT or self.count[b.SAMPLES] * self.books.samples.shape[1] > MOST_KEPT
+        )
 
     def keep(self) -> tuple[Floats, ...]:
         """Copies of all that steps change, for `bring_back`."""
