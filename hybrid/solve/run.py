@@ -183,9 +183,7 @@ class CompiledRun:
     @property
     def waits_much(self) -> bool:
         """Whether so much waits to be written down that copies of it would cost more than a step."""
-        return bool(
-            self.count[b.ROWS] > ROWS_KEPT or self.count[b.SAMPLES] * self.books.samples.shape[1] > MOST_KEPT
-        )
+        return bool(self.count[b.ROWS] > ROWS_KEPT or self.count[b.SAMPLES] * self.books.samples.shape[1] > MOST_KEPT)
 
     def keep(self) -> tuple[Floats, ...]:
         """Copies of all that steps change, for `bring_back`."""
