@@ -36,6 +36,7 @@ class SystemModel:
     body_places: Floats  # (B, STATE) where they are first
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
+    loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
     @property
     def cells(self) -> int:

@@ -11,6 +11,11 @@ from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text
 from hybrid.scene.ends import Body, Free, Loading
 from hybrid.scene.motion_tables import TURNS, Motion
 
+_BREAK = (
+    "when what holds the point fails, at a time or after the first step with so large a force of its lines: they hang "
+    "on together, and the point is free; absent: never"
+)
+
 # Names are keys of the result file and of its groups.
 FORBIDDEN = "/."
 
@@ -24,12 +29,27 @@ def _a_name(name: str) -> str:
 Name = Annotated[Text, AfterValidator(_a_name)]
 
 
+class Failure(Table):
+    """When something breaks: at a time, or after the first step with so large a force; whichever comes first."""
+
+    time: Positive | None = Field(default=None, description="time at which it breaks [s]")
+    tension: Positive | None = Field(default=None, description="force at which it breaks [N]")
+
+    @model_validator(mode="after")
+    def _says_when(self) -> Failure:
+        if self.time is None and self.tension is None:
+            fix = "time: 12 (s) or tension: 50e3 (N), or leave break_at out"
+            refuse([Finding((), "time or tension", fix)])
+        return self
+
+
 class FixedPoint(Table):
     """A point that is held or moved: an anchor, a fairlead of a vessel whose motion is known."""
 
     kind: Literal["fixed"] = Field(default="fixed", description="held where it is, or moved as `motion` says")
     position: Vector = Field(description="position, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
+    break_at: Failure | None = Field(default=None, description=_BREAK)
 
     @model_validator(mode="after")
     def _does_not_turn(self) -> FixedPoint:
@@ -83,6 +103,7 @@ class Fairlead(Table):
     kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
     body: Name = Field(description="name of the body")
     place: Vector = Field(description="where on the body, from its origin, in axes of the body [m]")
+    break_at: Failure | None = Field(default=None, description=_BREAK)
 
 
 Point = Annotated[

@@ -20,12 +20,18 @@ from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody
 from hybrid.scene.cable import Cable, Environment, Section
 from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
 from hybrid.scene.motion_checks import motion_findings
-from hybrid.scene.points import Fairlead, FixedPoint, FreePoint, Name, Point
+from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.suggestions import nearest
 
 # Of the length of a line: how far a free point may be looked for from the other one.
 REACHED = 0.95
+
+
+class LineFailure(Failure):
+    """When and where a line breaks from a point; its end is free from then on."""
+
+    end: Literal["start", "end"] = Field(default="end", description="the end that breaks: at s = 0, or at s = length")
 
 
 class JoinedLine(Table):
@@ -42,6 +48,11 @@ class JoinedLine(Table):
         description="rod, catenary, or zones of both that stay; absent: rod with bending stiffness, else catenary",
     )
     mesh: Mesh | None = Field(default=None, description="how the line is cut into cells; absent: chosen")
+    break_at: LineFailure | None = Field(
+        default=None,
+        description="when the line breaks from the point at one of its ends, at a time or after the first step with so "
+        "large a tension there; absent: never",
+    )
 
     @property
     def cable(self) -> Cable:
@@ -121,12 +132,17 @@ class System(Table):
         return isinstance(self.points[point], FreePoint) or isinstance(self.body_of(point), FreeBody)
 
     def lines_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
-        """Names of the lines that meet at a point, each with the end that does."""
+        """Names of the lines that meet at a point, each with the end that does; those that break there come last."""
         found: list[tuple[str, Literal["start", "end"]]] = []
         for name, line in self.lines.items():
             found += [(name, "start")] if line.start == point else []
             found += [(name, "end")] if line.end == point else []
-        return found
+        return sorted(found, key=lambda at: self.breaks(*at))
+
+    def breaks(self, name: str, end: str) -> bool:
+        """Whether a line may break from the point at an end."""
+        failure = self.lines[name].break_at
+        return failure is not None and failure.end == end
 
     def carried(self, name: str) -> tuple[str, ...]:
         """Ends (`start`, `end`) at which a line carries the free point, its mass and loads: the first line does."""
@@ -221,11 +237,29 @@ class System(Table):
                 yield Finding(
                     ("points", name), expected, f"leave it out, or let a line end there: `end: {name}`", "no line"
                 )
+            elif isinstance(point, FreePoint) and all(self.breaks(*at) for at in self.lines_at(name)):
+                line, _ = self.lines_at(name)[0]
+                expected = f"a line at point {name} that does not break there and carries what is left"
+                fix = "leave it out of one of them, or let it break at its other end"
+                yield Finding(("lines", line, "break_at"), expected, fix)
+        for name, failure, at in self._failures():
+            if self.time is not None and failure.time is not None and failure.time >= self.time.duration:
+                expected = f"a time before the end, {self.time.duration:g} s"
+                yield Finding((*at, "break_at", "time"), expected, "a longer duration, or leave it out", name)
         on = {point.body for point in self.points.values() if isinstance(point, Fairlead)}
         for name in self.bodies:
             if name not in on:
                 fix = f"add a point `{{body: {name}, place: [0, 0, 0]}}` and a line to it, or leave the body out"
                 yield Finding(("bodies", name), "a body with a fairlead among the points", fix, "no fairlead")
+
+    def _failures(self) -> Iterator[tuple[str, Failure, Place]]:
+        """What may break: its name, when, and where that stands."""
+        for name, line in self.lines.items():
+            if line.break_at is not None:
+                yield f"line {name}", line.break_at, ("lines", name)
+        for name, point in self.points.items():
+            if not isinstance(point, FreePoint) and point.break_at is not None:
+                yield f"point {name}", point.break_at, ("points", name)
 
     def _floating_groups(self) -> Iterator[Finding]:
         """Free points and bodies from which no way along lines leads to what is fixed."""

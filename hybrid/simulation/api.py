@@ -14,7 +14,6 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -25,7 +24,6 @@ from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
-    follows_curvature,
     is_irregular,
     mesh_is_free,
     model_is_free,
@@ -245,8 +243,7 @@ def _compute(
         else:
             choice, resolution = _surveyed(case, resolution) if remaining is None else (NAMED, resolution)
             control = _controller(case, _replacing(target, first, refinement), choice)
-            moves = isinstance(case.scene.model, AdaptiveModel) and not follows_curvature(case.scene)
-            go_on = partial(control.start, replace(resolution, follow=moves))
+            go_on = partial(control.start, resolution)
         try:
             result, errors = go_on()
             failed = control.model_misses

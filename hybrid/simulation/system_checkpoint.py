@@ -28,13 +28,18 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
     return {
         "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
         "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
-        "lines": lines,
+        "lines": lines, "broken": [*run.failures.broken],
     }  # fmt: skip
 
 
 def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     """Go on as `checkpoint` has written, with a run that was made for it.  ValueError: that cannot be."""
-    template = checkpoint(run) | {"dry": None}
+    if "broken" in saved:  # not in files of an earlier program
+        if not isinstance(saved["broken"], list):
+            raise ValueError("broken: numbers of what has broken were expected")
+        run.failures.again(saved["broken"])
+    saved = {"broken": [], **saved}
+    template = checkpoint(run) | {"dry": None, "broken": None}
     for line in template["lines"].values():
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
     found = matched(dict(saved), template)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,7 @@ from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
 from hybrid.scene.bodies import FreeBody
-from hybrid.scene.points import FreePoint
+from hybrid.scene.points import Fairlead, FreePoint, Point
 from hybrid.scene.system import System
 from hybrid.solve.system import SystemSolver, SystemState
 from hybrid.store.format import Field
@@ -61,12 +62,12 @@ def values_of(
     pulls: dict[str, list[tuple[Floats, Floats]]] = {name: [] for name in system.bodies}
     for name, point in system.points.items():
         at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]
-        line, node = at[0]
-        values[f"points/{name}/position"] = position = state.lines[line].r[node].copy()
-        values[f"points/{name}/velocity"] = state.lines[line].v[node].copy()
+        here = [(line, node) for line, node in at if (line, -node) not in model.loose]
+        position, velocity = _place(model, state, point, at[0], here)
+        values[f"points/{name}/position"], values[f"points/{name}/velocity"] = position, velocity
         if isinstance(point, FreePoint):
             continue
-        reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in at]
+        reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in here]
         values[f"points/{name}/force"] = force = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
         if system.body_of(name) is not None:
             pulls[point.body].append((position, force))  # type: ignore[union-attr]
@@ -85,6 +86,23 @@ def values_of(
         values[f"{at_body}/energy/kinetic"], values[f"{at_body}/energy/potential"] = work[KINETIC], work[POTENTIAL]
         values |= {f"{at_body}/work/{key}": work[DONE + k] for k, key in enumerate(WORKS)}
     return values
+
+
+def _place(
+    model: SystemModel, state: SystemState, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
+) -> tuple[Floats, Floats]:
+    """Position and velocity of a point; first: line and node that began there, here: those that are still there."""
+    if here:
+        line, node = here[0]
+        return state.lines[line].r[node].copy(), state.lines[line].v[node].copy()
+    for body, row in zip(model.bodies, state.bodies, strict=True):
+        if isinstance(point, Fairlead) and point.body == body.name:
+            R = row[FRAME:V].reshape(3, 3)
+            arm = R @ np.array(point.place)
+            return row[PLACE:FRAME] + arm, row[V : V + 3] + np.cross(R @ row[W : W + 3], arm)
+    line, node = first
+    ends = model.models[line].ends
+    return ends.values.position[-node].copy(), ends.velocity[-node].copy()
 
 
 def _of_body(

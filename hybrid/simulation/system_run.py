@@ -22,6 +22,7 @@ from hybrid.scene.system import System
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
 from hybrid.simulation.system_checkpoint import check_files, content, files_of, other_program, restore
+from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import fields_of, values_of
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
@@ -71,6 +72,7 @@ class SystemRun:
         self.t, self.steps, self.last_step, self.cpu = 0.0, 0, 0.0, 0.0
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
+        self.failures = Failures(self)
         self.loaded = 0.0  # s, loads that have stopped by then act no more
         self._checked = -1  # steps at the last checkpoint
         self._between = False  # whether the state is that between two steps
@@ -108,7 +110,7 @@ class SystemRun:
         with opened(source) as file:
             point = read_checkpoint(file)
             check_files(self.system, point, source)
-            self._solver()
+            self.make_solver()
             with refused(source):
                 restore(self, point.state)
                 near = SAME_STOP * (self.system.require_time().step or 1.0)
@@ -215,14 +217,15 @@ class SystemRun:
             self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
 
-    def _solver(self) -> None:
+    def make_solver(self) -> None:
+        """A solver for the model as it is."""
         self.solver = SystemSolver(joined_lines(self.model, 0.0), len(self.model.free), self.model.body_numbers(0.0))
         self.solver.keep_books([line.books for line in self.lines])
 
     def begin_motion(self) -> None:
         """Make the start ready for steps, and record it."""
         time = self.system.require_time()
-        self._solver()
+        self.make_solver()
         self._settle(self.solver)
         if self.system.environment.waves is not None:
             text = "waves act on lines and points, not on the body"
@@ -240,7 +243,7 @@ class SystemRun:
         """Times (s) at which a step ends: outputs, and where loads jump."""
         time = self.system.require_time()
         given = [*(m.ends.breaks for m in self.model.models), *(b.breaks for b in self.model.bodies)]
-        self._breaks = sorted({x for each in given for x in each if x < time.duration})
+        self._breaks = sorted({x for each in (*given, self.failures.times) for x in each if x < time.duration})
         return apart([*self.times, *self._breaks], self.t, time.step or time.duration)
 
     def go_to(self, stop: float, look: Callable[[], None] = lambda: None) -> None:
@@ -254,6 +257,10 @@ class SystemRun:
             self._between = False
             self._step(stop if k == count - 1 else first + (k + 1) * span / count, time.rho_inf)
             self.leg = (first, k + 1) if k + 1 < count else (self.t, 0)
+            if self.failures.all and self.failures.due(step):
+                self._settle(self.solver)
+                self.last_step = 0.0
+                self._other = self.state.copy()
             if self.steps % LOOK == 0:
                 self._look(self.solver)
             if k == count - 1:

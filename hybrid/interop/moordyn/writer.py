@@ -225,6 +225,8 @@ class _Writer:
         for name in self.scene.points:
             made[name] = self._free_or_fixed(name)
         for name, line in self.scene.lines.items():
+            if line.break_at is not None:
+                self.notes.append(f"lines.{name}.break_at is left out")
             self._line(f"lines.{name}", name, line.cable, [made[line.start], made[line.end]])
 
     def _line(self, where: str, name: str, cable: Any, ends: list[str]) -> None:
@@ -342,6 +344,8 @@ class _Writer:
         point = self.scene.points[name]
         line, end = self.scene.lines_at(name)[0]
         shape = self.shapes[line]
+        if getattr(point, "break_at", None) is not None:
+            self.notes.append(f"points.{name}.break_at is left out")
         if point.kind == "fixed":
             kind = "Coupled" if point.motion is not None else "Fixed"
             made = self._point(kind, shape.at(0.0 if end == "start" else shape.s[-1]), _Lump())

@@ -1,0 +1,62 @@
+"""Lines that break from their points, and points that give way: what may break, and the system after it.
+
+The ends that come loose are joined to a free point of their own without mass, which is what a free end is.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.model.system import SystemModel
+from hybrid.scene.points import Failure, FreePoint
+from hybrid.scene.system import System
+
+
+class Weakness(NamedTuple):
+    """Something that may break."""
+
+    name: str  # for people
+    ends: tuple[tuple[int, int], ...]  # of lines: number, and 0 or 1 for start or end
+    time: float  # s; infinite: never by itself
+    tension: float  # N, of all these ends together; infinite: however large
+    leaves: bool  # whether the ends leave their point; else the point comes with them
+
+
+def weaknesses(system: System) -> tuple[Weakness, ...]:
+    """All that may break, lines first."""
+    names = list(system.lines)
+    found: list[tuple[str, tuple[tuple[int, int], ...], Failure, bool]] = []
+    for name, line in system.lines.items():
+        if line.break_at is not None:
+            k = int(line.break_at.end == "end")
+            point = (line.start, line.end)[k]
+            text = f"line {name} breaks from point {point}"
+            found.append((text, ((names.index(name), k),), line.break_at, True))
+    for name, point_ in system.points.items():
+        if not isinstance(point_, FreePoint) and point_.break_at is not None:
+            ends = tuple((names.index(x), int(end == "end")) for x, end in system.lines_at(name))
+            found.append((f"point {name} gives way", ends, point_.break_at, False))
+    return tuple(
+        Weakness(text, ends, failure.time or np.inf, failure.tension or np.inf, leaves)
+        for text, ends, failure, leaves in found
+    )
+
+
+def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
+    """The system with the ends of a weakness loose, as far as they are at their point; the old one is as it was."""
+    ends = [at for at in weakness.ends if at not in model.loose]
+    points, loose = len(model.free), model.loose | (set(ends) if weakness.leaves else set())
+    joined = [model.joints[line][k] for line, k in ends]
+    if not ends or (0 <= joined[0] < points and sum(pair.count(joined[0]) for pair in model.joints) == len(ends)):
+        return replace(model, loose=loose)  # what is there is free already
+    joints = [[j if j < points else j + 1 for j in pair] for pair in model.joints]  # bodies come behind the points
+    for line, k in ends:
+        joints[line][k] = points
+    shape = model.models[ends[0][0]].start.r[-ends[0][1]]
+    return replace(
+        model, free=(*model.free, weakness.name), joints=tuple((a, b) for a, b in joints),
+        places=np.vstack([model.places, shape]), loose=loose,
+    )  # fmt: skip

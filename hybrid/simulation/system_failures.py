@@ -1,0 +1,79 @@
+"""Lines of a system that break in mid-motion: when, what goes on, and the event.
+
+Nothing is stored between a line that turns freely and its point, so no energy goes with it.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid.kernels.bodies import DONE, WORK
+from hybrid.kernels.report import FORCE_A
+from hybrid.model.failure import Weakness, after_failure, weaknesses
+
+if TYPE_CHECKING:
+    from hybrid.simulation.system_run import SystemRun
+
+SAME_TIME = 1e-6  # of a step: a time so near is now
+
+
+class Failures:
+    """What may break in a run, and what has."""
+
+    def __init__(self, run: SystemRun) -> None:
+        self._run = run
+        self.all = weaknesses(run.system)
+        self.broken: list[int] = []  # numbers in `all`, in the order in which they broke
+
+    @property
+    def times(self) -> list[float]:
+        """Times (s) at which something breaks by itself."""
+        return [x.time for k, x in enumerate(self.all) if np.isfinite(x.time) and k not in self.broken]
+
+    def due(self, step: float) -> bool:
+        """Break what is to break now, after a step; whether anything did.  step: s, the usual one."""
+        found = False
+        for k, x in enumerate(self.all):
+            if k in self.broken:
+                continue
+            if x.time <= self._run.t + SAME_TIME * step:
+                self._break(k, f"at t = {self._run.t:.6g} s (break_at.time)")
+                found = True
+            elif np.isfinite(x.tension) and (force := self._force(x)) > x.tension:
+                limit = f"above break_at.tension, {x.tension:g} N"
+                why = f"after the first step in which its force, {force:.6g} N, is {limit}"
+                self._break(k, why)
+                found = True
+        return found
+
+    def _force(self, x: Weakness) -> float:
+        """Force of the ends on their point, N."""
+        reports = [(self._run.solver.work[line].report, FORCE_A + 3 * k) for line, k in x.ends
+                   if (line, k) not in self._run.model.loose]  # fmt: skip
+        return float(np.linalg.norm(sum((r[f : f + 3] for r, f in reports), np.zeros(3))))
+
+    def again(self, broken: list[int]) -> None:
+        """Be as after what broke in an earlier part of the run.  ValueError: nothing of the kind may break."""
+        if not all(isinstance(k, int) and 0 <= k < len(self.all) for k in broken) or len(set(broken)) < len(broken):
+            raise ValueError("broken: numbers of what may break were expected")
+        for k in broken:
+            self._part(k)
+
+    def _break(self, k: int, why: str) -> None:
+        run, x = self._run, self.all[k]
+        self._part(k)
+        text = f"{x.name} {why}; what came loose is free from here on"
+        line, end = x.ends[0]
+        s = float(run.model.models[line].line.s[-end])
+        run.recorder.event(run.t, s, s, "end released", text, energy=0.0)
+
+    def _part(self, k: int) -> None:
+        """Take the ends off their point, in a solver of its own."""
+        run = self._run
+        run.model = after_failure(run.model, self.all[k])
+        self.broken.append(k)
+        done = run.solver.body_work[:, DONE:WORK].copy()
+        run.make_solver()
+        run.solver.body_work[:, DONE:WORK] = done

@@ -1,0 +1,152 @@
+"""Lines that break from a point, and points that give way, in mid-motion."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import Stopping, differences
+
+import hybrid
+from hybrid.errors import SceneError
+
+SECTION = {"length": 12.0, "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e5, "bending_stiffness": 20.0}
+
+
+def scene(lines: dict[str, Any] | None = None, points: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    """A weight on two lines."""
+    at = {
+        "left": {"position": [-8, 0, 0]}, "right": {"position": [8, 0, 0]},
+        "weight": {"initial_guess": [0, 0, -8], "mass": 30.0},
+    }  # fmt: skip
+    both = {"a": {"start": "left", "end": "weight"}, "b": {"start": "weight", "end": "right"}}
+    for name, line in both.items():
+        line.update({"sections": [SECTION], "mesh": {"cells": 12}, **(lines or {}).get(name, {})})  # type: ignore[arg-type]
+    for name, keys in (points or {}).items():
+        at[name].update(keys)  # type: ignore[attr-defined]
+    time = {"duration": 1.5, "step": 0.01}
+    return {"points": at, "lines": both, "time": time, "output": {"every": 0.05, "points": 13}} | more
+
+
+def masses() -> np.ndarray:
+    out = np.full(13, 2.0)
+    out[[0, -1]] *= 0.5
+    return out
+
+
+def test_a_line_that_breaks_from_its_anchor_leaves_what_it_carried_to_the_others() -> None:
+    """The weight swings on the line that is left; nothing pulls at the broken end, and the anchor stays."""
+    with hybrid.run(scene(lines={"b": {"break_at": {"time": 0.5}}})) as result:
+        event = next(x for x in result.events if x.kind == "end released")
+        assert event.t == 0.5 and "line b breaks from point right" in event.text and event.energy == 0.0
+        after = result.t > 0.5 + 1e-9
+        assert np.abs(result["points/right/force"][after]).max() == 0.0
+        assert result["points/right/position"][-1].tolist() == [8, 0, 0]
+        loose = result.lines["b"].position[-1, -1]
+        assert np.linalg.norm(loose - [8, 0, 0]) > 2.0
+        joint = result.lines["a"].position[:, -1] - result.lines["b"].position[:, 0]
+        assert np.abs(joint).max() < 1e-9
+
+
+@pytest.mark.parametrize("end", ["start", "end"])
+def test_lines_that_break_from_all_fall_as_bodies(end: str) -> None:
+    """Both come loose from both of their ends: the centre of mass is on the parabola of free fall."""
+    points = {"left": {"break_at": {"time": 0.3}}, "right": {"break_at": {"time": 0.3}}}
+    lines = {"b" if end == "start" else "a": {"break_at": {"time": 0.3, "end": end}}}
+    with hybrid.run(scene(lines, points)) as result:
+        t = result.t[result.t > 0.3 + 1e-9] - 0.3
+        name = next(iter(lines))
+        r = result.lines[name].position
+        centre = np.einsum("i,tik->tk", masses(), r) / masses().sum()
+        np.testing.assert_allclose(centre[7:, 2] - centre[6, 2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-5)
+        np.testing.assert_allclose(centre[7:, 0], centre[6, 0], rtol=0, atol=2e-5)
+        r = result.lines["a" if name == "b" else "b"].position
+        m = np.append(masses(), 30.0)
+        with_weight = np.concatenate([r, result["points/weight/position"][:, None]], axis=1)
+        centre = np.einsum("i,tik->tk", m, with_weight) / m.sum()
+        np.testing.assert_allclose(centre[7:, 2] - centre[6, 2], -0.5 * 9.81 * t**2, rtol=0, atol=2e-5)
+
+
+def test_a_line_breaks_after_the_step_in_which_its_force_is_too_large() -> None:
+    with hybrid.run(scene()) as still:
+        pull = float(np.linalg.norm(still["points/right/force"][0]))
+    moves = {"right": {"motion": {"heave": {"amplitude": 0.5, "period": 0.6}, "ramp": 0.6}}}
+    with hybrid.run(scene({"b": {"break_at": {"tension": 1.5 * pull}}}, moves, output={"every": 0.01})) as result:
+        event = next(x for x in result.events if x.kind == "end released")
+        force = np.linalg.norm(result["points/right/force"], axis=1)
+        before = result.t < event.t - 1e-9
+        assert 0.1 < event.t < 1.4 and force[before].max() <= 1.5 * pull and force[~before].max() < 1e-6
+        moved = result["points/right/position"][-1] - [8, 0, 0]  # the support goes on moving
+        assert moved[2] == pytest.approx(0.5 * np.sin(2 * np.pi * 1.5 / 0.6), abs=1e-9)
+
+
+def test_energy_after_a_break_is_kept_to_second_order() -> None:
+    lost = []
+    for step in (0.01, 0.0025):
+        made = scene({"b": {"break_at": {"time": 0.5}}}, time={"duration": 1.5, "step": step})
+        with hybrid.run(made) as result:
+            lost.append(max(float(np.abs(line.work["scheme"]).max()) for line in result.lines.values()))
+    assert lost[1] < 0.4 * lost[0] < 0.02 * 30 * 9.81 * 5, lost
+
+
+def test_a_mooring_of_a_body_breaks() -> None:
+    """A body on two lines keeps the momentum that the other line gives it, and its fairlead goes on with it."""
+    bodies = {"float": {"initial_guess": [0, 0, -8], "mass": 40.0, "inertia": [4.0, 4.0, 4.0]}}
+    points = {
+        "left": {"position": [-8, 0, 0]}, "right": {"position": [8, 0, 0]},
+        "port": {"body": "float", "place": [-0.3, 0, 0.2], "break_at": {"time": 0.5}},
+        "starboard": {"body": "float", "place": [0.3, 0, 0.2]},
+    }  # fmt: skip
+    lines = {
+        "a": {"start": "left", "end": "port", "sections": [SECTION], "mesh": {"cells": 12}},
+        "b": {"start": "starboard", "end": "right", "sections": [SECTION], "mesh": {"cells": 12},
+              "break_at": {"time": 0.8, "end": "start"}},
+    }  # fmt: skip
+    time = {"duration": 1.2, "step": 0.01}
+    made = {"points": points, "bodies": bodies, "lines": lines, "time": time}
+    with hybrid.run(made) as result:
+        force = result["bodies/float/force"]
+        assert np.abs(force[result.t > 0.8 + 1e-9]).max() < 1e-9
+        v = result["bodies/float/velocity"]
+        fall = v[-1, 2] - v[np.argmin(np.abs(result.t - 0.9)), 2]
+        assert fall == pytest.approx(-9.81 * (result.t[-1] - 0.9), abs=1e-9)
+        arm = result["points/starboard/position"][-1] - result["bodies/float/position"][-1]
+        assert np.linalg.norm(arm) == pytest.approx(np.hypot(0.3, 0.2), abs=1e-9)
+        assert [x.t for x in result.events if x.kind == "end released"] == [0.5, 0.8]
+
+
+def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Stopped before the break, between two breaks and after both."""
+    monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)
+    stopping = Stopping(monkeypatch)
+    points = {"left": {"break_at": {"time": 0.8}}}
+    made, whole, path = scene({"b": {"break_at": {"time": 0.5}}}, points), tmp_path / "whole.h5", tmp_path / "run.h5"
+    hybrid.run(made, whole, progress=stopping).close()
+    for k, stop in enumerate([40, 20, 30, -1]):
+        stopping.left = stop
+        try:
+            (hybrid.resume(path, progress=stopping) if k else hybrid.run(made, path, progress=stopping)).close()
+            break
+        except KeyboardInterrupt:
+            pass
+    assert k == 3
+    assert differences(whole, path) == []
+
+
+@pytest.mark.parametrize(
+    ("lines", "points", "words"),
+    [
+        ({"a": {"break_at": {}}}, {}, "time or tension"),
+        ({"a": {"break_at": {"time": 2.0}}}, {}, "before the end"),
+        ({}, {"left": {"break_at": {"time": 2.0}}}, "before the end"),
+        ({"a": {"break_at": {"time": 1.0}}, "b": {"break_at": {"time": 1.0, "end": "start"}}}, {}, "carries what is left"),
+        ({}, {"weight": {"break_at": {"time": 1.0}}}, "break_at"),
+    ],
+)  # fmt: skip
+def test_what_cannot_break_is_refused(lines: dict[str, Any], points: dict[str, Any], words: str) -> None:
+    with pytest.raises(SceneError) as refused:
+        hybrid.run(scene(lines, points))
+    assert words in str(refused.value)
