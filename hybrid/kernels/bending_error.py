@@ -328,7 +328,7 @@ def solve_error(job, state, old, history, s, moving):
 
 
 @inner
-def put_error(job, old, new, history, s, dt, moving):
+def put_error(job, state, old, new, history, s, dt, moving):
     """The error `new` after the step from its unknowns; how many nodes were clipped, and the node that was furthest."""
     arrays, x = job.arrays, job.arrays.x
     clipped, where, far = 0, -1, 0.0
@@ -349,7 +349,7 @@ def put_error(job, old, new, history, s, dt, moving):
             else:
                 new[1, i, k], new[2, i, k], new[3, i, k] = 0.0, 0.0, 0.0
         if moving and job.line.bits & FRICTION:
-            carry_travel(job.sea, job.new.r, arrays.slid, history.travel, old, new, i)
+            carry_travel(job.sea, state.r, arrays.slid, history.travel, old, new, i)
     return clipped, where
 
 
@@ -398,7 +398,7 @@ def advance_error(table):
     history = History(work[0], work[1], work[2], old[0], arrays.slid, work[3], arrays.powers)
     found[FINITE], found[CLIPPED] = 1, 0
     if solve_error(job, state, old, history, s, moving):
-        found[CLIPPED], found[FURTHEST] = put_error(job, old, new, history, s, dt, moving)
+        found[CLIPPED], found[FURTHEST] = put_error(job, state, old, new, history, s, dt, moving)
         found[CURRENT] = 1 - found[CURRENT]
     else:
         found[FINITE], found[FURTHEST] = 0, -1

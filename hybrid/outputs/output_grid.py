@@ -83,11 +83,11 @@ class Grid:
 
     def __init__(
         self, nodes_s: Floats, zones: Sequence[Zone], s: Floats, loads: Sequence[float] = (),
-        changes: Sequence[float] = (), after: bool = False,
+        changes: Sequence[float] = (), after: bool = False, kept: Sequence[float] = (),
     ) -> None:  # fmt: skip
         """loads: arc lengths, m, that cut the line, as of `stretches`; changes: those of them where one section ends
 
-        and the next begins; after: a point on a cut shows the side after it.
+        and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts.
         """
         self.s = s = np.require(s, float, ("C", "W"))  # so that kernels have one signature
         nodes_s = np.require(nodes_s, float, ("C", "W"))
@@ -99,7 +99,7 @@ class Grid:
         self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
         self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
 
-        self._x = nodes_s
+        self._x, self._cuts, self._kept = nodes_s, cuts, frozenset(kept)
         self._stretch = np.searchsorted(bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1], s)
         self._first, self._last = cuts[self._stretch], cuts[self._stretch + 1]  # nodes of the stretch of each point
 
@@ -124,10 +124,19 @@ class Grid:
 
     @cached_property
     def held(self) -> Rows:
-        """Columns: start, cells, end; next to an end its value takes part."""
+        """Columns: start, cells, end; next to an end its value takes part.
+
+        In a stretch of one cell the values beside it take part, but across point loads: tension goes on at a joint.
+        """
         x, middles = self._x, self._middles
-        start = np.where(self.s < middles[0], 0, self._first + 1)
-        end = np.where(self.s > middles[-1], x.size, self._last)
+        start, end = self._first + 1, self._last.copy()
+        single = start == end
+        loads = np.array([x for x in self.loads if x not in self._kept])
+        goes_on = np.array([not (np.abs(x[k] - loads) < 1e-9 * x[-1]).any() for k in self._cuts])
+        start -= single & goes_on[self._stretch]
+        end += single & goes_on[self._stretch + 1]
+        start[self.s < middles[0]] = 0
+        end[self.s > middles[-1]] = x.size
         return _linear(np.concatenate([x[:1], middles, x[-1:]]), self.s, start, end)
 
     @cached_property

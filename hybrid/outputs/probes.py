@@ -192,6 +192,8 @@ class Observer:
         """
         self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
+        near = NEAR * line.s[-1]
+        self._unloaded = tuple(x for x in jumps if all(abs(x - y) > near for y in loads))
         self.jumps = np.array(jumps, float)
         self._place(line, sea, zones, s)
         has = {"torsion"} if line.torsion.size and not line.bits & PLANAR else set()
@@ -264,8 +266,8 @@ class Observer:
         self.s, jumps, length = s, self.jumps, line.s[-1]
         if s[-1] > length * (1.0 + NEAR):  # what is on the reel has the values of the fairlead
             s, jumps = np.minimum(s, length), np.minimum(jumps, length)
-        self.grid = Grid(line.s, zones, s, self._cuts, self._changes)
-        self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, after=True)
+        self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded)
+        self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded)
 
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:

@@ -14,6 +14,7 @@ import threading
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -24,6 +25,7 @@ from hybrid.model.model_costs import NAMED, REST, ModelChoice, with_model
 from hybrid.model.resolution import (
     Resolution,
     first_resolution,
+    follows_curvature,
     is_irregular,
     mesh_is_free,
     model_is_free,
@@ -243,7 +245,8 @@ def _compute(
         else:
             choice, resolution = _surveyed(case, resolution) if remaining is None else (NAMED, resolution)
             control = _controller(case, _replacing(target, first, refinement), choice)
-            go_on = partial(control.start, resolution)
+            moves = isinstance(case.scene.model, AdaptiveModel) and not follows_curvature(case.scene)
+            go_on = partial(control.start, replace(resolution, follow=moves))
         try:
             result, errors = go_on()
             failed = control.model_misses

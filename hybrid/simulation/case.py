@@ -244,7 +244,9 @@ class Case:
             forces = np.column_stack([file[f"steps/{name}"][()] for name in FORCES])
         values, model_error = split_outputs(found)
         notes: Notes = ()
-        catenary = np.zeros(0)
+        catenary, bound = np.zeros(0), 0.0
+        if run.switching is not None:
+            bound = resolution.zones * run.model.length
         if resolution.local is not None or run.switching is not None:
             with written_result(target) as result:
                 if resolution.local is not None:
@@ -252,7 +254,7 @@ class Case:
                 if run.switching is not None:
                     catenary = np.array([catenary_share(x) for x in result.zones])
         return RunSample(
-            resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, 0.0, notes, forces=forces,
+            resolution, values, cells, run.steps, cpu, 1, unresolved, model_error, bound, notes, forces=forces,
             catenary=catenary,
         )  # fmt: skip
 

@@ -210,7 +210,9 @@ class ErrorController:
     ) -> tuple[RunSample, RunSample | None, RunSample | None] | None:
         """The runs to compare with; None: the first has failed."""
         found: list[RunSample | None] = [None, None, None]
-        coarser = [replace(x, follow=k == 0) for k, x in enumerate(comparison_resolutions(resolution, self.moves))]
+        follows = not resolution.follow  # else the result itself knows what neglected bending does
+        each = comparison_resolutions(resolution, self.moves)
+        coarser = [replace(x, follow=follows and k == 0) for k, x in enumerate(each)]
         which = (0, 1, 2) if self.moves else (0, 2)  # without steps the second is the first
         samples = [partial(self.sample, coarser[k]) for k in which]
         with self.beside(samples) if self.beside is not None else nullcontext(samples) as runs:
@@ -262,7 +264,7 @@ class ErrorController:
             found = statistics_of(result, self._every)
             for name, of_statistic in self.statistics.items():
                 of_statistic.update(found[name])
-        if stricter:
+        if stricter and not resolution.follow:
             self._renew_model_errors(estimate, resolution)
 
     def _set_statistics(self, result: RunSample, *comparisons: RunSample | None) -> None:

@@ -8,6 +8,7 @@ docs/accuracy.md
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
+from dataclasses import replace
 from typing import Any, NamedTuple, Self
 
 import numpy as np
@@ -49,6 +50,8 @@ OTHER_SOLUTION, VISIBLE, SEVERAL = 0.75, 2e-3, "several equilibria"
 # A quantity that finer runs change by more than this part of what coarser ones did does not converge; unless it is by
 # less than a part of its largest value that nobody asks for.
 NOT_CONVERGED, NOTHING = 0.9, 0.005
+# The same of tension along the line in the first three runs: order 0.4.
+HARDLY_CONVERGES = 0.75
 # Ratio of step or cell lengths of two runs below which their difference does not show the effect of either.
 LEAST_RATIO = 1.1
 # Model errors beyond so many times what the criteria of zones let pass are not believed: a loose line drifts for ever.
@@ -121,7 +124,8 @@ class Estimate:
 
         None: it failed, or nothing moves.
         """
-        self.run, both = result, [name for name in result.values if name in coarse.values]
+        doubt = self._take(result)
+        both = [name for name in result.values if name in coarse.values]
         # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
         fall = {name: falls(name, result, coarse, coarsest) for name in both}
         self.falls = {name: found.mean for name, found in fall.items()}
@@ -130,6 +134,7 @@ class Estimate:
         self.changes = {name: (found.change, found.before) for name, found in fall.items()}
         self.start = start_change(result, coarse), start_change(coarse, coarsest)
         self.set_model_errors(coarse)
+        self.notes += doubt
         slower = rough is not None and coarse.steps > LEAST_RATIO * rough.steps
         self._coarse, self._rough = coarse, rough if slower else None
         self.by_step: dict[str, np.ndarray] | None = (
@@ -174,6 +179,12 @@ class Estimate:
             del self._coarse, self._rough
         return self.by_step, self.by_mesh
 
+    def _take(self, result: RunSample) -> Notes:
+        """Take over a result, without the model error that it knows of itself if that is implausible: what to say."""
+        doubtful = _implausible(result)
+        self.run = replace(result, model_error={}) if doubtful else result
+        return ((NOT_ESTIMATED, doubtful),) if doubtful else ()
+
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
         doubtful = _implausible(coarse)
@@ -195,7 +206,7 @@ class Estimate:
         its cells are so much shorter that it is another line.  Zones of coarse cells are rod where fine ones need not.
         """
         now, (cells, every, then) = self.run.catenary, self._model_of
-        if self.run.model_error or not now.any():
+        if self.run.resolution.follow or self.run.model_error or not now.any():
             return False
         if self.run.cells > LEAST_RATIO * COARSER * cells or not then.size:
             return True
@@ -205,7 +216,8 @@ class Estimate:
     def update(self, result: RunSample) -> None:
         """A finer run has become the result."""
         by_step, by_mesh = self._keep()
-        before, self.run = self.run, result
+        before = self.run
+        self.notes = tuple(dict.fromkeys((*self.notes, *self._take(result))))
         self.start = start_change(result, before), self.start[0]
         finer, shorter = result.cells / before.cells, result.steps / before.steps
         other_zones = result.resolution.zones != before.resolution.zones
@@ -227,14 +239,19 @@ class Estimate:
 
     @property
     def not_converged(self) -> dict[str, float]:
-        """Outputs whose last change was no smaller than that before, and how many times as large it was."""
+        """Outputs whose last change was no smaller than that before, and how many times as large it was.
+
+        Tension along the line also where the first three runs have shown that it hardly converges: friction of a bed
+        that holds here or there jumps, and finer cells alone show little of that.
+        """
         found = {}
         for name, (last, before) in self.changes.items():
             if name not in RIGHT and last > NOT_CONVERGED * before:
                 most = float(np.abs(np.asarray(self.run.values[name])).max(initial=0.0))
                 if last > NOTHING * most:
                     found[END_FORCES.get(name, name)] = last / before
-        return found
+        fall = self.falls.get("tension", np.nan)
+        return found | ({"tension": fall} if fall > HARDLY_CONVERGES else {})
 
     @property
     def several_equilibria(self) -> Notes:

@@ -23,6 +23,7 @@ MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
 MOST_FINER = 3.0
 # Factor on cells or steps where the error is met in parts and missed in total.
 A_LITTLE = 0.8
+END_FORCE = next(iter(END_FORCES.values()))
 
 
 class Free(NamedTuple):
@@ -90,7 +91,8 @@ def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -
     """Events of quantities that finer runs change as much as coarser ones did; found: by how many times as much."""
     texts: dict[str, list[str]] = {}
     for name, times in found.items():
-        kind = "error uncertain" if asked is None or asked.asks(name) else "not converged"
+        named = asked is None or asked.asks(name) or (name == "tension" and asked.asks(END_FORCE))
+        kind = "error uncertain" if named else "not converged"  # forces at the ends are that tension too
         texts.setdefault(kind, []).append(f"{name.replace('_', ' ')} ({times:.2g} times)")
     why = "finer cells and steps change as much as coarser ones did"
     end = "the error may be larger than its figure"

@@ -28,7 +28,9 @@ def line(x: Floats, y: Floats, at: float) -> Floats:
     return y[k - 1] + (y[k] - y[k - 1]) * (at - x[k - 1]) / (x[k] - x[k - 1])
 
 
-def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats, after: bool) -> dict[str, Floats]:
+def plain(
+    nodes: Floats, spans: list[tuple[int, int, int]], s: Floats, after: bool, loads: list[float]
+) -> dict[str, Floats]:
     """The matrices, as what interpolation makes of the values 1, 0, 0, ... and 0, 1, 0, ... and so on."""
     n, sides = nodes.size, sum(b - a + 1 for a, b, _ in spans)
     middles = 0.5 * (nodes[:-1] + nodes[1:])
@@ -45,6 +47,8 @@ def plain(nodes: Floats, spans: list[tuple[int, int, int]], s: Floats, after: bo
         rows["cells"].append(line(middles[a:b], np.eye(n - 1)[a:b], at))
         near_end = at < middles[0] or at > middles[-1]
         first, last = (0, n + 1) if near_end else (a + 1, b + 1)
+        if not near_end and last == first + 1:  # one cell: across joints, and to the ends of the line
+            first, last = first - (nodes[a] not in loads), last + (nodes[b] not in loads)
         rows["held"].append(line(with_ends[first:last], np.eye(n + 1)[first:last], at))
         rows["sides"].append(line(x, np.eye(sides)[offset : offset + x.size], at))
     return {name: np.array(x) for name, x in rows.items()}
@@ -72,7 +76,7 @@ def test_matrices_are_those_of_a_plain_interpolation(seed: int, after: bool) -> 
     assert [(part.s_a, part.s_b) for part in grid.parts] == [(nodes[a], nodes[b]) for a, b in pairwise(cuts)]
     assert grid.loads == tuple(loads)
     assert grid.s is s
-    for name, expected in plain(nodes, grid.spans, s, after).items():
+    for name, expected in plain(nodes, grid.spans, s, after, loads).items():
         matrix = getattr(grid, name)
         for a, b in pairwise(matrix.begin):
             assert (np.diff(matrix.columns[a:b]) > 0).all()

@@ -187,3 +187,12 @@ def test_curvature_jumps_with_the_stiffness_and_the_moment_does_not() -> None:
     assert after["bending_moment"] == pytest.approx(before["bending_moment"], rel=1e-9)
     assert stiff * before["curvature"] == pytest.approx(before["bending_moment"], rel=1e-6)
     assert soft * after["curvature"] == pytest.approx(after["bending_moment"], rel=1e-6)
+
+
+def test_tension_in_a_zone_of_one_cell_is_linear() -> None:
+    """Of the three zones the first and the third, which is between joints, have one cell: 40 N/m, not 0, along it."""
+    zones = [{"catenary": 2.0, "cells": 1}, {"rod": 3.0, "cells": 6}] * 2
+    data = chain(points=41) | {"model": {"kind": "zones", "zones": zones}}
+    data["cable"] = {"sections": [{"length": LENGTH, "mass": MASS, "axial_stiffness": 1e6, "bending_stiffness": 1.0}]}
+    found = hybrid.static(hybrid.validate_scene(data))
+    assert found.tension[0] == pytest.approx(MASS * G * (LENGTH - found.s), abs=1e-6 * MASS * G * LENGTH)

@@ -43,12 +43,41 @@ def tether(model, accuracy):
 def test_zones_of_a_coarser_run_do_not_hide_what_those_of_the_result_leave_out():
     """The runs to compare with are all rod, the result is not: 0.26 where their model error was believed."""
     truth = hybrid.run(tether("rod", "0.1%"))
-    result = hybrid.run(tether("adaptive", "1%"))
+    result = hybrid.run(tether("adaptive", "2%"))
     kinds = {zone.kind for row in result.zones for zone in row}
     assert kinds == {"rod", "catenary"}
     assert SHARP[0] <= effectivity(result, truth) <= SHARP[1]
-    assert 0.6 <= effectivity(result, truth, "tension") <= SHARP[1]
+    assert SHARP[0] <= effectivity(result, truth, "tension") <= SHARP[1]
     assert result.errors["model/position"].max() > 0.5 * result.errors["total/position"].max()
+
+
+def test_zones_that_change_are_those_of_the_result():
+    """Zones come and go with the tension; in a coarser run they did so at other times: 0.44 for the force at the start.
+
+    What leaving bending out does is followed along the result itself.
+    """
+    scene = {
+        "environment": {"fluid": {"density": 1025, "current": [0.0178539, -0.0125168, 0]}},
+        "cable": {"sections": [{
+            "length": 28.0759, "mass": 2.02593, "diameter": 0.0293229, "bending_stiffness": 25.9265,
+            "drag": {"normal": 1.2, "tangential": 0.05}, "added_mass": {"normal": 1.0},
+        }]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [24.6080, 0, 3.62212], "motion": {
+                "heave": {"amplitude": 0.997574, "period": 5.14669}, "surge": {"amplitude": 0.784406, "period": 6.6907},
+                "ramp": 10.2934,
+            }},
+        },
+        "initial": "equilibrium", "time": {"duration": 25.7335}, "output": {"every": 0.643336, "points": 51},
+    }  # fmt: skip
+    truth = hybrid.run(scene | {"model": "rod", "accuracy": "0.1%"})
+    result = hybrid.run(scene | {"model": "adaptive", "accuracy": "1%"})
+    for name in ("position", "tension", "curvature", "bending_moment"):
+        assert SHARP[0] <= effectivity(result, truth, name) <= SHARP[1], name
+    for end in ("start", "end"):
+        off = np.linalg.norm(np.array(result[f"reaction_{end}"]) - np.array(truth[f"reaction_{end}"]), axis=1).max()
+        assert SHARP[0] <= np.max(result.errors[f"total/end_force_{end}"]) / off <= SHARP[1], end
 
 
 @pytest.mark.parametrize("cells", [25, 100, 400])

@@ -15,6 +15,7 @@ import hybrid
 import hybrid.simulation.time_loop
 from hybrid.errors import OTHER_PROGRAM
 from hybrid.simulation import case, restore
+from hybrid.simulation.error_estimate import Estimate
 from hybrid.store import checkpoint, lock
 from hybrid.store import writer as record
 from hybrid.store.hdf5_file import opened
@@ -368,6 +369,7 @@ def test_a_change_that_is_stopped_has_the_errors_of_the_change(more, tmp_path, m
 
 def test_a_run_that_is_stopped_while_its_model_error_is_followed_again(tmp_path, monkeypatch):
     """After the result, where no accuracy is asked for: the result stands, and goes on to its error figure."""
+    monkeypatch.setattr(Estimate, "lacks_model_errors", lambda self: True)
     scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", ["output.errors=true", "time.duration=5"])
     stopping = Stopping(monkeypatch)
     hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
