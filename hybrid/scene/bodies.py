@@ -122,6 +122,9 @@ class FixedBody(Table):
     @model_validator(mode="after")
     def _fairleads_are_points(self) -> FixedBody:
         vessel = self.motion.vessel if self.motion is not None else None
+        if vessel is not None and vessel.rao is None:
+            expected = "nothing, because `file` is of the body itself: place of its origin and its rotation"
+            refuse([Finding(("motion", "vessel"), expected, "leave it out")])
         if vessel is not None and vessel.fairlead is not None:
             expected = "nothing, because lines end at points of kind fairlead"
             refuse([Finding(("motion", "vessel", "fairlead"), expected, "leave it out")])

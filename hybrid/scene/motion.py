@@ -19,9 +19,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.motion_file import RecordRefused, read_record, spline
+from hybrid.scene.motion_file import RecordRefused, spline
 from hybrid.scene.motion_tables import SHIFTS, TURNS, Harmonic, Motion, Vessel, smooth_step
-from hybrid.scene.rao_file import point_harmonics
+from hybrid.scene.rao_file import drift_harmonics, point_harmonics
+from hybrid.scene.vessel_record import motion_record
 
 Array = NDArray[np.float64]
 
@@ -77,7 +78,7 @@ class EndMotion:
         harmonics = {} if motion is None else motion.harmonics()
         self._shifts = _components(harmonics, SHIFTS, 1.0)
         self._turns = _components(harmonics, TURNS, math.pi / 180)
-        if motion is not None and motion.vessel is not None:
+        if motion is not None and motion.vessel is not None and motion.file is None:
             self._sail(motion.vessel, waves)
         self._carried = None
         if motion is not None and ((motion.velocity and any(motion.velocity)) or motion.travel is not None):
@@ -90,7 +91,7 @@ class EndMotion:
         self._turn_spline: Any = None
         if motion is not None and motion.file is not None:
             try:
-                record = read_record(motion.file)
+                record = motion_record(motion, self.base.tolist(), waves[2] if waves is not None else frame is not None)
             except RecordRefused as refused:
                 found = refused.finding
                 raise SceneError([Complaint("motion.file", found.given or "", found.expected, found.fix)]) from None
@@ -178,11 +179,14 @@ class EndMotion:
         if waves is None or not len(waves[0]):
             raise ValueError("a vessel needs waves to move in")
         components, ramp, turns = waves
+        assert vessel.rao is not None
         try:
             harmonics = point_harmonics(vessel.rao, components, np.array(vessel.origin), vessel.heading, self.base)
         except RecordRefused as refused:
             found = refused.finding
             raise SceneError([Complaint("motion.vessel.rao", found.given or "", found.expected, found.fix)]) from None
+        if vessel.drift is not None:
+            harmonics += drift_harmonics(vessel.drift, np.array(vessel.origin), vessel.heading, self.base)
         self._ramp = ramp
         self._shifts = [h for h in harmonics if h[0] < 3]
         self._turns = [(axis - 3, a, w, phase) for axis, a, w, phase in harmonics if axis >= 3 and turns]

@@ -100,11 +100,12 @@ def _harmonic_jump(motion: Motion) -> Iterator[Finding]:
 
 def _judged(end: End, motion: Motion, duration: float | None) -> tuple[Record | None, list[Finding]]:
     """A motion file, if it can be read, and what is wrong with it."""
-    from hybrid.scene.motion_file import RecordRefused, read_record
+    from hybrid.scene.motion_file import RecordRefused
     from hybrid.scene.motion_jumps import judge_record
+    from hybrid.scene.vessel_record import motion_record
 
     try:
-        record = read_record(motion.file or "")
+        record = motion_record(motion, end.held_position, end.held_tangent is not None)
     except RecordRefused as refused:
         return None, [refused.finding]
     if end.held_tangent is None and record.rotation is not None:
@@ -125,7 +126,8 @@ def _vessel(end: End, vessel: Vessel) -> Iterator[Finding]:
     from hybrid.scene.rao_file import read_rao
 
     try:
-        read_rao(vessel.rao)
+        if vessel.rao is not None:
+            read_rao(vessel.rao)
     except RecordRefused as refused:
         found = refused.finding
         yield Finding(("vessel", "rao"), found.expected, found.fix, found.given)
@@ -183,6 +185,9 @@ def _periods(here: Place, motion: Motion) -> Iterator[tuple[str, str, Harmonic]]
         for i, h in enumerate(harmonics):
             if h.amplitude:
                 yield dotted((*here, name, i) if listed else (*here, name)), name, h
+    drift = motion.vessel.drift if motion.vessel is not None else None
+    for name, harmonics in drift.harmonics().items() if drift is not None else ():
+        yield from ((dotted((*here, "vessel", "drift", name)), name, h) for h in harmonics if h.amplitude)
 
 
 def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float]:
@@ -195,12 +200,13 @@ def _all_periods(ends: Ends, environment: Environment | None) -> dict[str, float
 def shortest_period(ends: Ends, environment: Environment | None) -> float:
     """The shortest period, ramp or move of a scene, s; infinity if it names none."""
     times = list(_all_periods(ends, environment).values())
-    for _, _, motion in _motions(ends):
+    for _, end, motion in _motions(ends):
         times += [t for t in (motion.ramp, motion.travel.over if motion.travel else None) if t]
         if motion.file is not None:
-            from hybrid.scene.motion_file import read_record, shortest_in
+            from hybrid.scene.motion_file import shortest_in
+            from hybrid.scene.vessel_record import motion_record
 
-            times.append(shortest_in(read_record(motion.file)))
+            times.append(shortest_in(motion_record(motion, end.held_position, end.held_tangent is not None)))
     return min(times, default=math.inf)
 
 

@@ -19,8 +19,10 @@ from hybrid.scene.base import Finding
 
 Array = NDArray[np.float64]
 
-SHIFT_COLUMNS, ROTATION_COLUMNS = ("x", "y", "z"), ("rx", "ry", "rz")
-COLUMNS = "t,x,y,z or t,rx,ry,rz or t,x,y,z,rx,ry,rz"
+SHIFT_COLUMNS, ROTATION_COLUMNS, ANGLE_COLUMNS = ("x", "y", "z"), ("rx", "ry", "rz"), ("roll", "pitch", "yaw")
+COLUMNS = "t,x,y,z or t,rx,ry,rz or t,roll,pitch,yaw, or t,x,y,z with rx,ry,rz or roll,pitch,yaw"
+# deg, by which an angle may change from row to row: more could be a turn the other way.
+LARGEST_CHANGE = 90.0
 
 # Bytes: twelve hours of seven columns at 100 Hz take 400 MB, and 12 samples a period of any sea a hundredth of that.
 LARGEST_FILE = 200_000_000
@@ -119,7 +121,28 @@ def read_record(path: str | Path) -> Record:
 
     shift, shift_unit = columns(SHIFT_COLUMNS)
     rotation, rotation_unit = columns(ROTATION_COLUMNS)
+    if rotation is None and "yaw" in header:
+        angles, rotation_unit = columns(ANGLE_COLUMNS)
+        assert angles is not None
+        rotation = _unwound(name, angles, list(numbers))
     return Record(times, shift, rotation, shift_unit, rotation_unit, name)
+
+
+def _unwound(name: str, angles: Array, lines: list[int]) -> Array:
+    """Rotation vectors (n, 3) deg of roll, pitch and yaw (n, 3) deg, which may jump by full turns where they wrap."""
+    from hybrid.scene.angles import continuous, matrices_of, vectors_of
+
+    smooth = np.unwrap(angles, axis=0, period=360.0)
+    for k, column in np.argwhere(np.abs(np.diff(smooth, axis=0)) > LARGEST_CHANGE)[:1]:
+        change = smooth[k + 1, column] - smooth[k, column]
+        given = f"{name}, line {lines[k + 1]}: {ANGLE_COLUMNS[column]} changes by {change:.4g} deg"
+        raise RecordRefused(f"angles that change by at most {LARGEST_CHANGE:g} deg", "sample more finely", given)
+    turned = np.degrees(continuous(vectors_of(matrices_of(np.radians(smooth)))))
+    for k in np.flatnonzero(np.abs(np.diff(turned, axis=0)).max(axis=1) > LARGEST_CHANGE)[:1]:
+        expected = "attitudes that come through a full turn about one axis only, or stay within one"
+        given = f"{name}, line {lines[k + 1]}: a full turn of an axis that is tilted"
+        raise RecordRefused(expected, "count the turn from another heading, or leave small roll and pitch out", given)
+    return turned
 
 
 def read_history(path: str | Path) -> tuple[tuple[float, float, float, float], ...]:
@@ -216,10 +239,11 @@ def _table(
 
 
 def _checked_header(name: str, header: list[str]) -> list[str]:
-    groups = [group for group in (SHIFT_COLUMNS, ROTATION_COLUMNS) if set(group) <= set(header)]
-    if "t" in header and groups and len(header) == 1 + sum(map(len, groups)):
+    groups = [group for group in (SHIFT_COLUMNS, ROTATION_COLUMNS, ANGLE_COLUMNS) if set(group) <= set(header)]
+    twice = ROTATION_COLUMNS in groups and ANGLE_COLUMNS in groups
+    if "t" in header and groups and not twice and len(header) == 1 + sum(map(len, groups)):
         return header
-    known = [c for c in ("t", *SHIFT_COLUMNS, *ROTATION_COLUMNS) if c in header]
+    known = [c for c in ("t", *SHIFT_COLUMNS, *ROTATION_COLUMNS, *ANGLE_COLUMNS) if c in header]
     given = f"{name} with {len(header)} columns, of which {', '.join(known) or 'none'} can be used"
     raise RecordRefused(f"columns {COLUMNS}", "name the columns in the first line of the file", given)
 

@@ -53,19 +53,45 @@ class Travel(Table):
     begin: NonNegative = Field(default=0.0, description="time at which it begins [s]")
 
 
+class Drift(Table):
+    """Slow motion of a vessel about where it stands, in its axes, each a harmonic or a list whose sum is meant.
+
+    To first order, as the RAO; it grows with the ramp of the waves.
+    """
+
+    surge: Harmonics | None = Field(default=None, description="along the bow")
+    sway: Harmonics | None = Field(default=None, description="to port")
+    heave: Harmonics | None = Field(default=None, description="up")
+    roll: Harmonics | None = Field(default=None, description="about the axis to the bow, which carries port up")
+    pitch: Harmonics | None = Field(default=None, description="about the axis to port, which carries the bow down")
+    yaw: Harmonics | None = Field(default=None, description="about the axis up, which carries the bow to port")
+
+    def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
+        """Those that are given, by name."""
+        named = {name: getattr(self, name) for name in (*SHIFTS, *TURNS)}
+        return {n: (x,) if isinstance(x, Harmonic) else x for n, x in named.items() if x is not None}
+
+
 class Vessel(Table):
     """A vessel that carries the end: it moves with the waves of the scene, to first order; it grows with their ramp."""
 
-    rao: Text = Field(
+    rao: Text | None = Field(
+        default=None,
         min_length=1,
         description="CSV file, relative to the scene file: a row for every frequency [rad/s] and heading [deg], the "
         "direction of the waves against that of the vessel (0: from astern, 180: from ahead); columns surge, sway, "
-        "heave (m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin)",
+        "heave (m/m), roll, pitch, yaw (deg/m), and surge_phase .. (deg behind the crest at the origin); or a dataset "
+        "of Capytaine in netCDF (.nc) with its RAO, or with what it follows from; absent: "
+        "the motion of the vessel is in `file` beside this table",
     )
-    origin: Vector = Field(description="point of the vessel that the RAO is for, at rest, inertial frame [m]")
+    origin: Vector = Field(
+        description="point of the vessel that the RAO is for, where it stands at its mean offset, inertial frame [m]"
+    )
     heading: Number = Field(
-        default=0.0, description="direction of its bow, counter-clockwise from the inertial x axis [deg]"
+        default=0.0,
+        description="direction of its bow at its mean offset, counter-clockwise from the inertial x axis [deg]",
     )
+    drift: Drift | None = Field(default=None, description="its slow motion beside that of the RAO; absent: none")
     fairlead: Vector | None = Field(
         default=None,
         description="the end in axes of the vessel from its origin (to the bow, to port, up); absent: it follows from "
@@ -106,8 +132,9 @@ class Motion(Table):
     file: Text | None = Field(
         default=None,
         min_length=1,
-        description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (s, m, degrees) in any order; relative to the "
-        "scene file; it starts at rest where the end is, or `ramp` blends it in",
+        description="CSV file with columns t,x,y,z and/or t,rx,ry,rz (rotation vector) or t,roll,pitch,yaw (s, m, "
+        "degrees) in any order; relative to the scene file; it starts at rest where the end is, or `ramp` blends it "
+        "in; with `vessel` it is of the vessel: place of its origin and its attitude, inertial",
     )
 
     def harmonics(self) -> dict[str, tuple[Harmonic, ...]]:
@@ -139,6 +166,17 @@ class Motion(Table):
     def _one_source(self) -> Motion:
         given = [*self.shifts(), *(name for name in TURNS if getattr(self, name) is not None)]
         ramped = [name for name in given if name not in ("travel", "follow", "vessel")]
+        if self.vessel is not None and self.file is not None:
+            extra: list[tuple[str, ...]] = [
+                ("vessel", name) for name in ("rao", "drift") if getattr(self.vessel, name) is not None
+            ]
+            extra += [(name,) for name in given if name != "vessel"]
+            fix = "put the whole motion of the vessel into the file, or leave file out"
+            refuse(Finding(x, "nothing, because file gives the motion of the vessel", fix) for x in extra)
+            return self
+        if self.vessel is not None and self.vessel.rao is None:
+            fix = "give rao, or `file` beside vessel with t,x,y,z,roll,pitch,yaw"
+            refuse([Finding(("vessel", "rao"), "a CSV file or a dataset of Capytaine", fix)])
         if self.vessel is not None:
             fix = "leave it out, or write all of the motion into a file; travel may move the vessel"
             beside = [name for name in given if name not in ("vessel", "travel")]

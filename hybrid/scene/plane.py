@@ -209,6 +209,7 @@ def _moved(motion: Motion, here: Place) -> Iterator[Witness]:
     if motion.vessel is not None:  # it may move and turn about any axis
         for axis in ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), UP):
             yield Witness((*here, "vessel"), "along", axis)
+        return
     if motion.file is not None:
         from hybrid.scene.motion_file import RecordRefused, read_record  # numpy, for scenes that need it
 

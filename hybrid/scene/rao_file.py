@@ -1,4 +1,5 @@
-"""Motion of a vessel in waves: a CSV table of amplitudes and phases (RAO), and the harmonics of a point of the vessel.
+"""Motion of a vessel in waves: amplitudes and phases (RAO, a CSV table or a dataset of Capytaine), and the harmonics of
+a point of the vessel.
 
     symbol   meaning                                                           unit
     A, w, k  amplitude, angular frequency, wave vector of a wave               m, 1/s, 1/m
@@ -21,7 +22,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.scene.motion_file import RecordRefused, check_file, read_table
-from hybrid.scene.motion_tables import SHIFTS, TURNS
+from hybrid.scene.motion_tables import SHIFTS, TURNS, Drift
+from hybrid.scene.rao_dataset import is_dataset, read_dataset
 
 FREEDOMS = (*SHIFTS, *TURNS)
 COLUMNS = ("frequency", "heading", *FREEDOMS, *(f"{name}_phase" for name in FREEDOMS))
@@ -40,6 +42,8 @@ def read_rao(path: str) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArr
 def _read(
     path: str, _changed: int, _size: int
 ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.complex128]]:
+    if is_dataset(path):
+        return read_dataset(path)
     name = Path(path).name
     header, table, lines = read_table(path, _checked_header)
     columns = {column: table[:, header.index(column)] for column in header}
@@ -113,6 +117,23 @@ def point_harmonics(
         for z, omega in zip(moved[:, axis].tolist(), w.tolist(), strict=True):
             if z != 0.0:
                 out.append((axis, abs(z), omega, math.atan2(z.imag, z.real) + 0.5 * math.pi))
+    return out
+
+
+def drift_harmonics(
+    drift: Drift, origin: NDArray[np.float64], heading: float, point: NDArray[np.float64]
+) -> list[tuple[int, float, float, float]]:
+    """Harmonics of a point of the vessel by its slow motion; arguments and result as of `point_harmonics`."""
+    c, s = math.cos(math.radians(heading)), math.sin(math.radians(heading))
+    axes, out = np.array([[c, s, 0.0], [-s, c, 0.0], [0.0, 0.0, 1.0]]), []
+    for name, listed in drift.harmonics().items():
+        axis = axes[FREEDOMS.index(name) % 3]
+        unit = np.concatenate([axis, np.zeros(3)])
+        if name in TURNS:
+            unit = math.radians(1.0) * np.concatenate([np.cross(axis, point - origin), axis])
+        for h in listed:
+            w, phase = 2.0 * math.pi / h.period, math.radians(h.phase)
+            out += [(k, h.amplitude * x, w, phase) for k, x in enumerate(unit.tolist()) if h.amplitude * x != 0.0]
     return out
 
 

@@ -95,7 +95,7 @@ def followed(environment: Environment, ends: Ends) -> Iterator[Finding]:
     sea = environment.fluid.waves if environment.fluid is not None else None
     for name, end in ends.named().items():
         motion = end.prescribed_motion
-        if motion is None or (motion.follow is None and motion.vessel is None):
+        if motion is None or (motion.follow is None and (motion.vessel is None or motion.vessel.rao is None)):
             continue
         if sea is None:
             fix, key = "give environment.fluid.waves, with a surface and a ramp", "follow"

@@ -9,8 +9,8 @@ import numpy as np
 
 from hybrid.kernels.state import State
 from hybrid.model.build import Model
-from hybrid.scene.motion_file import read_record
 from hybrid.scene.schema import Scene
+from hybrid.scene.vessel_record import motion_record
 from hybrid.simulation.events import EventLog
 
 AT_REST = 1e-9  # m, deg, m/s or deg/s, below which a record starts at rest
@@ -22,7 +22,7 @@ def note_blended(scene: Scene, events: EventLog) -> None:
         motion = end.prescribed_motion
         if motion is None or motion.file is None or motion.ramp is None:
             continue
-        record, parts = read_record(motion.file), []
+        record, parts = motion_record(motion, end.held_position, end.held_tangent is not None), []
         bases = (np.array(end.held_position or (0.0, 0.0, 0.0)), np.zeros(3))
         for values, base, units in ((record.shift, bases[0], "m"), (record.rotation, bases[1], "deg")):
             if values is None:
