@@ -144,7 +144,7 @@ class DomainManager:
         floor = tension_floor(cable.mean_bending, weight, scale)
         self.weightless = bool((floor < WEIGHTLESS * scale).any())
         # a torque needs rods from end to end: what the ends have been turned by is remembered while there are none
-        self.zones.counts[z.HOLDS_TWIST] = all(cable.held_twist) and all(cable.held_tangent)
+        self.zones.counts[z.HOLDS_TWIST] = cable.passes_torque
         self.set_layout(layout)
 
     # --- what the compiled run knows ----------------------------------------------------------------

@@ -269,6 +269,8 @@ def fill_spin(W, line, state, i, cell, here, there, ca, passed):
     )
     sp = (dot(d, (An[0], An[3], An[6])), dot(d, (An[1], An[4], An[7])), dot(d, (An[2], An[5], An[8])))
     soft = -LEAST_SPIN_STIFFNESS * (line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1])
+    if soft == 0.0:  # between swivels
+        soft = -LEAST_SPIN_STIFFNESS * (line.kb[i, 0] + line.kb[i + 1, 0])
     residual, inertia = along, 0.0
     if line.bits & ROTARY:
         residual -= line.polar[i] * state.wd[i]

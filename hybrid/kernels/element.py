@@ -11,12 +11,19 @@
 
 With dth = d x de/l + d dpsi the change of M is
     dM = A de_b + a dpsi_b - B de_a - b dpsi_a.
+
+A swivel is an element without torsional stiffness (kb[2] = 0) of a round, straight section.  It knows the directions of
+the cells alone, whatever their frames: M = kb (beta/sin beta) d_a x d_b, beta the angle between them, has no component
+along either.  (The log strain of a large twist would take part of it for bending.)
 """
 
 from __future__ import annotations
 
+import math
+
 from hybrid.kernels.compile import inner
 from hybrid.kernels.rotations import (
+    add,
     cross,
     d_double_cross,
     dot,
@@ -31,6 +38,8 @@ from hybrid.kernels.rotations import (
     mat_vec,
     mscale,
     msub,
+    outer,
+    project,
     scale,
     sub,
     vec_mat,
@@ -64,8 +73,70 @@ def columns_scaled(A, b):
 
 
 @inner
+def turns_freely(kb, k0):
+    """Whether an element is a swivel."""
+    return kb[2] == 0.0 and kb[0] == kb[1] and k0[0] == 0.0 and k0[1] == 0.0
+
+
+@inner
+def swing_functions(s, c):
+    """beta/sin beta and its derivative by cos beta."""
+    if s < 1e-3 and c > 0.0:
+        return 1.0 + s * s * (1.0 / 6.0 + 3.0 / 40.0 * s * s), -1.0 / 3.0 - 2.0 / 15.0 * s * s
+    s = max(s, 1e-12)
+    beta = math.atan2(s, c)
+    return beta / s, (beta * c - s) / (s * s * s)
+
+
+@inner
+def swing(Ra, Rb):
+    """Rotation (rad, inertial) that takes the direction of cell a to that of cell b, without twist."""
+    w = cross((Ra[2], Ra[5], Ra[8]), (Rb[2], Rb[5], Rb[8]))
+    return scale(swing_functions(math.sqrt(dot(w, w)), Ra[2] * Rb[2] + Ra[5] * Rb[5] + Ra[8] * Rb[8])[0], w)
+
+
+@inner
+def strain_of_element(Ra, Rb, kb, k0):
+    """Log strain (rad, frame Ra); of a swivel that of its bend alone."""
+    if turns_freely(kb, k0):
+        return vec_mat(swing(Ra, Rb), Ra)
+    return log_rotation(relative_rotation(Ra, Rb))
+
+
+@inner
+def swivel(Ra, Rb, stiffness):
+    """As `bending`, of a swivel of that stiffness, N m."""
+    a, b = (Ra[2], Ra[5], Ra[8]), (Rb[2], Rb[5], Rb[8])
+    w, c = cross(a, b), dot(a, b)
+    g, g1 = swing_functions(math.sqrt(dot(w, w)), c)
+    ga, gw = scale(-stiffness * g, b), scale(-stiffness * g1, w)
+    C = madd(outer(ga, a), outer(gw, w))
+    x = stiffness * g * c
+    return scale(stiffness * g, w), (C[0] + x, C[1], C[2], C[3], C[4] + x, C[5], C[6], C[7], C[8] + x)
+
+
+@inner
+def damped_swivel(Ra, Rb, stiffness, tau, wa, wb):
+    """As `damped_bending`, of a swivel: about the mean of both directions nothing is damped."""
+    M, C = swivel(Ra, Rb, stiffness)
+    b, k = (Rb[2], Rb[5], Rb[8]), tau * stiffness
+    t = (Ra[2] + b[0], Ra[5] + b[1], Ra[8] + b[2])
+    size = 1.0 / math.sqrt(max(dot(t, t), 1e-24))
+    t, y = scale(size, t), sub(wb, wa)
+    along = dot(t, y)
+    across = sub(y, scale(along, t))
+    # dt = H dth_b, H = -(1 - t t)[b]x/|d_a + d_b|
+    P = project(t)
+    H = mat_hat(P, b)
+    C = madd(C, mscale(k * size, madd(mscale(along, H), outer(t, vec_mat(y, H)))))
+    return add(M, scale(k, across)), C, mscale(k, P), k * dot(across, across)
+
+
+@inner
 def bending(Ra, Rb, kb, k0):
     """Moment M and C, where dM = C (dth_b - dth_a) + dth_a x M."""
+    if turns_freely(kb, k0):
+        return swivel(Ra, Rb, kb[0])
     k = log_rotation(relative_rotation(Ra, Rb))
     g, g1 = jacobian_functions(dot(k, k))
     P = inverse_left_jacobian(k, g)
@@ -87,6 +158,8 @@ def damped_bending(Ra, Rb, kb, k0, tau, wa, wb):
     dM = C (dth_b - dth_a) + dth_a x M + Cd (dw_b - dw_a - dth_a x (w_b - w_a)),
     and the power that the damping takes out (W, positive).
     """
+    if turns_freely(kb, k0):
+        return damped_swivel(Ra, Rb, kb[0], tau, wa, wb)
     k = log_rotation(relative_rotation(Ra, Rb))
     g, g1 = jacobian_functions(dot(k, k))
     P = inverse_left_jacobian(k, g)

@@ -5,9 +5,9 @@ from __future__ import annotations
 from hybrid.kernels.assembly import get3, get9
 from hybrid.kernels.cell import chord, turning
 from hybrid.kernels.compile import kernel
-from hybrid.kernels.element import bending, damped_bending, relative_rotation
+from hybrid.kernels.element import bending, damped_bending, strain_of_element
 from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.rotations import add, cross, dot, frame, log_rotation, scale, sub
+from hybrid.kernels.rotations import add, cross, dot, frame, scale, sub
 
 
 @kernel
@@ -56,7 +56,7 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
             d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
             wb = add(cross(d, d1), scale(w[i], d))
         kb, k0 = get3(line.kb, i), get3(line.k0, i)
-        k = log_rotation(relative_rotation(Ra, Rb))
+        k = strain_of_element(Ra, Rb, kb, k0)
         x = sub(k, k0)
         energy[1] += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
         energy[2] += 0.5 * kb[2] * x[2] * x[2]

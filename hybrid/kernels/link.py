@@ -253,6 +253,8 @@ def count_link(line, ends, r, e, a1, turn, seen, blocks, out):
 
 def holds_twist(line: Line) -> bool:
     """Whether both ends hold the twist of a line, through all of its zones."""
+    if not line.kb[line.element == 1, 2].all():  # a swivel
+        return False
     first, last = line.element[[0, -1]].astype(bool) & (line.kb[[0, -1], 2] > 0.0)
     if not line.spin.all():
         zones = np.count_nonzero(np.diff(np.concatenate([[1], line.spin])) < 0)

@@ -7,9 +7,10 @@ import math
 from hybrid.kernels.assembly import get9
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.element import relative_rotation
+from hybrid.kernels.element import strain_of_element
+from hybrid.kernels.node_forces import get3
 from hybrid.kernels.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
-from hybrid.kernels.rotations import frame, log_rotation
+from hybrid.kernels.rotations import frame
 
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
@@ -82,7 +83,7 @@ def sharpest_in_space(line, ends, e, T, a1, strains):
             weight = 2.0
             if T[c] > 0.0 and l * l * T[c] > stiffness:
                 weight = CLAMP * l * math.sqrt(T[c] / stiffness)
-        k = log_rotation(relative_rotation(Ra, Rb))
+        k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
         x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
         y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
         if strains.shape[0] > 0:

@@ -42,6 +42,7 @@ class Cable(NamedTuple):
     points: Floats  # (9, n+1)
     blank: Floats  # (9,) of nodes without a point
     load: NDArray[np.int8]  # (n+1,) 1 where there is one
+    turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
 
 
@@ -50,7 +51,7 @@ def blank_cable(n: int) -> Cable:
     z = np.zeros
     return Cable(
         z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z((n, 3)), z((n, 3)), z(n),
-        z(n), z((9, n + 1)), z(9), z(n + 1, np.int8), z((2, 2), np.int8),
+        z(n), z((9, n + 1)), z(9), z(n + 1, np.int8), z(n + 1, np.int8), z((2, 2), np.int8),
     )  # fmt: skip
 
 
@@ -145,6 +146,8 @@ def fill_elements(cable, of, line):
                 ja, jb = of[i - 1], of[i]
                 line.kb[i, k] = 1.0 / (a / cable.B[ja, k] + b / cable.B[jb, k])
                 line.k0[i, k] = a * cable.kappa[ja, k] + b * cable.kappa[jb, k]
+        if inside and of[i] != of[i - 1] and cable.turns[of[i]]:
+            line.kb[i, 2] = 0.0
     for end in range(2):
         node, cell = (n, n - 1) if end else (0, 0)
         if line.spin[cell] and cable.held[end, 0]:

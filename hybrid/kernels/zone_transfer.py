@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.element import turns_freely
 from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
@@ -329,10 +330,18 @@ def carried(a, d, to):
 
 
 @inner
+def is_swivel(line, i):
+    """Whether both sides of node i turn freely against each other."""
+    return line.element[i] and turns_freely(get3(line.kb, i), get3(line.k0, i))
+
+
+@inner
 def beside(job, c, k):
     """Director and tangent of what is beyond the fresh rod that begins (k = 0) or ends (1) at cell c; whether it is."""
     out, target = job.out, job.target
     to = c - 1 if k == 0 else c + 1
+    if is_swivel(target, c + k):
+        return (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), NOTHING
     if 0 <= to < target.h.shape[0]:
         if target.spin[to]:
             return get3(out.a1, to), direction(out, to), CARRIED
@@ -377,7 +386,8 @@ def make_frames(job, p, q):
 def carry_spins(job, p, q):
     """Rates of spin of the fresh rod cells p to q (excluded): between those of the rods beside them."""
     out, target = job.out, job.target
-    left, right = p > 0 and target.spin[p - 1], q < target.h.shape[0] and target.spin[q]
+    left = p > 0 and target.spin[p - 1] and not is_swivel(target, p)
+    right = q < target.h.shape[0] and target.spin[q] and not is_swivel(target, q)
     if not left and not right:
         return
     a, b = (p - 1 if left else q), (q if right else p - 1)
@@ -398,7 +408,7 @@ def carry_frames(job):
     p = 0
     while p < m:
         q = p
-        while q < m and is_fresh(job, q):
+        while q < m and is_fresh(job, q) and not (q > p and is_swivel(target, q)):
             q += 1
         if q > p:
             make_frames(job, p, q)

@@ -276,7 +276,7 @@ def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
     given = [[load.value for load in end.loads if load.what == "moment"] for end in scene.ends.both]
     takes = [end.holds_twist or bool(loads) or resists for end, loads in zip(scene.ends.both, given, strict=True)]
     moments = given[0] * takes[1] + given[1] * takes[0]
-    if scene.dimension == 2 or not (twisted or moments):
+    if scene.dimension == 2 or cable.swivels.size or not (twisted or moments):
         return np.zeros(s.size)
     give = 1.0 / cable.B[:, 2]
     torque = twisted / float(give @ np.diff(cable.bounds)) + sum(float(np.linalg.norm(x)) for x in moments)

@@ -20,7 +20,7 @@ from hybrid.model.resolution import (
     wants_survey,
 )
 from hybrid.model.sea import current_table
-from hybrid.model.sections import weight
+from hybrid.model.sections import swivels, weight
 from hybrid.scene.schema import AdaptiveModel, Scene
 
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
@@ -133,6 +133,9 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
     yield Entry("bending that differs in two directions", differ, "sections[].bending_stiffness of two numbers")
     curled = any(x.intrinsic_curvature is not None and any(x.intrinsic_curvature) for x in sections)
     yield Entry("curvature without load", curled, "sections[].intrinsic_curvature")
+    free = swivels(scene)
+    if free:
+        yield Entry(f"swivels: {len(free)}", True, "cable.attachments of kind swivel: no torque passes")
     attached = len(scene.cable.attachments) + len(scene.ends.bodies())
     yield Entry(f"attachments: {attached}", attached > 0, "cable.attachments, ends of kind body")
 

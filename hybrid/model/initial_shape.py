@@ -14,6 +14,7 @@ from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
 from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
+from hybrid.model.sections import swivels
 from hybrid.scene.motion import EndMotion
 from hybrid.scene.schema import Body, Equilibrium, Points, RodZone, Scene, Straight, ZonesModel
 
@@ -252,7 +253,11 @@ def ends_and_frames(scene: Scene, e: Floats, line: Line, around: Surroundings) -
         n = l.size
         part = np.concatenate([[0.0], (np.cumsum(l) - 0.5 * l) / l.sum(), [1.0]])
         rod = line.spin == 1
-        if not (rod.all() or line.torsion.size):
+        turning = [i for i in np.searchsorted(line.s, np.array(swivels(scene)) - 1e-9 * line.s[-1]) if line.element[i]]
+        if turning:  # what lies beyond the last swivel takes it
+            part = np.ones(n + 2)
+            part[: turning[-1] + 1] = 0.0
+        elif not (rod.all() or line.torsion.size):
             part = np.ones(n + 2)  # the rod at the end takes it; joints let the rest be
             part[: n - int(np.argmin(rod[::-1])) + 1] = 0.0
         whole = part if start.fixes_frame else np.ones(n + 2)  # the whole line takes the end's orientation

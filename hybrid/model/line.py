@@ -42,6 +42,7 @@ def line_on(
         footing[:] = 0.0
         footing[place[: material.footing.size]] = material.footing
     element, kb, k0, hn = _elements(material, h, rod, of)
+    kb[material.swivel_nodes(s), 2] = 0.0
     half = 0.5 * h
     torsion = torsion_zones(material, h, rod, of)
     return Line(
@@ -61,8 +62,7 @@ def spins_freely(material: Material) -> bool:
     Where no torque passes from end to end, a rod between joints turns freely about its chords, and the damping of its
     bend turns it: at once by half a turn where the bend goes through zero and nothing has inertia.
     """
-    passes = all(material.held_twist) and all(material.held_tangent)
-    return not passes and bool(material.bits & STIFFNESS_DAMPING) and bool(material.polar.any())
+    return not material.passes_torque and bool(material.bits & STIFFNESS_DAMPING) and bool(material.polar.any())
 
 
 def with_spin_inertia(line: Line, material: Material) -> Line:
@@ -112,7 +112,7 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
     the zone's: from the frame in its middle.
     """
     GJ = material.B[of, 2]
-    if rod.all() or not (all(material.held_twist) and all(material.held_tangent)):
+    if rod.all() or not material.passes_torque:
         return NO_TORSION
     rows = []
     edges = np.flatnonzero(np.diff(np.concatenate([[0], ~rod, [0]])))

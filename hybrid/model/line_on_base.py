@@ -31,17 +31,26 @@ class LineOnBase:
         per_length = {name: np.ascontiguousarray(getattr(material, name)[of]) for name in PER_LENGTH}
         polar = material.polar[of] if spins_freely(material) else np.full(of.size, np.nan)
         place = material.point_nodes(base)
-        load = np.zeros(base.size, np.int8)
+        load, turns = np.zeros(base.size, np.int8), np.zeros(base.size, np.int8)
+        turns[material.swivel_nodes(base)] = 1
         load[place] = 1
         self._points, self._place, self._material = np.zeros((9, base.size)), place, material
         held = np.array([material.held_tangent, material.held_twist], np.int8).T.copy()
         EI, w = material.mean_bending[of], np.abs(material.submerged_weight[of])
         self._cable = Cable(
-            **per_length, polar=polar, EI=EI, w=w, points=self._points, blank=np.zeros(9), load=load, held=held
+            **per_length,
+            polar=polar,
+            EI=EI,
+            w=w,
+            points=self._points,
+            blank=np.zeros(9),
+            load=load,
+            turns=turns,
+            held=held,
         )
         self._line_job, self._kinds_job = Table(blank_line_job()), Table(blank_kinds_job())
         self._bits, self._of = -1, of
-        self._holds_twist = bool(held.all())
+        self._passes_torque = material.passes_torque
 
     @property
     def cable(self) -> Cable:
@@ -53,7 +62,7 @@ class LineOnBase:
         if bits != self._bits:
             self._fill_points(bits)
         torsion = NO_TORSION
-        if self._holds_twist:
+        if self._passes_torque:
             torsion = torsion_zones(
                 self._material, np.diff(layout.nodes), layout.rod_cells, self._of[layout.base_of_cell]
             )

@@ -20,6 +20,7 @@ from hybrid.model.sections import (
     merged_sections,
     modules_of,
     rotary_inertia,
+    swivels,
     torsional_stiffness,
 )
 from hybrid.scene.schema import Scene, Section
@@ -56,12 +57,18 @@ class Material:
     diameter: Floats  # (K,) m, of the displaced volume
     outer_diameter: Floats  # (K,) m, as given for the sections; 0 where none is
     bits: int  # optional forces that are on wherever the line is; rods may ask for more
+    swivels: Floats  # arc lengths at which both sides turn freely against each other
     held_tangent: tuple[bool, bool]  # whether an element sits at the ends of a rod
     held_twist: tuple[bool, bool]  # and resists twist
     at: Floats  # (P,) m, where points are
     lift: Floats  # (P,) N, constant force upwards of each
     footing: Floats  # (P,) m, cable that presses on the seabed as much as each; empty without a seabed
     points: dict[str, Floats] = field(default_factory=dict)  # POINT -> (P,)
+
+    @property
+    def passes_torque(self) -> bool:
+        """Whether both ends hold the twist, and nothing between them lets it go."""
+        return all(self.held_twist) and all(self.held_tangent) and not self.swivels.size
 
     @property
     def mean_bending(self) -> Floats:
@@ -85,6 +92,10 @@ class Material:
     def piece(self, s: Floats) -> np.ndarray:
         """Piece that each of the arc lengths s (m) lies in."""
         return np.clip(np.searchsorted(self.bounds, s) - 1, 0, self.mass.size - 1)
+
+    def swivel_nodes(self, s: Floats) -> np.ndarray:
+        """Of nodes at s (N+1,) m, those of swivels."""
+        return np.searchsorted(s, self.swivels - 1e-9 * s[-1])
 
     def point_nodes(self, s: Floats) -> np.ndarray:
         """Of nodes at s (N+1,) m, those (P,) where points are."""
@@ -146,6 +157,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         polar=np.array([rotary_inertia(x)[1] for x in of]),
         damp=nothing, tau=nothing, drag_n=nothing, drag_t=nothing, added_n=nothing, added_t=nothing,
         buoy=nothing, displaced=nothing, diameter=nothing, bits=0,
+        swivels=np.array(swivels(scene), float),
         outer_diameter=np.array([x.diameter or 0.0 for x in of]),
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
         held_twist=(start.holds_twist, end.holds_twist),

@@ -188,7 +188,7 @@ def _plan(scene: Scene) -> Plan:
 def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:
     """Of the elastic catenary that a search of equilibrium starts from."""
     cable, line, T = model.cable, model.line, model.start.T
-    if not (all(cable.held_twist) and model.start_shape == HUNG and T.min() > 0.0):
+    if not (cable.passes_torque and model.start_shape == HUNG and T.min() > 0.0):
         return None
     middle = 0.5 * (line.s[:-1] + line.s[1:])
     EI = cable.weakest_bending[cable.piece(middle)]

@@ -7,7 +7,7 @@ from itertools import accumulate
 
 import numpy as np
 
-from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section
+from hybrid.scene.schema import Body, Clump, Damping, Float, Modules, Scene, Section, Swivel
 
 # Limits that a section may have and that only reports ask for: unit, what it is, the stricter one of two.
 SECTION_LIMITS: dict[str, tuple[str, str, np.ufunc]] = {
@@ -108,7 +108,7 @@ def weight(section: Section, scene: Scene) -> float:
     return float((section.mass - displaced) * scene.environment.gravity)
 
 
-def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Body]]:
+def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Swivel | Body]]:
     """Everything that sits at a point of the line, with its arc length, m: floats, clumps, bodies at the ends."""
     for x in scene.cable.attachments:
         if not isinstance(x, Modules):
@@ -116,6 +116,11 @@ def attachments_at(scene: Scene) -> Iterator[tuple[float, Float | Clump | Body]]
     for at, end in ((0.0, scene.ends.start), (scene.length, scene.ends.end)):
         if isinstance(end, Body):
             yield at, end
+
+
+def swivels(scene: Scene) -> list[float]:
+    """Arc lengths, m, at which the cable turns freely about itself."""
+    return sorted(x.at for x in scene.cable.attachments if isinstance(x, Swivel))
 
 
 def modules_of(scene: Scene) -> Iterator[Modules]:
@@ -130,7 +135,7 @@ def attached_weights(scene: Scene) -> list[float]:
     fluid, gravity = scene.environment.fluid, scene.environment.gravity
     density = fluid.density if fluid else 0.0
 
-    def sinks(x: Float | Clump | Modules | Body) -> float:
+    def sinks(x: Float | Clump | Swivel | Modules | Body) -> float:
         return gravity * (x.mass - (density * x.volume_in(density, gravity) if fluid else 0.0))
 
     points = [sinks(x) for _, x in attachments_at(scene)]

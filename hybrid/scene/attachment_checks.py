@@ -4,17 +4,21 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from itertools import accumulate
 
-from hybrid.scene.attachments import Clump, Float, Modules, sphere_diameter
+from hybrid.scene.analysis import Model
+from hybrid.scene.attachments import Clump, Float, Modules, Swivel, sphere_diameter
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import USUAL_DENSITIES, Cable, Environment
 from hybrid.scene.ends import Body, Ends
 from hybrid.scene.start_checks import SAME_LENGTH
 
+Hung = Float | Clump | Swivel | Modules | Body
+
 # Mean densities (mass over displaced volume).  The least is a part of the density of the fluid, because a float in the
 # air is lighter than air: in sea water 8.2 kg/m^3, which an inflated lift bag exceeds (10), and 51 for a clump, which
 # is to weigh on the cable.  The most, in kg/m^3, is more than that of any metal (osmium, 22 600).
-LEAST_PART: dict[str, float] = {"float": 0.008, "modules": 0.008, "body": 0.008, "clump": 0.05}
+LEAST_PART: dict[str, float] = {"float": 0.008, "modules": 0.008, "body": 0.008, "clump": 0.05, "swivel": 0.05}
 DENSEST = 25_000.0
 FOAM_TO_WATER = (20.0, 1000.0)  # kg/m^3, to which a corrected unit of what floats should lead
 # Slips of units: the key, the factor that corrects it, and what its value is then taken for.
@@ -37,11 +41,38 @@ def attachments_on_cable(cable: Cable) -> Iterator[Finding]:
             yield Finding(("cable", "attachments", i, *place), expected, fix)
 
 
+def swivels_turn(cable: Cable, ends: Ends, model: Model, dimension: int | None) -> Iterator[Finding]:
+    """Swivels where nothing turns about the cable, or where the material axes of both sides would matter."""
+    bounds = list(accumulate(section.length for section in cable.sections))
+    near = SAME_LENGTH * cable.length
+    for i, item in enumerate(cable.attachments):
+        if not isinstance(item, Swivel):
+            continue
+        here: Place = ("cable", "attachments", i)
+        if abs(item.at - cable.length) <= near:
+            expected = f"an arc length inside the cable, less than {cable.length:.8g} m"
+            yield Finding((*here, "at"), expected, "at an end write ends.end.swivel: true (kind clamped)")
+        if dimension == 2:
+            expected = "no swivel, because in a plane (dimension: 2) nothing turns about the cable"
+            yield Finding((*here, "kind"), expected, "leave it out, or leave dimension out", "swivel")
+        for k, section in enumerate(cable.sections):
+            begin = bounds[k] - section.length
+            curled = section.intrinsic_curvature is not None and any(section.intrinsic_curvature[:2])
+            if begin - near <= item.at <= bounds[k] + near and (section.anisotropic or curled):
+                why = "bending_stiffness of two numbers" if section.anisotropic else "intrinsic_curvature"
+                expected = f"sections alike in all directions beside a swivel; cable.sections[{k}] has {why}"
+                yield Finding((*here, "at"), expected, "put a short section with one bending_stiffness around it")
+        for name, end in ends.named().items():
+            if end.held_turns:
+                expected = f"no swivel, because ends.{name}.turns twists the cable, and a swivel lets it turn back"
+                yield Finding((*here, "kind"), expected, f"leave it out, or leave ends.{name}.turns out", "swivel")
+
+
 def attachments_in_fluid(environment: Environment, cable: Cable) -> Iterator[Finding]:
     """Attachments that need a fluid and have none, or that do in it what their kind does not say."""
     for i, item in enumerate(cable.attachments):
         here: Place = ("cable", "attachments", i)
-        if isinstance(item, Clump):
+        if isinstance(item, Clump | Swivel):
             yield from _needs_fluid(here, item, environment)
         elif environment.fluid is None:
             fix = f"{_WATER}; what only weighs is kind: clump"
@@ -74,7 +105,7 @@ def bodies_in_fluid(environment: Environment, ends: Ends) -> Iterator[Finding]:
         yield from _needs_fluid(("ends", name), body, environment)
 
 
-def _needs_fluid(here: Place, item: Clump | Body, environment: Environment) -> Iterator[Finding]:
+def _needs_fluid(here: Place, item: Clump | Swivel | Body, environment: Environment) -> Iterator[Finding]:
     if environment.fluid is not None:
         return
     names = {"volume": "buoyancy", "drag_area": "drag", "added_mass": "added mass", "height": "height under water"}
@@ -91,9 +122,7 @@ def densities(environment: Environment, cable: Cable, ends: Ends) -> Iterator[Fi
     fluid = environment.fluid
     if fluid is None:
         return
-    named: list[tuple[Place, Float | Clump | Modules | Body]] = [
-        (("cable", "attachments", i), item) for i, item in enumerate(cable.attachments)
-    ]
+    named: list[tuple[Place, Hung]] = [(("cable", "attachments", i), item) for i, item in enumerate(cable.attachments)]
     named += [(("ends", name), body) for name, body in ends.bodies().items()]
     for here, item in named:
         if environment.gravity == 0.0 and getattr(item, "buoyancy", None) is not None:
@@ -105,7 +134,7 @@ def densities(environment: Environment, cable: Cable, ends: Ends) -> Iterator[Fi
             yield from _size(here, item, volume, cable.length)
 
 
-def _density(here: Place, item: Float | Clump | Modules | Body, volume: float, fluid: float) -> Iterator[Finding]:
+def _density(here: Place, item: Hung, volume: float, fluid: float) -> Iterator[Finding]:
     density, least, most = item.mass / volume, LEAST_PART[item.kind] * fluid, DENSEST
     lift = getattr(item, "buoyancy", None)
     if density >= least and (density <= most or lift is not None):
@@ -119,7 +148,7 @@ def _density(here: Place, item: Float | Clump | Modules | Body, volume: float, f
     yield Finding((*here, "mass"), expected, _other_units(item, density))
 
 
-def _other_units(item: Float | Clump | Modules | Body, density: float) -> str:
+def _other_units(item: Hung, density: float) -> str:
     """The units from which an impossible density, kg/m^3, may come, and what to write instead."""
     per = "/m" if isinstance(item, Modules) else ""
     least, most = FOAM_TO_WATER if isinstance(item, Float | Modules) else USUAL_DENSITIES
@@ -134,7 +163,7 @@ def _other_units(item: Float | Clump | Modules | Body, density: float) -> str:
     return "; or ".join(found) or f"check mass ({units['mass']}) and {'volume' if item.volume else 'buoyancy'}"
 
 
-def _size(here: Place, item: Float | Clump | Modules | Body, volume: float, length: float) -> Iterator[Finding]:
+def _size(here: Place, item: Hung, volume: float, length: float) -> Iterator[Finding]:
     """What has a volume alone, or a mass alone and so at least the volume of the densest metal."""
     given = volume > 0.0
     least = volume if given else item.mass / DENSEST

@@ -1,4 +1,4 @@
-"""What hangs on the cable: floats and clumps at points, modules over stretches."""
+"""What hangs on the cable or sits in it: floats, clumps and swivels at points, modules over stretches."""
 
 from __future__ import annotations
 
@@ -91,6 +91,29 @@ class Clump(Table):
         return self.height if self.height is not None else sphere_diameter(self.volume)
 
 
+class Swivel(Table):
+    """A joint at a point of the cable that passes force and bending moment, and no torque."""
+
+    kind: Literal["swivel"] = Field(
+        default="swivel", description="lets both sides of the cable turn freely against each other about its axis"
+    )
+    at: Positive = Field(description="arc length s, its position on the cable, between the ends [m]")
+    mass: NonNegative = Field(default=0.0, description="mass in air, its weight over gravity [kg]")
+    volume: NonNegative = Field(default=0.0, description="displaced volume, for its buoyancy [m^3]")
+    drag_area: NonNegative = Field(default=0.0, description=DRAG_AREA)
+    added_mass: NonNegative = Field(default=0.0, description=ADDED_MASS)
+    height: Positive | None = Field(default=None, description=HEIGHT)
+    shape: Shape = Field(default="sphere", description=SHAPE)
+
+    def volume_in(self, density: float, gravity: float) -> float:
+        """Displaced volume [m^3], whatever the fluid."""
+        return self.volume
+
+    def height_in(self, density: float, gravity: float) -> float:
+        """Vertical extent [m]."""
+        return self.height if self.height is not None else sphere_diameter(self.volume)
+
+
 class Modules(Table):
     """Buoyancy modules, fairings or ballast, spread evenly over a stretch; everything per metre of cable."""
 
@@ -141,7 +164,10 @@ def _either(attachment: Float | Modules) -> None:
 
 
 Attachment = Annotated[
-    Annotated[Float, Tag("<float>")] | Annotated[Clump, Tag("<clump>")] | Annotated[Modules, Tag("<modules>")],
+    Annotated[Float, Tag("<float>")]
+    | Annotated[Clump, Tag("<clump>")]
+    | Annotated[Swivel, Tag("<swivel>")]
+    | Annotated[Modules, Tag("<modules>")],
     Discriminator(by_kind),
-    Kinds(("float", "clump", "modules"), usual=("float",)),
+    Kinds(("float", "clump", "swivel", "modules"), usual=("float",)),
 ]

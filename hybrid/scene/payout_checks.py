@@ -49,7 +49,7 @@ def payout_at_the_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
 
 
 def payout_stands_alone(
-    ends: Ends, model: Model, contact: Contact, solver: str, resolution: Resolution | None
+    ends: Ends, cable: Cable, model: Model, contact: Contact, solver: str, resolution: Resolution | None
 ) -> Iterator[Finding]:
     """Of zones that stay, without contact with itself, by elimination."""
     if not _payout(ends.end):
@@ -58,6 +58,10 @@ def payout_stands_alone(
     if moving or (isinstance(model, ZonesModel) and any(isinstance(x, CorrectedZone) for x in model.zones)):
         expected = "catenary, rod, or zones of both that stay, because line is paid out (ends.end.payout)"
         yield Finding(("model",), expected, "write `model: catenary`, or `model: rod`", f"kind: {model.kind}")
+    for i, item in enumerate(cable.attachments):
+        if item.kind == "swivel":
+            expected = "no swivel, because line is paid out (ends.end.payout)"
+            yield Finding(("cable", "attachments", i, "kind"), expected, "leave it out: a pinned end turns freely")
     if contact.self:
         yield Finding(("contact", "self"), "false, because line is paid out (ends.end.payout)", LEAVE_OUT)
     if solver == "shooting":

@@ -153,7 +153,7 @@ def net_weight(environment: Environment, cable: Cable, ends: Ends) -> tuple[floa
         if density > 0.0 and gravity > 0.0:  # without, attachments that float are refused elsewhere
             length = item.range[1] - item.range[0] if item.kind == "modules" else 1.0
             masses.append((item.mass * length, item.volume_in(density, gravity) * length))
-        elif item.kind == "clump":
+        elif item.kind in ("clump", "swivel"):
             masses.append((item.mass, item.volume))
     masses += [(body.mass, body.volume) for body in ends.bodies().values()]
     down = [gravity * mass for mass, _ in masses]

@@ -86,7 +86,7 @@ def _follow_ends(model: Model, torque: Floats) -> None:
     cable, line = model.cable, model.line
     of = cable.piece(0.5 * (line.s[:-1] + line.s[1:]))
     stiffness = cable.B[of, 2]
-    held = all(cable.held_twist) and all(cable.held_tangent) and bool((stiffness > 0.0).all())
+    held = cable.passes_torque and bool((stiffness > 0.0).all())
     if held and not line.spin.all():
         torque[COMPLIANCE] = np.sum(line.h / stiffness)
         torque[FREE_TURN] = line.h @ cable.kappa[of, 2]

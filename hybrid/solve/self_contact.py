@@ -61,7 +61,11 @@ class SelfContact:
         contact.mass[:] = line.mass / pieces
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
         contact.numbers[SINCE], contact.numbers[NARROWEST] = np.nan, contact.width.min()
-        holds_twist = line.spin.all() and bool((line.element * line.kb[:, 2])[[0, -1]].any())
+        holds_twist = (
+            line.spin.all()
+            and bool((line.element * line.kb[:, 2])[[0, -1]].any())
+            and bool(line.kb[line.element == 1, 2].all())
+        )
         contact.numbers[ROLLS] = float(bool(line.bits & ROTARY) or holds_twist)
         self.contact = contact
         self._middles = 0.5 * (line.s[1:] + line.s[:-1])

@@ -12,6 +12,7 @@ import pytest
 
 from hybrid.kernels.block_elimination import SIZE, WIDTH
 from hybrid.kernels.configuration import update
+from hybrid.kernels.energies import observe
 from hybrid.kernels.entry import assembly, block_rows, correction, workspace
 from hybrid.kernels.forces import (
     ADDED_MASS,
@@ -141,6 +142,40 @@ def test_jacobian_is_the_derivative_of_the_residual(zones, bits):
             soft = line.kb[i, 2] * line.element[i] + line.kb[i + 1, 2] * line.element[i + 1]
             exact[5 * i + 4, 5 * i + 4] += 1e-9 * soft
     assert np.abs(exact - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+@pytest.mark.parametrize("bits", [0, STIFFNESS_DAMPING, LAND])
+@pytest.mark.parametrize("where", [0, 3, N])
+def test_jacobian_of_swivels(where, bits):
+    """A swivel bends and passes no torque, whatever the frames; its derivative is exact."""
+    line, sea, ends, st = random_case(3, ZONES["rod"], bits)
+    line.kb[where] = [0.7, 0.7, 0.0]
+    line.k0[where] = 0.0
+    J, _ = assembled(line, sea, ends, st, np.zeros_like(st.r))
+    numeric, t = np.zeros_like(J), 1e-4
+    for j in range(J.shape[1]):
+        x = np.zeros(J.shape[1])
+        x[j] = t
+        f = [residual_at(line, sea, ends, st, (k * x).reshape(-1, 5)) for k in (-2, -1, 1, 2)]
+        numeric[:, j] = -(f[0] - 8 * f[1] + 8 * f[2] - f[3]) / (12 * t)
+    identity = [0, 5 * N + 4]
+    numeric[identity, identity] = 1.0
+    assert np.abs(J - numeric).max() < 1e-6 * np.abs(J).max()
+
+
+def test_a_swivel_passes_no_torque_however_its_sides_are_turned():
+    line, _, ends, st = random_case(3, ZONES["rod"], 0)
+    line.kb[3] = [0.7, 0.7, 0.0]
+    line.k0[3] = 0.0
+    M = np.zeros((2, N + 1, 3))
+    for turned in range(2):
+        d = st.e / np.linalg.norm(st.e, axis=1)[:, None]
+        observe(line, ends, st.e, st.v, st.a1, st.w, M[turned], np.zeros((N + 1, 3)), np.zeros(5))
+        assert abs(M[turned, 3] @ d[2]) < 1e-15 and abs(M[turned, 3] @ d[3]) < 1e-15
+        angle = np.arccos(d[2] @ d[3])
+        np.testing.assert_allclose(np.linalg.norm(M[turned, 3]), 0.7 * angle, rtol=1e-12)
+        st.a1[:3] = np.cross(d[:3], st.a1[:3])
+    np.testing.assert_allclose(M[0, 3], M[1, 3], atol=1e-15)
 
 
 @pytest.mark.parametrize("zones", ZONES)

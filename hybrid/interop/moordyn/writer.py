@@ -253,6 +253,10 @@ class _Writer:
         """What hangs on a line, by arc length; where sections meet, at just that."""
         found: dict[float, _Lump] = {}
         for i, item in enumerate(cable.attachments):
+            if item.kind == "swivel":
+                fix = "make it a clump: lines of a deck have no torque"
+                self._refuse(f"{where}[{i}]", "swivel", "a clump or a float, which a deck has as points", fix)
+                continue
             if item.kind == "modules":
                 fix = "give their mass, volume and drag to a section of that length"
                 self._refuse(f"{where}[{i}]", "modules", "a clump or a float, which a deck has as points", fix)
