@@ -62,6 +62,7 @@ class CableUnit:
         known = json.loads((self._folder / INTERFACE).read_text(encoding="utf-8"))
         self._cable: Simulation | None = None
         self._values: dict[str, Floats] = {}
+        self._recovered: Floats | None = None  # tension along the cable now
         self._refused = ""  # why a state could not be set
         self.output_file, self.inputs_at_begin = "", False
         self.author, self.description = "hybrid", f"cable {known['name']}: hybrid, Kirchhoff rods and catenaries"
@@ -140,11 +141,17 @@ class CableUnit:
         forces = cable.forces()
         return forces[k] if name == "force" else forces[2 + k]
 
+    def _tension(self) -> Floats:
+        """Tension along the cable, at the points of the result, as recovered once for a state."""
+        if self._recovered is None:
+            self._recovered = self.cable.tension()
+        return self._recovered
+
     def _tension_max(self) -> float:
-        return float(self.cable.state.tension.max())
+        return float(self._tension().max())
 
     def _tension_min(self) -> float:
-        return float(self.cable.state.tension.min())
+        return float(self._tension().min())
 
     # --- what a master calls ------------------------------------------------------------------------
 
@@ -153,6 +160,7 @@ class CableUnit:
 
     def do_step(self, current_time: float, step_size: float) -> Fmi3StepResult:
         """One communication step; `discard` where a shorter one may do (after a return to a saved state)."""
+        self._recovered = None
         try:
             if self._refused:
                 raise ValueError(self._refused)
@@ -200,6 +208,7 @@ class CableUnit:
         return {"cable": self.cable.save(), "values": values}
 
     def _set_fmu_state(self, state: dict[str, Any]) -> None:
+        self._recovered = None
         try:
             self.cable.restore(state["cable"])
         except ValueError as error:  # an exception here would end the master: the next step says it

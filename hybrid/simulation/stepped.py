@@ -9,10 +9,11 @@ from typing import Any, Concatenate, NamedTuple, ParamSpec, Protocol, TypeVar
 
 import numpy as np
 
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
 from hybrid.scene.schema import Scene
+from hybrid.simulation.time_loop import TimeLoop
 
 
 class CableState(NamedTuple):
@@ -101,3 +102,15 @@ def iterations_allowed(most: Any) -> int:
     if isinstance(most, bool) or not isinstance(most, int | np.integer) or most < 1:
         raise ValueError(f"most_iterations: expected a whole number of at least 1, found {most!r:.60}")
     return int(most)
+
+
+def tension_now(loop: TimeLoop) -> Floats:
+    """Tension (ns,) N at the points of the result, as it would be written now."""
+    run, model = loop.run, loop.run.model
+    books, observer = run.run.books, loop.observer.on(model.line, model.sea.values, model.zones)
+    batch = batch_of_one(run.t, model.ends.at(run.t), run.state, books.report[0], books.work[0], model.sea.at(run.t))
+    if run.payout is not None:
+        _, seen = next(iter(run.payout.looks(observer, model, batch)))
+    else:
+        seen = observer.look(batch)
+    return np.array(seen.tension[:, 0])

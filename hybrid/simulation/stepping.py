@@ -28,7 +28,7 @@ from hybrid.scene.schema import missing_time
 from hybrid.simulation.case import Case
 from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.first_use import compile_beside
-from hybrid.simulation.stepped import CableState, Saved, in_space, iterations_allowed, one_thread
+from hybrid.simulation.stepped import CableState, Saved, in_space, iterations_allowed, one_thread, tension_now
 from hybrid.simulation.stepped_ends import STILL, SteppedEnds
 from hybrid.simulation.transient import StepFailed
 from hybrid.store.hdf5_file import check_target
@@ -171,6 +171,15 @@ class Simulation(SteppedEnds):
         run = self._loop.run
         x = run.state
         return CableState(run.t, run.model.line.s.copy(), x.r.copy(), x.v.copy(), x.T.copy(), run.model.zones)
+
+    @one_thread
+    def tension(self) -> Floats:
+        """Tension (ns,) N now at the points of the result, recovered between cells and at the ends as written there.
+
+        `state.tension` is that of the cells, and costs less.
+        """
+        self._check_open()
+        return tension_now(self._loop)
 
     # --- back and forth ---------------------------------------------------------------------------
 

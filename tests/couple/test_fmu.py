@@ -232,3 +232,25 @@ def test_a_winch_is_an_input(tmp_path: Path) -> None:
             cable.setFloat64([number["payout_rate"]], [0.5 * (k + 1) / 40.0])
             step(cable, k)
         assert cable.getFloat64([number["length"]]) == pytest.approx([12.5])
+
+
+def test_tensions_are_those_of_the_result_ends_included(tmp_path: Path) -> None:
+    unit, file = hybrid.export_fmu(hybrid.parse_scene(SCENE), tmp_path / "line.fmu"), tmp_path / "run.h5"
+    found = []
+    with running(unit, tmp_path / "open", output_file=str(file)) as (cable, number):
+        saved = cable.getFMUState()
+        for height in (1e-4, 2e-4):  # the second from the state before
+            cable.setFMUState(saved)
+            cable.setFloat64([number["end.position.z"], number["end.velocity.z"]], [height, 0.0])
+            step(cable, 0)
+            found.append(cable.getFloat64([number["tension_max"], number["tension_min"]]))
+        cable.freeFMUState(saved)
+    with hybrid.Simulation(hybrid.parse_scene(SCENE + "output: {every: 0.05}")) as same:
+        same.set_end("end", [10, 0, 2e-4])
+        same.step()
+        cells = same.state.tension
+        expected = same.tension()
+        written = same.result().tension[1]
+    assert expected == pytest.approx(written, rel=1e-12)
+    assert found[1] == pytest.approx([written.max(), written.min()], rel=1e-9)
+    assert found[0] != found[1] and written.max() > cells.max()
