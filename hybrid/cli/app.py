@@ -151,12 +151,12 @@ def load_either(console: Console, path: Path, settings: list[str] | None) -> Sce
 
 @contextmanager
 def opened_line(result: Path, line: str | None) -> Iterator[tuple[Result, Path]]:
-    """A result, of several lines that of one, and the name of its file, by which others are called."""
+    """A result, of several lines the one named or all, and the name of its file, by which others are called."""
     from hybrid.errors import ResultError
 
     with hybrid.open(result) as whole:
         names = list(whole.lines)
-        if line is None and not names:
+        if line is None:
             yield whole, result
             return
         if line not in names:

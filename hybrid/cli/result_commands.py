@@ -81,7 +81,9 @@ def report(
         from hybrid.view.summary import facts_of
 
         page = hybrid.report(opened, output or result.with_suffix(".html"), overwrite=overwrite)
-        size, facts = page.stat().st_size, [fact._asdict() for fact in facts_of(opened)] if as_json else []
+        size, facts = page.stat().st_size, []
+        if as_json and not opened.lines:
+            facts = [fact._asdict() for fact in facts_of(opened)]
         console.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
 
 
@@ -124,12 +126,19 @@ def export(
 
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         target = output or beside(result, format)
-        made = hybrid.export(opened, target, format=format, names=names, times=times, at=at, overwrite=not keep)
-        for text in made.notes:
-            console.json("note", text=text)
-            console.note(f"note: {text}")
+        parts = {f".{name}": one for name, one in opened.lines.items()} or {"": opened}
+        all_made = []
+        for name, part in parts.items():  # of several lines each is a file of its own
+            stem, dot, rest = target.name.partition(".")
+            to = target.with_name(f"{stem}{name}{dot}{rest}")
+            made = hybrid.export(part, to, format=format, names=names, times=times, at=at, overwrite=not keep)
+            all_made.append(made)
+            for text in made.notes:
+                console.json("note", text=text, line=name.removeprefix("."))
+                console.note(f"note: {name.removeprefix('.')}{': ' if name else ''}{text}")
         status = "" if opened.status == "complete" else f"; {opened.status_text}"
-        console.done(made.text + status, *made.files, status=opened.status, notes=list(made.notes))
+        files, notes = [x for made in all_made for x in made.files], [x for made in all_made for x in made.notes]
+        console.done(all_made[0].text + status, *files, status=opened.status, notes=notes)
 
 
 def _deck(source: Path, target: Path, keep: bool, quiet: bool, as_json: bool) -> None:

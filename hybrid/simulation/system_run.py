@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import time as clock
 from collections.abc import Callable
 from contextlib import suppress
@@ -18,6 +19,7 @@ from hybrid.kernels.state import Floats, blank_state
 from hybrid.model.plan import output_times, parts
 from hybrid.model.resolution import first_resolution
 from hybrid.model.system import build_system
+from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
@@ -96,6 +98,9 @@ class SystemRun:
             "length": sum(x.length for x in self.model.models), "static_path": self.found.summary,
             "static_residual": self.found.residual,
         }  # fmt: skip
+        on_bodies = {x: point.body for x, point in self.system.points.items() if isinstance(point, Fairlead)}
+        if on_bodies:
+            attributes["fairleads"] = json.dumps(on_bodies)
         recorder = Recorder(
             self.target, grid_s=np.zeros(1), fields=fields_of(self.system), step_fields=(), attributes=attributes,
             texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, before={} if self.kept else None,

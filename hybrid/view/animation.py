@@ -18,8 +18,8 @@ from hybrid.store.reader import Result
 from hybrid.view.along import along
 from hybrid.view.decimate import even
 from hybrid.view.figure import Band, Item, Line, Panel
+from hybrid.view.headed_page import page_of
 from hybrid.view.panels import cable, framed, profiles, sea
-from hybrid.view.plots import page_of
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
@@ -104,6 +104,11 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int) -> It
     """Pixels (height, width, 4) of every frame."""
     from hybrid.view.matplotlib_backend import film
 
+    if result.lines:
+        from hybrid.view.system_views import film_page
+
+        page, shown = film_page(result, factor)
+        return film(page, shown, frames, dpi)
     views = dict(zip(("shape", "second"), views_of(result), strict=False))
     names, profile = list(views), _tension_range(result)
     panels = {name: _still(result, view) for name, view in views.items()} | {"tension": profile}

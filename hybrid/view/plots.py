@@ -13,6 +13,7 @@ import numpy as np
 
 from hybrid.store.reader import Result
 from hybrid.view.figure import Map, Page, Panel
+from hybrid.view.headed_page import page_of, refuse_several
 from hybrid.view.panels import history as over_time
 from hybrid.view.panels import profiles, shape, touchdown
 from hybrid.view.projections import (
@@ -25,8 +26,6 @@ from hybrid.view.projections import (
     whole_zones,
 )
 from hybrid.view.save import save_figure
-from hybrid.view.style import NEWS
-from hybrid.view.summary import warnings_of
 from hybrid.view.zones import counted, share_of_rod, zone_map
 
 if TYPE_CHECKING:
@@ -72,9 +71,16 @@ def plot_summary(
     which arc lengths to follow (m); else those recorded as `history`, else the middle and
     the ends that move. A static result shows curvature and tangent in place of histories; a
     cable that touches a seabed also shows the force of contact and, over time, where it does.
+    Of several lines all are drawn, with points and bodies; times and history are of one line, `result.lines[name]`.
     """
     from hybrid.view.matplotlib_backend import draw_page
 
+    if result.lines:
+        from hybrid.view.system_views import page
+
+        if times is not None or history is not None:
+            refuse_several(result, "times and history")
+        return save_figure(draw_page(page(result)), path, overwrite=overwrite)
     return save_figure(draw_page(_summary(result, times, history)), path, overwrite=overwrite)
 
 
@@ -87,6 +93,7 @@ def plot_zones(result: Result, path: str | Path | None = None, *, overwrite: boo
     """
     from hybrid.view.matplotlib_backend import draw_page
 
+    refuse_several(result, "zones along s")
     more: dict[str, Any] = {}
     if len(result.times):
         zones = zone_map(result)
@@ -125,26 +132,6 @@ def _summary(result: Result, times: Numbers | None, history: Numbers | None) -> 
     legend = ["s", "h"] if len(points) else ["s"]
     look = {"mosaic": mosaic, "widths": widths, "heights": heights, "legend": legend}
     return page_of(result, _facts(result, earlier), panels=panels, **look)
-
-
-def page_of(result: Result, facts: list[str], **more: Any) -> Page:
-    """A page about a result: title and facts above the panels, warnings below."""
-    n, complete = len(result.times), result.status == "complete"
-    head = [] if complete else [result.status_text]
-    if n:
-        span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
-        head.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
-    found = warnings_of(result)
-    alarms = [(event, count) for event, count in found if event.kind not in NEWS]
-    note = "; ".join(dict.fromkeys(event.text for event, _ in (alarms[:1] or found)))
-    if alarms:
-        names = ", ".join(event.kind + f" (× {count})" * (count > 1) for event, count in alarms)
-        note = f"Warning: {names}; at t = {alarms[0][0].t:.4g} s: {note}"
-    elif found:
-        note = f"Note: {note}"
-    texts = "; ".join(filter(None, [*head, *facts]))
-    empty = "" if n else "no output was saved"
-    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(alarms)), empty=empty, **more)
 
 
 def _facts(result: Result, earlier: np.ndarray) -> list[str]:

@@ -29,12 +29,7 @@ def scenery(result: Result, store: Store, shown: Kept) -> dict[str, Any]:
     if not len(shown.frames):
         return {}
     position = result.position
-    box = np.array([position.min(axis=(0, 1)), position.max(axis=(0, 1))])
-    planes = _planes(result, box)
-    extent = np.ptp(box, axis=0)
-    size = float(extent.max()) or 1.0
-    room = np.maximum(0.5 * (_THIN * size - extent), 0.03 * size)  # thin directions get some depth, others a margin
-    box += np.array([-room, room])
+    box, planes, far = box_and_planes(result)
     factors = np.maximum(_OPEN * np.ptp(box, axis=0).max() / np.ptp(box, axis=0), 1.0)
     rows = np.ix_(shown.frames, shown.points)
     frames = position[rows].transpose(2, 0, 1)
@@ -44,11 +39,23 @@ def scenery(result: Result, store: Store, shown: Kept) -> dict[str, Any]:
         **{axis: store.add(frames[k]) for k, axis in enumerate("xyz")},
         "colours": _colours(result, store, shown),
         "marks": _marks(result, store, shown),
-        "planes": [_plane(plane, box) for plane in planes],
-        "far": [plane["text"] for plane in planes if plane["far"]],
+        "planes": planes,
+        "far": far,
         "box": box.T.tolist(), "factors": factors.tolist(), "ink": INK,
         "speed": speed_of(result),
     }  # fmt: skip
+
+
+def box_and_planes(result: Result) -> tuple[np.ndarray, list[dict[str, Any]], list[str]]:
+    """The box (2, 3) m that is drawn, the planes in it, and texts on those that are far."""
+    position = result.position
+    box = np.array([position.min(axis=(0, 1)), position.max(axis=(0, 1))])
+    planes = _planes(result, box)
+    extent = np.ptp(box, axis=0)
+    size = float(extent.max()) or 1.0
+    room = np.maximum(0.5 * (_THIN * size - extent), 0.03 * size)  # thin directions get some depth, others a margin
+    box += np.array([-room, room])
+    return box, [_plane(plane, box) for plane in planes], [plane["text"] for plane in planes if plane["far"]]
 
 
 def speed_of(result: Result, seconds: float = 12.0) -> float:

@@ -51,6 +51,11 @@ def facts_of(result: Result) -> list[Fact]:
     return [*facts, _status(result)]
 
 
+def status_facts(result: Result) -> list[Fact]:
+    """Warnings, and how it ended: what is known of several lines together."""
+    return [*_warnings(result), _status(result)]
+
+
 def attention(facts: list[Fact]) -> list[Fact]:
     """What a reader has to know first: how it ended if not well, limits that are broken, warnings; else nothing."""
     alarms = [fact for fact in facts if fact.weight == "alarm"]

@@ -1,0 +1,39 @@
+"""A page about a result: its title and facts above, warnings below; what pages of several lines refuse."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from hybrid.errors import ResultError
+from hybrid.store.reader import Result
+from hybrid.view.figure import Page
+from hybrid.view.style import NEWS
+from hybrid.view.summary import warnings_of
+
+
+def page_of(result: Result, facts: list[str], **more: Any) -> Page:
+    """A page about a result: title and facts above the panels, warnings below."""
+    n, complete = len(result.times), result.status == "complete"
+    head = [] if complete else [result.status_text]
+    if n:
+        span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
+        head.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
+    found = warnings_of(result)
+    alarms = [(event, count) for event, count in found if event.kind not in NEWS]
+    note = "; ".join(dict.fromkeys(event.text for event, _ in (alarms[:1] or found)))
+    if alarms:
+        names = ", ".join(event.kind + f" (× {count})" * (count > 1) for event, count in alarms)
+        note = f"Warning: {names}; at t = {alarms[0][0].t:.4g} s: {note}"
+    elif found:
+        note = f"Note: {note}"
+    texts = "; ".join(filter(None, [*head, *facts]))
+    empty = "" if n else "no output was saved"
+    return Page(result.title or "(no title)", texts, note=note, alarm=(not complete, bool(alarms)), empty=empty, **more)
+
+
+def refuse_several(result: Result, what: str) -> None:
+    """ResultError where something of one line is asked of several."""
+    if result.lines:
+        name = next(iter(result.lines))
+        advice = f"result.lines['{name}'], or --line {name}"
+        raise ResultError(f"{what}: of one line, and the result is of {len(result.lines)}\n    try:      {advice}")

@@ -1,0 +1,260 @@
+"""The report of several lines: all of them in space, tables of lines, points and bodies, graphs, events, the scene."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import Any
+
+import numpy as np
+
+from hybrid.store.envelope import extreme
+from hybrid.store.reader import Result
+from hybrid.view import report_parts as parts
+from hybrid.view.decimate import Kept, Store, even, kept, script_json
+from hybrid.view.figure import Panel
+from hybrid.view.panels import ranges
+from hybrid.view.plotly_backend import colour_scale, figure_of
+from hybrid.view.projections import views_of
+from hybrid.view.save import REPORT_MARK
+from hybrid.view.scenery import box_and_planes, speed_of
+from hybrid.view.style import BODY, INK, prefix
+from hybrid.view.summary import Fact, amount, attention, facts_of, short, status_facts
+from hybrid.view.svg_backend import draw
+from hybrid.view.system_views import (
+    AllLines,
+    arms_of,
+    bodies_of,
+    colours,
+    facts_line,
+    fairleads_of,
+    largest_tensions,
+    motions,
+    points_of,
+    shape,
+)
+from hybrid.view.zones import COLOURS
+
+# Numbers of the moving picture, all lines together: frames times points, as of one cable.
+MOST_VALUES = 80_000
+# Extremes of each line in the table: quantity, bound, heading, unit.
+EXTREMES = (
+    ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),
+    ("curvature", "max", "largest curvature", "1/m"), ("bending_moment", "max", "largest bending moment", "N m"),
+)  # fmt: skip
+
+
+def html(result: Result) -> str:
+    """The page as text."""
+    store, facts = Store(), facts_of_all(result)
+    every = AllLines(result)
+    several = every.outputs > 1
+    shown = _kept(every)
+    scene = scenery(result, every, shown, store) if every.outputs else None
+    groups = _panels(result, every, shown)
+    figures = [figure_of(panel, store) for group in groups.values() for panel in group]
+    numbers = iter(range(len(figures)))
+    numbered = {name: [(next(numbers), panel) for panel in group] for name, group in groups.items()}
+    made = {
+        "title": escape(result.title or "(no title)"),
+        "subtitle": escape(_subtitle(result, every)),
+        "attention": parts.attention_html(attention(facts), several),
+        "facts": parts.facts_html([f for f in facts if f.weight != "alarm"], several) + _tables(result),
+        "cable": _space(result, every, scene, shown) if scene else "",
+        "figures": _graphs(numbered),
+        "events": parts.events_html(result, several),
+        "energy": "",
+        "settings": parts.settings_html(result),
+        "scene": escape(result.scene_text),
+        "footer": escape(parts.footer()),
+        "mark": REPORT_MARK,
+        "index": script_json({"scene": scene, "figures": figures}),
+    }
+    return parts.filled_page(made, store)
+
+
+def facts_of_all(result: Result) -> list[Fact]:
+    """What to know first: warnings with the names of lines, how the run ended, and limits of each line."""
+    facts = status_facts(result)
+    for name, line in result.lines.items():
+        for fact in facts_of(line) if len(line.times) else []:
+            if fact.key in ("limits", "errors") and fact.weight != "absent":
+                facts.append(fact._replace(title=f"{fact.title} of line {name}", key=f"{fact.key}-{name}"))
+    return facts
+
+
+def _subtitle(result: Result, every: AllLines) -> str:
+    n = every.outputs
+    outputs = f"{n} outputs to t = {every.times[-1]:.6g} s" if n > 1 else "static, one output" if n else "no output"
+    made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
+    computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
+    return "; ".join([outputs, *facts_line(result, every), computed])
+
+
+def _kept(every: AllLines) -> dict[str, Kept]:
+    """Frames, the same of all lines, and points of each, that the page shows."""
+    points = {name: kept(line).points for name, line in every.lines.items()}
+    total = sum(map(len, points.values()))
+    if total > MOST_VALUES // 50:  # so that at least some frames are left
+        part = MOST_VALUES // 50 / total
+        points = {name: p[even(len(p), max(5, int(part * len(p))))] for name, p in points.items()}
+        total = sum(map(len, points.values()))
+    frames = even(every.outputs, min(1000, max(2, MOST_VALUES // total)))
+    return {name: Kept(frames, p, every.outputs, len(every.lines[name].s)) for name, p in points.items()}
+
+
+# ---- tables ---------------------------------------------------------------------------------------
+
+
+def _tables(result: Result) -> str:
+    """Extremes of all lines, forces at points, and where bodies were."""
+    heads = [x for x in EXTREMES if any(extreme(line, x[0], x[1]) for line in result.lines.values())]
+    rows = []
+    for name, line in result.lines.items():
+        row = [name, f"{float(line.attributes.get('length', line.s[-1])):.6g} m"]
+        for quantity, bound, _, unit in heads:
+            found = extreme(line, quantity, bound)
+            where = f" at s = {found.s:.5g} m, t = {found.t:.5g} s" if found else ""
+            row.append(amount(found.value, unit) + where if found else "–")
+        rows.append(row)
+    out = "<h3>Lines: extremes of all steps</h3>"
+    out += parts.table_html(rows, ["line", "length", *(x[2] for x in heads)], numbers=len(heads) + 1)
+    if len(result.times):
+        out += _points(result) + _bodies(result)
+    return out
+
+
+def _largest(result: Result, name: str, unit: str) -> str:
+    sizes = np.linalg.norm(result[name], axis=1)
+    k = int(sizes.argmax())
+    vector = _vector(result[name][k] * prefix(unit, float(sizes[k]))[0], 4)
+    return f"{amount(float(sizes[k]), unit)} [{vector}] at t = {result.times[k]:.5g} s"
+
+
+def _points(result: Result) -> str:
+    rows = []
+    for name in points_of(result):
+        at, force = result[f"points/{name}/position"], f"points/{name}/force"
+        row = [name, fairleads_of(result).get(name, ""), _vector(at[-1]), _vector(np.ptp(at, axis=0))]
+        rows.append([*row, _largest(result, force, "N") if force in result else "–"])
+    head = ["point", "on body", "last place (m)", "range of motion (m)", "largest force of its lines"]
+    return "<h3>Points</h3>" + parts.table_html(rows, head, numbers=3)
+
+
+def _bodies(result: Result) -> str:
+    moved, loaded = [], []
+    for name in bodies_of(result):
+        at, turned = result[f"bodies/{name}/position"], result[f"bodies/{name}/rotation"]
+        moved.append([name, *(_vector(x) for y in (at, turned) for x in (y[-1], np.ptp(y, axis=0)))])
+        loads = (("force", "N"), ("moment", "N m"))
+        loaded.append([name, *(_largest(result, f"bodies/{name}/{key}", unit) for key, unit in loads)])
+    head = ["body", "last place (m)", "range (m)", "roll, pitch, yaw (deg)", "range (deg)"]
+    loads_head = ["body", "largest force of its lines", "largest moment of its lines about its origin"]
+    if not moved:
+        return ""
+    return "<h3>Bodies</h3>" + parts.table_html(moved, head, 4) + parts.table_html(loaded, loads_head, 2)
+
+
+def _vector(x: np.ndarray, digits: int = 5) -> str:
+    least = 1e-9 * float(np.abs(x).max(initial=0.0)) + 1e-9
+    return ", ".join(short(float(c), digits) if abs(c) > least else "0" for c in x)
+
+
+# ---- graphs ---------------------------------------------------------------------------------------
+
+
+def _panels(result: Result, every: AllLines, shown: dict[str, Kept]) -> dict[str, list[Panel]]:
+    if not every.outputs:
+        return {"histories": [], "ranges": []}
+    over = [largest_tensions(result, every), *motions(result, every)] if every.outputs > 1 else []
+    along = [
+        panel._replace(key=f"{panel.key}-{name}", title=f"line {name}: {panel.title}")
+        for name, line in every.lines.items()
+        for panel in ranges(line, shown[name])
+    ]
+    return {"histories": over, "ranges": along}
+
+
+def _graphs(groups: dict[str, list[tuple[int, Panel]]]) -> str:
+    out = ""
+    heads = {"histories": "Over time", "ranges": "Along the lines"}
+    texts = {"histories": "Click a graph to set the time.",
+             "ranges": "Lowest, mean and highest of all outputs, and now: the time of the slider."}  # fmt: skip
+    for name, figures in groups.items():
+        if figures:
+            drawn = "".join(parts.figure_html(k, panel) for k, panel in figures)
+            out += f'<section id="{name}"><h2>{heads[name]}</h2><p class="quiet">{texts[name]}</p>'
+            out += f'<div class="grid">{drawn}</div></section>'
+    return out
+
+
+# ---- in space -------------------------------------------------------------------------------------
+
+
+def scenery(result: Result, every: AllLines, shown: dict[str, Kept], store: Store) -> dict[str, Any]:
+    """What the moving picture needs: all lines as one curve with gaps, points and bodies as marks."""
+    frames = next(iter(shown.values())).frames
+    box, planes, far = box_and_planes(every.as_result)
+    factors = np.maximum(0.45 * np.ptp(box, axis=0).max() / np.ptp(box, axis=0), 1.0)
+    gap = np.full((len(frames), 1), np.nan)
+    curves: dict[str, list[np.ndarray]] = {"x": [], "y": [], "z": [], "s": [], "tension": [], "line": []}
+    for k, (name, line) in enumerate(every.lines.items()):
+        rows = np.ix_(frames, shown[name].points)
+        for axis, at in zip("xyz", line.position[rows].transpose(2, 0, 1), strict=True):
+            curves[axis] += [at, gap]
+        curves["s"].append(np.append(line.s[shown[name].points], np.nan))
+        curves["tension"] += [line.tension[rows], gap]
+        curves["line"].append(np.full((len(frames), len(shown[name].points) + 1), k))
+    for name in bodies_of(result):
+        arms = arms_of(result, name, frames)
+        for axis, at in zip("xyz", arms.transpose(2, 0, 1), strict=True):
+            curves[axis] += [at, gap]
+        curves["s"].append(np.full(arms.shape[1] + 1, np.nan))
+        curves["tension"].append(np.zeros((len(frames), arms.shape[1] + 1)))
+        curves["line"].append(np.full((len(frames), arms.shape[1] + 1), len(every.lines)))
+    tension = np.nan_to_num(np.concatenate(curves["tension"], axis=1))
+    factor, unit = prefix("N", float(np.abs(tension).max()))
+    named = [*colours(result).items()] + [("bodies", INK)] * bool(bodies_of(result))
+    count = len(named)
+    steps = [[(k + d) / count, colour] for k, (_, colour) in enumerate(named) for d in (0, 1)]
+    by_line: dict[str, Any] = {
+        "key": "line",
+        "label": "line",
+        "values": store.add(np.concatenate(curves["line"], axis=1), "u1"),
+    }
+    by_line |= {"scale": steps, "legend": [list(x) for x in named], "low": -0.5, "high": count - 0.5}
+    low, high = float(tension.min() * factor), float(tension.max() * factor)
+    by_tension: dict[str, Any] = {
+        "key": "tension",
+        "label": f"tension ({unit})",
+        "values": store.add(tension * factor),
+        "unit": unit,
+    }
+    by_tension |= {"scale": colour_scale(COLOURS["catenary"][2:]), "low": low, "high": high or 1.0, "log": False}
+    return {
+        "times": [float(every.times[k]) for k in frames], "s": store.add(np.concatenate(curves["s"])),
+        **{axis: store.add(np.concatenate(curves[axis], axis=1)) for axis in "xyz"},
+        "colours": [by_line, by_tension], "marks": _marks(result, frames, store),
+        "planes": planes, "far": far, "box": box.T.tolist(), "factors": factors.tolist(), "ink": INK,
+        "speed": speed_of(every.as_result),
+    }  # fmt: skip
+
+
+def _marks(result: Result, frames: np.ndarray, store: Store) -> list[dict[str, Any]]:
+    """Bodies, then points and an empty mark: the page lists all but the last two in its legend."""
+    groups: list[tuple[str, np.ndarray, str, str, int]] = [
+        (f"body {n}", result[f"bodies/{n}/position"][frames][:, None], "square", BODY, 6) for n in bodies_of(result)
+    ]
+    places = np.stack([result[f"points/{n}/position"][frames] for n in points_of(result)], axis=1)
+    groups += [("points", places, "circle", INK, 3), ("", places[:, :0], "circle", INK, 1)]
+    return [
+        {"name": name, "symbol": symbol, "colour": colour, "size": size}
+        | {axis: store.add(at[..., k]) for k, axis in enumerate("xyz")}
+        for name, at, symbol, colour, size in groups
+    ]
+
+
+def _space(result: Result, every: AllLines, scene: dict[str, Any], shown: dict[str, Kept]) -> str:
+    poster = draw([shape(result, every, views_of(every.as_result)[0])])
+    thinned = next(iter(shown.values()))
+    section = parts.space_html(scene, poster, len(thinned.frames) > 1, thinned.notice)
+    return section.replace("<h2>The cable</h2>", "<h2>The lines</h2>")

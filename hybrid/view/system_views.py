@@ -1,0 +1,217 @@
+"""Pictures of several lines: their shapes in one frame with points and bodies, what is along each, and over time.
+
+A panel of shapes asks the functions for one cable for its frame, with all lines as one set of places.
+"""
+
+from __future__ import annotations
+
+import json
+from itertools import cycle
+from typing import Any, cast
+
+import numpy as np
+
+from hybrid.store.reader import Result
+from hybrid.view.along import along
+from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel
+from hybrid.view.headed_page import page_of
+from hybrid.view.panels import framed, sea
+from hybrid.view.projections import Numbers, View, aspect_of, telling_times, views_of
+from hybrid.view.style import BODY, INK, earlier_grey, prefix
+
+LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
+MOST_NAMED = 12  # lines in a legend: more would hide the picture
+_EARLIER = 4  # shapes of the motion behind the last one
+
+
+class AllLines:
+    """The lines of a result as one cable, for what asks only where it is and what is around."""
+
+    def __init__(self, result: Result) -> None:
+        self.lines = dict(result.lines)
+        self._around = next(iter(self.lines.values()))
+        self.outputs = min(len(result.times), *(len(line.times) for line in self.lines.values()))
+        self.times = result.times[: self.outputs]
+        self.position = np.concatenate([x.position[: self.outputs] for x in self.lines.values()], axis=1)
+        self.s = np.arange(self.position.shape[1], dtype=float)
+
+    def __contains__(self, name: str) -> bool:
+        return name.startswith(("seabed", "surface")) and name in self._around
+
+    def __getitem__(self, name: str) -> Any:
+        return self._around[name]
+
+    @property
+    def as_result(self) -> Result:
+        """Itself, for functions of a result that ask no more."""
+        return cast(Result, self)
+
+
+def colours(result: Result) -> dict[str, str]:
+    """A colour for every line."""
+    return dict(zip(result.lines, cycle(LINE_COLOURS), strict=False))
+
+
+def bodies_of(result: Result) -> list[str]:
+    """Names of the bodies of a result."""
+    return [n.split("/")[1] for n in result.names if n.startswith("bodies/") and n.endswith("/position")]
+
+
+def points_of(result: Result) -> list[str]:
+    """Names of the points of a result."""
+    return [n.split("/")[1] for n in result.names if n.startswith("points/") and n.endswith("/position")]
+
+
+def fairleads_of(result: Result) -> dict[str, str]:
+    """The body of each point that is on one."""
+    return dict(json.loads(str(result.attributes.get("fairleads", "{}"))))
+
+
+def shapes(result: Result, every: AllLines, view: View, output: int = -1) -> list[Item]:
+    """The lines at an output, each in its colour, points and bodies with arms to their fairleads."""
+    items: list[Item] = []
+    for k, (name, colour) in enumerate(colours(result).items()):
+        label = name if k < MOST_NAMED else ""
+        items.append(Line(*view.project(every.lines[name].position[output]), label, colour, 1.8))
+    items += [Line(*view.project(arms_of(result, name, [output])[0]), "", INK, 0.9) for name in bodies_of(result)]
+    points = np.array([result[f"points/{name}/position"][output] for name in points_of(result)])
+    items.append(Marks(*view.project(points), "o", "points", size=3.5))
+    for name in bodies_of(result):
+        at = result[f"bodies/{name}/position"][[output]]
+        items.append(Marks(*view.project(at), "s", "origins of bodies", BODY, size=8.0))
+    return items
+
+
+def arms_of(result: Result, body: str, outputs: Numbers) -> np.ndarray:
+    """From the origin of a body to each of its fairleads and back (n, points, 3) m, at outputs (n,)."""
+    at = result[f"bodies/{body}/position"][outputs]
+    ends = [result[f"points/{p}/position"][outputs] for p, b in fairleads_of(result).items() if b == body]
+    return np.stack([x for end in ends for x in (at, end)] + [at], axis=1)
+
+
+def shape(result: Result, every: AllLines, view: View) -> Panel:
+    """The last shapes over some earlier ones, in grey."""
+    items = sea(every.as_result, view)
+    times = telling_times(every.as_result)
+    times = times[np.unique(np.linspace(0, len(times) - 1, min(len(times), _EARLIER)).round().astype(int))]
+    for k, t in enumerate(times):
+        output = int(np.abs(every.times - t).argmin())
+        label = "earlier shapes (later: darker)"
+        for line in every.lines.values():
+            items.append(Line(*view.project(line.position[output]), label, earlier_grey(k, len(times)), 0.6))
+    items += shapes(result, every, view)
+    when = f" at t = {every.times[-1]:.4g} s" if every.outputs > 1 else ""
+    return framed(every.as_result, view, items, when)
+
+
+def tensions(result: Result, every: AllLines, output: int | None = None) -> Panel:
+    """Tension along every line: the last one over the range of all times; output: that one, without ranges."""
+    peak = max(float(np.abs(line.tension).max()) for line in every.lines.values())
+    factor, unit = prefix("N", peak)
+    items: list[Item] = []
+    for (name, colour), line in zip(colours(result).items(), every.lines.values(), strict=True):
+        found = along(line, "tension")
+        values = found.values * factor
+        if len(values) > 1 and output is None:
+            items.append(Band(found.s, values.min(axis=0), values.max(axis=0), colour=colour, opacity=0.15))
+        items.append(Line(*found.curve(values[-1 if output is None else output]), name, colour, 1.2))
+    title = "tension along the lines" + ", and its range over all times" * (every.outputs > 1 and output is None)
+    return Panel("tension", title, Axis("s", "m"), Axis("tension", unit, peak=peak * factor), items)
+
+
+def largest_tensions(result: Result, every: AllLines) -> Panel:
+    """The largest tension of every line over time."""
+    found = {name: line.tension[: every.outputs].max(axis=1) for name, line in every.lines.items()}
+    peak = max(float(np.abs(x).max()) for x in found.values())
+    factor, unit = prefix("N", peak)
+    items: list[Item] = [Line(every.times, found[name] * factor, name, c) for name, c in colours(result).items()]
+    y = Axis("tension", unit, peak=peak * factor)
+    caption = "The largest along each line, at outputs; the tables have those of all steps."
+    return Panel("over-time", "largest tension of each line", Axis("t", "s"), y, items, caption=caption, cursor=True)
+
+
+def motions(result: Result, every: AllLines) -> list[Panel]:
+    """How bodies and points that move leave their first places: one panel for each direction with motion."""
+    named = {f"body {name}": result[f"bodies/{name}/position"] for name in bodies_of(result)}
+    held = fairleads_of(result)
+    named |= {f"point {x}": result[f"points/{x}/position"] for x in points_of(result) if x not in held}
+    moved = {name: at[: every.outputs] - at[0] for name, at in named.items() if np.ptp(at, axis=0).max() > 0.0}
+    panels = []
+    for k, axis in enumerate("xyz"):
+        peak = max((float(np.abs(x[:, k]).max()) for x in moved.values()), default=0.0)
+        if peak > 0.0 and every.outputs > 1:
+            factor, unit = prefix("m", peak)
+            lines = zip(list(moved.items())[:MOST_NAMED], cycle(LINE_COLOURS), strict=False)
+            items: list[Item] = [Line(every.times, x[:, k] * factor, name, c) for (name, x), c in lines]
+            y = Axis(axis, unit, peak=peak * factor)
+            title = f"motion along {axis}, from the first place"
+            panels.append(Panel(f"motion-{axis}", title, Axis("t", "s"), y, items, legend=True, cursor=True))
+    return panels
+
+
+# ---- pages ----------------------------------------------------------------------------------------
+
+
+def facts_line(result: Result, every: AllLines) -> list[str]:
+    """What a page says of the lines, below its title."""
+    several = f"{len(every.lines)} line{'s' * (len(every.lines) != 1)}"
+    bodies = bodies_of(result)
+    return [several + (f", {len(bodies)} bod{'ies' if len(bodies) != 1 else 'y'}" if bodies else "")]
+
+
+def page(result: Result) -> Page:
+    """One page of several lines: shapes from two sides, tension along the lines, and over time what moves."""
+    if not len(result.times):
+        return page_of(result, [])
+    every = AllLines(result)
+    views = views_of(every.as_result)
+    names = ["s", "S"][: len(views)]
+    panels = {name: shape(result, every, view) for name, view in zip(names, views, strict=True)}
+    panels["p"] = tensions(result, every)
+    below = ["p"]
+    if every.outputs > 1:
+        panels["h"] = largest_tensions(result, every)
+        moved = sorted(motions(result, every), key=lambda panel: -(panel.y.peak or 0.0))
+        panels |= dict(zip("mn", moved, strict=False))
+        below = [name for name in "phmn" if name in panels]
+    rows = [names] if aspect_of(views, every.as_result) < 3.0 else [[name] for name in names]
+    wide = 2 if len(below) > 1 else 1
+    rows = [[name for name in row for _ in range(wide // len(row) or 1)] for row in rows]
+    grid = [below[k : k + wide] for k in range(0, len(below), wide)]
+    rows += [row + [row[-1]] * (wide - len(row)) for row in grid]
+    rows = [row * (wide // len(row)) if len(row) < wide else row for row in rows]
+    heights = [1.6 if set(row) <= {"s", "S"} else 1.0 for row in rows]
+    return page_of(
+        result, facts_line(result, every), panels=panels, mosaic=rows, widths=[1.0] * len(rows[0]), heights=heights,
+        legend=["s"],
+    )  # fmt: skip
+
+
+Moving = Any
+
+
+def film_page(result: Result, factor: float) -> tuple[Page, Moving]:
+    """The page of a film of several lines, and what moves on it: by output, the time in words and items by panel."""
+    every = AllLines(result)
+    views = dict(zip(("shape", "second"), views_of(every.as_result), strict=False))
+    none = np.zeros(0)
+    legend: list[Item] = [Line(none, none, x, c, 1.8) for x, c in list(colours(result).items())[:MOST_NAMED]]
+    panels: dict[str, Panel] = {}
+    for name, view in views.items():
+        first: list[Item] = [
+            Line(*view.project(line.position[0]), "first shapes", "#B5B5B5", 0.8) for line in every.lines.values()
+        ]
+        panels[name] = framed(every.as_result, view, [*sea(every.as_result, view), *legend, *first])
+    still = tensions(result, every)
+    panels["tension"] = still._replace(items=[item for item in still.items if isinstance(item, Band)])
+    names = list(views)
+    look = {"mosaic": [names, ["tension"] * len(names)], "heights": [2.2, 1.0], "legend": ["shape"]}
+    made = page_of(result, [f"{factor:g} × real time"], panels=panels, size=(8.0, 5.12), **look)
+    pause = float(np.ptp(every.times)) / max(every.outputs - 1, 1)
+    places = int(np.clip(1 - np.floor(np.log10(pause)), 0, 6))
+
+    def moving(i: int) -> tuple[str, dict[str, list[Item]]]:
+        items = {name: shapes(result, every, view, i) for name, view in views.items()}
+        return f"t = {every.times[i]:.{places}f} s", items | {"tension": tensions(result, every, i).items}
+
+    return made, moving

@@ -1,0 +1,151 @@
+"""Pages, films, reports and exports of several lines: every line, point and body is there, with its own numbers."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from PIL import Image
+from typer.testing import CliRunner
+
+import hybrid
+import hybrid.cli.commands  # registers them
+from hybrid.cli.app import app
+from hybrid.errors import ResultError
+from hybrid.view.animation import animate
+from hybrid.view.figure import Line, Marks
+from hybrid.view.system_report import html
+from hybrid.view.system_views import AllLines, arms_of, page
+
+SECTION = {"length": 120, "mass": 20, "diameter": 0.1, "axial_stiffness": 1e8}
+PLACES = {"east": (100, 0), "north": (-50, 87), "south": (-50, -87)}
+
+
+def spar() -> dict[str, Any]:
+    """A body on three lines, pulled and let go, over a bed; the tension of one line breaks its limit."""
+    lines = {n: {"start": n, "end": f"to_{n}", "mesh": {"cells": 12}, "sections": [SECTION]} for n in PLACES}
+    lines["east"]["sections"] = [SECTION | {"max_tension": 1000}]
+    return {
+        "title": "<three> lines",
+        "environment": {"fluid": {"density": 1025, "surface": 5.0}, "seabed": {"z": -62, "stiffness": 1e4}},
+        "points": {n: {"position": [x, y, -60]} for n, (x, y) in PLACES.items()}
+        | {f"to_{n}": {"body": "spar", "place": [x / 50, y / 50, -4]} for n, (x, y) in PLACES.items()},
+        "bodies": {"spar": {
+            "initial_guess": [0, 0, 0], "mass": 1e5, "centre": [0, 0, -3], "inertia": [4e6, 4e6, 2e6],
+            "hydrostatics": {"heave": 8e4, "roll": 4e6, "pitch": 4e6}, "force": {"value": [4e4, 0, 0], "until": 1},
+        }},
+        "lines": lines, "time": {"duration": 4.0, "step": 0.05}, "output": {"every": 0.2, "points": 13},
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def path(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    target = tmp_path_factory.mktemp("views") / "spar.h5"
+    hybrid.run(spar(), target).close()
+    return target
+
+
+@pytest.fixture(scope="module")
+def result(path: Path) -> hybrid.Result:
+    return hybrid.open(path)
+
+
+def test_a_page_has_every_line_where_it_is(result: hybrid.Result) -> None:
+    drawn = page(result)
+    shape = drawn.panels["S"]  # from above
+    lines = {item.label: item for item in shape.items if isinstance(item, Line)}
+    for name, line in result.lines.items():
+        x, y = (
+            line.position[-1] @ axis
+            for axis in (np.eye(3)["xy".index(shape.x.name)], np.eye(3)["xy".index(shape.y.name)])
+        )
+        assert np.array_equal(lines[name].x, x) and np.array_equal(lines[name].y, y)
+    points = next(item for item in shape.items if isinstance(item, Marks) and item.label == "points")
+    assert len(points.x) == 6
+    assert [item.label for item in drawn.panels["p"].items if isinstance(item, Line)] == list(PLACES)
+    moved = drawn.panels["m"].items
+    assert [x.label for x in moved if isinstance(x, Line)] == ["body spar"]
+    largest = {x.label: x.y for x in drawn.panels["h"].items if isinstance(x, Line)}
+    factor = largest["east"].max() / result.lines["east"].tension.max()
+    assert factor in (1.0, 1e-3)
+    assert "tension above limit" in drawn.note and "line east" in drawn.note
+
+
+def test_arms_lead_from_a_body_to_its_fairleads(result: hybrid.Result) -> None:
+    arms = arms_of(result, "spar", [0, -1])
+    assert arms.shape == (2, 7, 3)
+    lengths = np.linalg.norm(np.diff(arms, axis=1), axis=2)
+    assert np.allclose(lengths, np.hypot(np.hypot(*np.array(PLACES["north"]) / 50), 4), rtol=0.01)
+
+
+def test_a_report_has_all_lines_points_and_bodies(result: hybrid.Result) -> None:
+    text = html(result)
+    assert "&lt;three&gt; lines" in text and "<three>" not in text.split("<script")[0]
+    index = json.loads(re.search(r'id="index">(.*?)</script>', text, re.S)[1])  # type: ignore[index]
+    scene = index["scene"]
+    assert [x[0] for x in scene["colours"][0]["legend"]] == [*PLACES, "bodies"]
+    assert scene["x"]["shape"] == [21, 3 * 14 + 8] and scene["s"]["shape"] == [3 * 14 + 8]
+    assert [mark["name"] for mark in scene["marks"]] == ["body spar", "points", ""]
+    for name, line in result.lines.items():
+        most = line.envelope["tension_max"].max()
+        row = re.search(rf"<td>{name}</td><td class=\"number\">120 m</td><td class=\"number\">([\d.]+) kN", text)
+        assert row is not None and abs(float(row[1]) * 1e3 - most) < 1e-3 * most
+        assert f"Line {name}: " in text
+    force = np.linalg.norm(result["points/east/force"], axis=1).max()
+    assert f"{force / 1e3:.4g} kN" in text.split("<h3>Points</h3>")[1].split("<h3>Bodies</h3>")[0]
+    assert "tension above limit" in text or "Tension above limit" in text
+
+
+def test_a_film_moves_all_lines(result: hybrid.Result, tmp_path: Path) -> None:
+    film = animate(result, tmp_path / "spar.gif")
+    with Image.open(film.path) as image:
+        assert image.n_frames == film.frames == 21
+        first = np.array(image.convert("L"), int)
+        image.seek(10)
+        assert np.abs(np.array(image.convert("L"), int) - first).max() > 100
+
+
+def test_what_is_of_one_line_says_so(result: hybrid.Result) -> None:
+    with pytest.raises(ResultError, match=r"--line east"):
+        hybrid.plot_zones(result)
+    with pytest.raises(ResultError, match=r"--line east"):
+        hybrid.plot(result, history=[1.0])
+
+
+def test_commands_take_all_lines_or_one(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    call = CliRunner()
+    for command in ("plot", "report"):
+        assert (
+            call.invoke(app, [command, str(path), "-o", f"all.{'png' if command == 'plot' else 'html'}"]).exit_code == 0
+        )
+    assert call.invoke(app, ["plot", str(path), "--line", "east", "-o", "east.png"]).exit_code == 0
+    assert call.invoke(app, ["export", str(path), "-o", "run.csv"]).exit_code == 0
+    assert {x.name for x in tmp_path.iterdir()} == {
+        "all.png", "all.html", "east.png", *(f"run.{name}.csv" for name in PLACES)
+    }  # fmt: skip
+    rows = [x for x in (tmp_path / "run.north.csv").read_text().splitlines() if not x.startswith("#")]
+    assert len(rows) == 22
+
+
+def test_a_stopped_run_is_drawn(tmp_path: Path) -> None:
+    """A file with fewer outputs than were asked for, and an equilibrium with one."""
+
+    def stop(progress: Any) -> None:
+        if progress.step >= 30:
+            raise KeyboardInterrupt
+
+    target = tmp_path / "part.h5"
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("hybrid.simulation.progress.REPORT_EVERY", -1.0)
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.run(spar(), target, progress=stop)
+    with hybrid.open(target) as part:
+        assert part.status == "interrupted" and 1 < AllLines(part).outputs < 21
+        assert "interrupted" in page(part).facts and "interrupted" in html(part).lower()
+    still = hybrid.static(spar())
+    assert set(page(still).panels) == {"s", "S", "p"} and "static, one output" in html(still)
