@@ -1,6 +1,6 @@
 """Run `hybrid trade` on the example scenes and write docs/trade.md and its pictures.
 
-    python docs/make_trade.py [-o FOLDER] [--accuracies 3%,1%,0.3%] [--peers] [name ...]
+    python docs/make_trade.py [-o FOLDER] [--levels] [--accuracies 3%,1%,0.3%] [--peers] [name ...]
 
 Finished runs are stored in FOLDER (build/trade); a second call computes what is missing.  With names, only these
 scenes are computed; the sections of the others stay.
@@ -23,6 +23,7 @@ from hybrid.view.tradeoff import plot_trade
 ROOT = Path(__file__).parents[1]
 PICTURES = ROOT / "docs" / "pictures"
 SCENES = ("touchdown", "s_tether", "rov_tether", "laying", "slack_on_seabed")
+PARTS = [part for name in SCENES for part in (name, f"{name}.levels")]
 BEGIN, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 HEAD = """\
 # Error against cost
@@ -65,8 +66,30 @@ print(table.recommended, table.front(), table.rows)
 Other programs run in processes of their own (`hybrid/studies/peers/` has an adapter for each): a uniform line between
 two points, fixed or moved, in still water, on a level seabed. Their CPU time includes their statics.
 
+## What each level costs
+
+`hybrid trade scene.yaml --levels` (`hybrid.trade_levels`) compares models at three levels of demand:
+
+| level | asked |
+|---|---|
+| A | position within 0.1 % of the length, end forces within 1 % of the largest |
+| B | the same, and the largest bending moment of every output within 5 % of the largest of all |
+| C | the same, and curvature at every point and output within 5 % of the largest |
+
+Models are rods, catenaries, zones that move, and ("following") zones that move with rods whose cells follow the curvature.
+Each run asks for the accuracy of its level, with moments and curvature at every point; it is compared with a rod everywhere of a third of that error.
+`--peers` adds other programs to level A: they give positions and end forces.
+The folder gets levels.md and levels.csv.
+
 The sections below were written by `python docs/make_trade.py` for example scenes.
 """
+
+
+def levels(name: str, folder: Path) -> str:
+    """What the levels of one scene cost."""
+    command = f"hybrid trade examples/{name}.yaml --levels --peers"
+    path = ROOT / "examples" / f"{name}.yaml"
+    return hybrid.trade_levels(path, folder / f"{name}.levels", peers=True, command=command).markdown(level=2)
 
 
 def section(name: str, folder: Path, accuracies: list[str], peers: bool) -> str:
@@ -95,13 +118,17 @@ def main() -> None:
     ask.add_argument("-o", "--output", type=Path, default=ROOT / "build" / "trade")
     ask.add_argument("--accuracies", default=",".join(ACCURACIES))
     ask.add_argument("--peers", action="store_true")
+    ask.add_argument("--levels", action="store_true", help="of these scenes alone what the levels cost")
     ask.add_argument("names", nargs="*", default=SCENES)
     given = ask.parse_args()
     page = ROOT / "docs" / "trade.md"
     before = page.read_text(encoding="utf-8") if page.exists() else ""
-    parts = {name: before.partition(BEGIN.format(name))[2].partition(END.format(name))[0] for name in SCENES}
+    parts = {name: before.partition(BEGIN.format(name))[2].partition(END.format(name))[0] for name in PARTS}
     for name in given.names:
-        parts[name] = section(name, given.output, given.accuracies.split(","), given.peers)
+        if given.levels:
+            parts[f"{name}.levels"] = levels(name, given.output)
+        else:
+            parts[name] = section(name, given.output, given.accuracies.split(","), given.peers)
         text = "".join(f"\n{BEGIN.format(n)}{part}{END.format(n)}" for n, part in parts.items() if part)
         page.write_text(HEAD + text, encoding="utf-8")
 

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
+    from hybrid.studies.levels import trade_levels
     from hybrid.studies.tradeoff import trade
     from hybrid.view.plots import plot_summary as plot
     from hybrid.view.plots import plot_zones
@@ -67,6 +68,7 @@ _HOME = {
     "static": ("hybrid.simulation.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "trade": ("hybrid.studies.tradeoff", "trade"),
+    "trade_levels": ("hybrid.studies.levels", "trade_levels"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
 }
 
@@ -101,6 +103,7 @@ __all__ = [
     "static",
     "stiffness",
     "trade",
+    "trade_levels",
     "validate_scene",
 ]
 

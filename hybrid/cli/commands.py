@@ -52,6 +52,7 @@ from hybrid.cli.tables import (
     extremes_table,
     import_notes,
     judged,
+    level_table,
     trade_table,
     zones_line,
     zones_over_time,
@@ -198,6 +199,9 @@ def trade(
     target: Annotated[str, typer.Option("--for", metavar="A", help="Accuracy to recommend a setting for.")] = "1%",
     repeat: Annotated[int, typer.Option(metavar="N", help="Runs of which the median CPU time counts.")] = 1,
     peers: Annotated[bool, flag("--peers", help="Other programs as well, if installed.")] = False,
+    levels: Annotated[
+        bool, flag("--levels", help="Instead: what position and tension, moments, curvature cost with every model.")
+    ] = False,
     settings: Settings = None, quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Compare models and accuracies on a scene: error against CPU time; recommend one."""
@@ -207,6 +211,9 @@ def trade(
         console.left = f"{folder} keeps the runs that are done; the same command makes the others"
         console.note(f"runs and tables go to the folder {folder}")
         console.compiling(asked)
+        if levels:
+            _trade_levels(console, asked, folder, repeat, peers, shlex.join(["hybrid", *(context.obj or [])]))
+            return
         chosen = {"accuracies": accuracies} if accuracies else {}
         with console.study() as listener:
             table = hybrid.trade(
@@ -221,6 +228,19 @@ def trade(
         facts = {"recommended": best.name if best else None, "cpu": best.cpu if best else None, "runs": len(table.rows)}
         files = [folder / name for name in ("trade.md", "trade.csv", "trade.png")]
         console.done(f"{len(table.rows)} runs", *files, **facts)
+
+
+def _trade_levels(console: Any, scene: Any, folder: Path, repeat: int, peers: bool, command: str) -> None:
+    """The three levels of studies.levels, as a table and a sentence for each."""
+    with console.study() as listener:
+        table = hybrid.trade_levels(
+            scene, folder, repeat=repeat, peers=peers, progress=listener, command=command
+        )  # fmt: skip
+    for row in table.rows:
+        console.json("row", **asdict(row))
+    console.show(lambda: level_table(table))
+    console.show(lambda: "\n".join(table.sentences()))
+    console.done(f"{len(table.rows)} runs", *(folder / name for name in ("levels.md", "levels.csv")))
 
 
 @app.command("import")

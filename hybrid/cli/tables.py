@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from hybrid.interop.moordyn import ImportedDeck
     from hybrid.store.reader import Result
     from hybrid.store.tradeoff_table import Row, TradeTable
+    from hybrid.studies.levels import LevelTable
 
 
 def equilibrium_facts(result: Result) -> dict[str, Any]:
@@ -249,6 +250,27 @@ def trade_table(table: TradeTable) -> Any:
         style = "bold green" if row == best else "" if row in front else "yellow" if not row.is_choice else "dim"
         figures = [part(row.position_part), part(row.end_force_part), str(row.cells or ""), str(row.steps or "")]
         out.add_row(row.name, *figures, f"{row.cpu:.3g} s" if row.cpu else "", remark, style=style)
+    return out
+
+
+def level_table(table: LevelTable) -> Any:
+    """What each level costs with every model."""
+    from rich.table import Table
+
+    from hybrid.studies.levels import percent, status_of
+
+    out = Table(box=None, pad_edge=False, header_style="bold")
+    out.add_column("level, model", no_wrap=True)
+    for name in ("position", "end force", "moment", "curvature", "cells", "CPU"):
+        out.add_column(name, justify="right", no_wrap=True)
+    out.add_column("", overflow="fold")
+    for row in table.rows:
+        best = row == table.cheapest(row.level)
+        figures = [percent(x) for x in (row.position, row.end_force, row.moment, row.curvature)]
+        cpu = f"{row.cpu:.3g} s" if row.cpu else ""
+        remark = "cheapest" if best else status_of(row)
+        style = "bold green" if best else "" if row.meets else "yellow"
+        out.add_row(f"{row.level} {row.model}", *figures, str(row.cells or ""), cpu, remark, style=style)
     return out
 
 

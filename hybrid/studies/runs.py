@@ -32,6 +32,8 @@ WARM_PART = 0.02
 # Keys of a model that set the resolution: the study chooses these.
 FINENESS = ("kind", "tolerance", "rod_cell", "hold_time")
 COMPARED = ("position", "reaction_start", "reaction_end")
+# The same of runs for a level (studies.levels).
+ALONG = ("bending_moment", "curvature")
 # Files of the package that change no answer, only how it is shown or ranked.
 SHOWS = ("cli", "view", "exports", "interop")
 
@@ -55,6 +57,7 @@ class RunSpec:
     scene: Scene | None  # None: refused
     refused: str = ""
     times: int = 1  # repetitions; the median of their CPU times counts
+    kept: tuple[str, ...] = COMPARED  # outputs that are compared
 
     @property
     def name(self) -> str:
@@ -66,7 +69,7 @@ def model_kinds() -> tuple[str, ...]:
     return next(part.names for part in get_args(Model) if isinstance(part, Kinds))
 
 
-def scene_data(scene: Scene, kind: str, accuracy: str) -> dict[str, Any]:
+def scene_data(scene: Scene, kind: str, accuracy: str | Mapping[str, str]) -> dict[str, Any]:
     """The scene with this model at this accuracy, and without keys that set the resolution; as data."""
     data = scene.model_dump(mode="json", exclude_none=True)
     for name in ("mesh", "solver"):
@@ -82,7 +85,8 @@ def scene_data(scene: Scene, kind: str, accuracy: str) -> dict[str, Any]:
     kept = {name: value for name, value in given.items() if name not in FINENESS}
     if "zones" in kept:
         kept["zones"] = [{k: x for k, x in zone.items() if k not in ("cells", "ratio")} for zone in kept["zones"]]
-    return data | {"model": {"kind": kind} | kept, "accuracy": accuracy}
+    asked = accuracy if isinstance(accuracy, str) else dict(accuracy)
+    return data | {"model": {"kind": kind} | kept, "accuracy": asked}
 
 
 def run_spec(scene: Scene, kind: str, accuracy: str) -> RunSpec:
@@ -90,6 +94,19 @@ def run_spec(scene: Scene, kind: str, accuracy: str) -> RunSpec:
         return RunSpec(kind, accuracy, validate_scene(scene_data(scene, kind, accuracy)))
     except SceneError as error:
         return RunSpec(kind, accuracy, None, _in_short(error))
+
+
+def level_spec(
+    scene: Scene, kind: str, name: str, accuracy: Mapping[str, str], model: Mapping[str, float] | None = None
+) -> RunSpec:
+    """A run for an accuracy with several parts, which has a name; model: more keys of the model."""
+    data = scene_data(scene, kind, accuracy)
+    data["model"] |= model or {}
+    kept = (*COMPARED, *ALONG)
+    try:
+        return RunSpec(kind, name, validate_scene(data), kept=kept)
+    except SceneError as error:
+        return RunSpec(kind, name, None, _in_short(error), kept=kept)
 
 
 def _in_short(error: SceneError) -> str:
@@ -124,7 +141,7 @@ class RunStore:
                 raise SceneError([Complaint("reference", spec.name, "a model that the scene admits", spec.refused)])
             self.done += 1
             return row, {}
-        key = key_of(spec.scene, spec.times)
+        key = key_of(spec.scene, spec.times, "" if spec.kept == COMPARED else " ".join(spec.kept))
         found = self.load(key)
         if found is None:
             found = self._compute(replace(row, key=key), spec, spec.scene, required)
@@ -176,7 +193,7 @@ class RunStore:
                 raise
             return replace(row, cause=f"a bug: {type(error).__name__}: {error}"), {}
         assert result is not None
-        values = {name: np.array(result[name]) for name in COMPARED if name in result}
+        values = {name: np.array(result[name]) for name in spec.kept if name in result}
         row = replace(_figures_of(result, row), cpu=median(spent))
         self.computed += 1
         return self.save(row, values)
@@ -193,7 +210,7 @@ class RunStore:
             return
         self._warm.add(spec.model)
         self.report(f"loading the kernels of {spec.model}", 0.0)
-        data = scene_data(scene, spec.model, ROUGH)
+        data = scene.model_dump(mode="json", exclude_none=True) | {"accuracy": ROUGH}
         data["time"]["duration"] *= WARM_PART
         data["output"].pop("every", None)
         with suppress(ComputationError, SceneError, ArithmeticError, ValueError, LookupError):

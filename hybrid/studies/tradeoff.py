@@ -222,7 +222,9 @@ def _compared(
 def with_errors(row: Row, values: Mapping[str, np.ndarray], reference: Mapping[str, np.ndarray], length: float) -> Row:
     """The row with its errors: outputs (nt, ...) of the run and of the reference, at the same times and places."""
     position = float(np.linalg.norm(values["position"] - reference["position"], axis=-1).max())
-    forces = [float(_difference(values[x], reference[x]).max()) for x in END_FORCES if x in values and x in reference]
+    forces = [
+        float(force_difference(values[x], reference[x]).max()) for x in END_FORCES if x in values and x in reference
+    ]
     row = replace(row, position=position, position_part=position / length)
     largest = _largest_end_force(reference)
     if forces and largest:
@@ -232,7 +234,7 @@ def with_errors(row: Row, values: Mapping[str, np.ndarray], reference: Mapping[s
     return row
 
 
-def _difference(force: np.ndarray, reference: np.ndarray) -> np.ndarray:
+def force_difference(force: np.ndarray, reference: np.ndarray) -> np.ndarray:
     """Difference (nt,) of two forces (nt, 3), N; of their sizes, where only that is known (nt, 1)."""
     if force.shape[-1] == 1:
         return np.asarray(np.abs(np.abs(force[:, 0]) - np.linalg.norm(reference, axis=-1)))
@@ -253,10 +255,10 @@ def _largest_end_force(reference: Mapping[str, np.ndarray]) -> float | None:
 # --- other programs -----------------------------------------------------------------------------
 
 
-def _peer_row(
-    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene, reference: Mapping[str, np.ndarray]
-) -> Row:
-    """The row of another program, kept as ours are."""
+def peer_found(
+    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene
+) -> tuple[Row, dict[str, np.ndarray]]:
+    """The row of another program, kept as ours are, and what it computes; nothing where it fails."""
     row = Row(
         peer_run.code,
         peer_run.model,
@@ -267,7 +269,7 @@ def _peer_row(
     )
     if peer_run.unsupported:
         store.done += 1
-        return replace(row, status=peer_codes.UNSUPPORTED)
+        return replace(row, status=peer_codes.UNSUPPORTED), {}
     found = store.load(row.key)
     if found is None:
         store.report(peer_run.name, 0.0)
@@ -281,9 +283,17 @@ def _peer_row(
             found = store.save(replace(row, cpu=median(x.cpu for x in answers)), values)
             store.computed += 1
     store.done += 1
+    return found
+
+
+def _peer_row(
+    store: RunStore, peer_run: peer_codes.PeerRun, repeat: int, scene: Scene, reference: Mapping[str, np.ndarray]
+) -> Row:
+    """The same with its errors."""
+    found = peer_found(store, peer_run, repeat, scene)
     if not found[1]:
         return found[0]
-    forces = np.max([_difference(found[1][x], reference[x]) for x in END_FORCES], axis=0)
+    forces = np.max([force_difference(found[1][x], reference[x]) for x in END_FORCES], axis=0)
     # The median tells a transient at the start, or one impact, from an error that lasts.
     worst, usual = [0.0, *output_times(scene)][int(forces.argmax())], float(np.median(forces))
     cause = f"largest error of its end force at t = {worst:g} s; median error {usual:.3g} N"

@@ -1,0 +1,92 @@
+"""Three levels of demand: their errors, what meets them at least cost, and that runs are kept."""
+
+from __future__ import annotations
+
+import csv
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.store.tradeoff_table import FAILED, Row
+from hybrid.studies import runs
+from hybrid.studies.levels import ALONG, LEVELS, LevelRow, LevelTable, _row, status_of
+
+SAG: dict[str, Any] = {
+    "title": "a line that sags",
+    "environment": {"fluid": {"density": 1025}},
+    "cable": {"sections": [{
+        "length": 12.0, "diameter": 0.03, "mass": 2.0, "axial_stiffness": 1e5, "bending_stiffness": 20.0,
+        "drag": {"normal": 1.2}, "added_mass": {"normal": 1.0},
+    }]},
+    "ends": {
+        "start": {"kind": "pinned", "position": [0, 0, -5]},
+        "end": {"kind": "pinned", "position": [10, 0, -5], "motion": {"heave": {"amplitude": 0.3, "period": 2.0}, "ramp": 1}},
+    },
+    "initial": "equilibrium", "time": {"duration": 1.0}, "output": {"every": 0.1, "points": 25},
+}  # fmt: skip
+
+
+def values(
+    shift: float, force: float, moment: list[list[float]], curvature: list[list[float]]
+) -> dict[str, np.ndarray]:
+    reaction = np.full((2, 3), [100.0 + force, 0.0, 0.0])
+    position = np.zeros((2, 2, 3)) + [shift, 0.0, 0.0]
+    return {"position": position, "reaction_start": reaction, "bending_moment": np.array(moment),
+            "curvature": np.array(curvature)}  # fmt: skip
+
+
+EXACT = values(0.0, 0.0, [[0.0, 10.0], [4.0, 8.0]], [[0.0, 1.0], [0.4, 0.8]])
+
+
+def test_errors_are_those_of_each_level() -> None:
+    """The largest moment of an output may lie elsewhere; curvature counts at every point."""
+    found = values(0.01, 0.5, [[9.8, 0.0], [8.0, 4.0]], [[0.0, 1.04], [0.48, 0.8]])
+    done = Row("hybrid", "rod", "level", "done", cpu=1.0)
+    a, b, c = (_row(level, "rod", done, found, EXACT, 20.0) for level in "ABC")
+    assert (a.position, a.end_force, a.moment, a.curvature) == pytest.approx((0.0005, 0.005, 0.02, 0.08))
+    assert (a.worst, b.worst) == pytest.approx((0.5, 0.5)) and a.meets and b.meets
+    assert c.worst == pytest.approx(0.08 / ALONG) and not c.meets
+    assert status_of(c) == "error 1.6 times what is asked"
+
+
+def test_the_cheapest_that_meets_a_level_is_named() -> None:
+    rows = (
+        LevelRow("A", "rod", "done", "", worst=0.5, cpu=2.0), LevelRow("A", "catenary", "done", "", worst=0.9, cpu=1.0),
+        LevelRow("A", "adaptive", "done", "", worst=1.1, cpu=0.5), LevelRow("A", "CableDyn 20", "done", "", worst=0.1, cpu=0.1),
+        LevelRow("B", "catenary", FAILED, "no moment"),
+    )  # fmt: skip
+    table = LevelTable("by hand", Row("hybrid", "rod", "reference", "done", cells=9, steps=9), rows, ())
+    best = table.cheapest("A")
+    assert best is not None and best.model == "catenary"
+    one, two, three = table.sentences()
+    assert "catenary, 1 s of CPU time, 2 times less than a rod everywhere" in one
+    assert two.endswith("no run met it.") and three.endswith("no run met it.")
+    assert "failed: no moment" in table.markdown()
+
+
+def test_levels_are_computed_once_and_kept(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[str] = []
+    real = runs.run
+
+    def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
+        if more:
+            made.append(scene.model.kind)
+        return real(scene, *args, **more)
+
+    monkeypatch.setattr(runs, "run", run)
+    monkeypatch.setattr("hybrid.studies.levels.MODELS", ("rod", "catenary"))
+    first = hybrid.trade_levels(SAG, tmp_path)
+    assert made == ["rod", "rod", "catenary", "rod", "rod"], "the reference; a catenary is asked for no moment"
+    assert [(row.level, row.model) for row in first.rows] == [(x, y) for x in LEVELS for y in ("rod", "catenary")]
+    for row in first.rows:
+        assert row.meets or row.model == "catenary", row
+    made.clear()
+    again = hybrid.trade_levels(SAG, tmp_path)
+    assert not made and again.rows == first.rows
+    read = list(csv.DictReader(io.StringIO((tmp_path / "levels.csv").read_text())))
+    assert [x["level"] for x in read] == [row.level for row in first.rows]
+    assert "# a line that sags: what each level costs" in (tmp_path / "levels.md").read_text()
