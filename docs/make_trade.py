@@ -76,8 +76,9 @@ two points, fixed or moved, in still water, on a level seabed. Their CPU time in
 | B | the same, and the largest bending moment of every output within 5 % of the largest of all |
 | C | the same, and curvature at every point and output within 5 % of the largest |
 
-Models are rods, catenaries, zones that move, and ("following") zones that move with rods whose cells follow the curvature.
-Each run asks for the accuracy of its level, with moments and curvature at every point; it is compared with a rod everywhere of a third of that error.
+Models are rods, catenaries, zones that move, and ("following") zones that move with rods whose cells follow the
+curvature. Each run asks for the accuracy of its level, with moments and curvature at every point; it is compared with a
+rod everywhere of a third of that error.
 `--peers` adds other programs to level A: they give positions and end forces.
 The folder gets levels.md and levels.csv.
 

@@ -104,6 +104,7 @@ EVENTS_BY_WEIGHT = (
     "largest force uncertain",
     "windows uncertain",
     "irregular motion",
+    "costly accuracy",
     "end force between outputs",
     "line meets itself",
     "loop can form",

@@ -12,7 +12,7 @@ if TYPE_CHECKING:
     from hybrid.model.plan import Plan
     from hybrid.scene.schema import Scene
 
-LINES, COLUMNS = 13, 80  # of the short form
+LINES, COLUMNS = 14, 80  # of the short form
 # Forces whose names are too long for it.
 SHORT = {
     "mass-proportional damping": "mass damping",
@@ -45,6 +45,7 @@ def plan_lines(scene: Scene, plan: Plan) -> list[str]:
         "forces": ", ".join(SHORT.get(name, name) for name in ("gravity", "buoyancy", *FORCES) if name in on),
         "hockling": _hockling(plan),
         "time": _time(scene, plan),
+        "runs": _runs(plan),
         "accuracy": asked,
         "assumed": "; ".join(what for what, why in on.items() if why.startswith("assumed")),
     }
@@ -65,7 +66,8 @@ def _model(plan: Plan) -> str:
     """Kinds of zones; the first four of many."""
     if plan.choice:
         each = ", ".join(f"{kind} {span(seconds)}" for kind, seconds in plan.choice)
-        return f"the cheapest, by a pre-run: {each}"
+        none = f"; no catenary: {plan.no_choice}" if plan.no_choice else ""
+        return f"the cheapest, by a pre-run: {each}{none}"
     if plan.base_cells is not None:
         return "adaptive: rod where a criterion asks for it, catenary elsewhere"
     if len(plan.zones) == 1:
@@ -115,6 +117,14 @@ def _time(scene: Scene, plan: Plan) -> str:
     asked = scene.time.step or plan.step
     short = f" ({asked:.6g} s asked)" if plan.step < 0.999 * asked else ""
     return f"{steps} of {plan.step:.6g} s{short}; about {span(plan.seconds)} of CPU"
+
+
+def _runs(plan: Plan) -> str:
+    """How many runs an accuracy, or an error figure, takes; empty of one."""
+    if plan.most_runs == 1:
+        return ""
+    more = f", {plan.most_runs} at most" if plan.most_runs > plan.runs else ""
+    return f"{plan.runs} with those to compare with{more}"
 
 
 def contents_table(plan: Plan) -> Any:

@@ -16,7 +16,7 @@ from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
 from hybrid.model.payout import PayoutForecast
-from hybrid.model.resolution import first_resolution, model_is_free
+from hybrid.model.resolution import first_resolution, model_is_free, predicted_runs
 from hybrid.model.run_time import processor_time
 from hybrid.model.sections import limits_along, outer_diameter
 from hybrid.scene.read import SceneLike, as_scene_or_system
@@ -49,8 +49,13 @@ class Plan:
     steps: int
     step: float  # s, of most steps
     seconds: float  # of processor time, within a factor of two (hybrid.model.run_time)
+    runs: int = (
+        1  # until there is a first result with its errors: the mesh pre-run and three to compare with among them
+    )
+    most_runs: int = 1  # if that misses the accuracy that is asked
     # The same of every model that a pre-run chooses from; none: the scene names its model.  The rest is as for rods.
     choice: tuple[tuple[str, float], ...] = ()
+    no_choice: str = ""  # why catenaries are none of them
     # None: an end turns freely, nothing resists bending, or the shape under all loads is not known without a search
     critical_torque: CriticalTorque | None = None
     payout: PayoutForecast | None = None  # of a line that is paid out; `cells` are those at t = 0
@@ -156,9 +161,10 @@ def plan(scene: SceneLike | System) -> Plan | SystemPlan:
     if not model_is_free(scene):
         return _plan(scene)
     rods = _plan(with_model(scene, "rod"))
-    kinds = ["adaptive"] if structural(scene, material(scene)) else ["catenary", "adaptive"]
+    why_not = structural(scene, material(scene))
+    kinds = ["adaptive"] if why_not else ["catenary", "adaptive"]
     others = tuple((kind, _plan(with_model(scene, kind)).seconds) for kind in kinds)
-    return replace(rods, choice=(("rod", rods.seconds), *others))
+    return replace(rods, choice=(("rod", rods.seconds), *others), no_choice=why_not)
 
 
 def _plan(scene: Scene) -> Plan:
@@ -181,7 +187,8 @@ def _plan(scene: Scene) -> Plan:
     seconds = processor_time(scene, model, mean, steps, outputs)
     return Plan(
         model.contents, zones, cells, model.layout.rod.size if model.layout else None, model.unknowns, steps, step,
-        seconds, critical_torque=_critical_torque(scene, model), payout=paid,
+        seconds, *(predicted_runs(scene) if scene.time else (1, 1)),
+        critical_torque=_critical_torque(scene, model), payout=paid,
     )  # fmt: skip
 
 

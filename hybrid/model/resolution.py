@@ -30,6 +30,9 @@ PER_PERIOD = 12
 # An end may turn so far in a step (rad), in runs of longer steps twice as far: with LARGEST_TWIST of
 # simulation.diagnostics, an element can then not pass half a turn, where its twist would be taken for the opposite one.
 TURN, MOST_TURN = 1.0, 2.0
+# Refinements that may follow the first result where an accuracy is asked; of an irregular motion, in which chance is
+# soon more than cells and steps are; of an equilibrium, whose errors need not fall evenly.
+MOST_REFINEMENTS, IRREGULAR_REFINEMENTS, REFINEMENTS_AT_REST = 3, 1, 6
 # Least steps to a run, and the shortest step, as a part of the longest, before a step counts as failed.
 LEAST_STEPS, SHORTEST = 10, 1e-6
 
@@ -144,6 +147,18 @@ def wants_errors(scene: Scene) -> bool:
     if scene.output.errors is not None:
         return scene.output.errors
     return accuracy_of(scene) is not None
+
+
+def predicted_runs(scene: Scene) -> tuple[int, int]:
+    """Runs that a scene in motion takes before it has a first result with its errors, and at most, with refinements."""
+    if not wants_errors(scene):
+        return 1 + wants_survey(scene), 1 + wants_survey(scene)
+    first = 4 + wants_survey(scene)  # three to compare with
+    if requested_accuracy(scene) is None:
+        return first, first
+    assert scene.time is not None
+    free = mesh_is_free(scene) or zones_are_free(scene) or (scene.time.controlled and scene.time.tolerance is None)
+    return first, first + free * (IRREGULAR_REFINEMENTS if is_irregular(scene) else MOST_REFINEMENTS)
 
 
 def mesh_is_free(scene: Scene) -> bool:

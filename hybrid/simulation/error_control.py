@@ -20,7 +20,13 @@ from hybrid.errors import ComputationError
 from hybrid.model.model_costs import NAMED, WORDS, ModelChoice
 from hybrid.model.output_points import OutputPoints
 from hybrid.model.plan import output_times
-from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.model.resolution import (
+    IRREGULAR_REFINEMENTS,
+    MOST_REFINEMENTS,
+    REFINEMENTS_AT_REST,
+    RequestedAccuracy,
+    Resolution,
+)
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import Errors, Estimate
 from hybrid.simulation.error_order import COARSER
@@ -33,7 +39,16 @@ from hybrid.simulation.error_statistics import (
     statistics_of,
     windows_uncertain,
 )
-from hybrid.simulation.refinement import MOST_OF_MODEL, Free, Verdict, judge, not_converged, refined
+from hybrid.simulation.refinement import (
+    COSTLY_ACCURACY,
+    MOST_OF_MODEL,
+    Free,
+    Verdict,
+    costly,
+    judge,
+    not_converged,
+    refined,
+)
 from hybrid.simulation.restore import resolution_from, resolution_tree
 from hybrid.simulation.run_sample import END_FORCES, RunSample, restored_notes, restored_sample
 from hybrid.store.named_arrays import Tree, matched
@@ -44,13 +59,10 @@ from hybrid.store.stored_rows import MissingRows
 STALLED = 0.8
 # Processor time, s, after which runs are not made finer for what they miss: a longer wait should be asked for.
 MOST_CPU = 600.0
-# Refinements that may follow the first result.
-MOST_REFINEMENTS = 3
-# The same of an equilibrium, which takes milliseconds, and until when: s.  Its errors need not fall evenly: cells lie
-# now so, now otherwise beside an edge of contact.
-REFINEMENTS_AT_REST, CPU_AT_REST = 6, 5.0
-# The same of an irregular motion, and how much finer it may be: chance is soon more than cells and steps are.
-IRREGULAR_REFINEMENTS, IRREGULAR_FINER = 1, 2.0
+# Processor time, s, after which an equilibrium is not made finer; it takes milliseconds.
+CPU_AT_REST = 5.0
+# How much finer a run of an irregular motion may be made: chance is soon more than cells and steps are.
+IRREGULAR_FINER = 2.0
 # A run that is hardly finer is not made of it: what it changes is chance.
 WORTH_REPEATING = 1.2
 # Values at an instant do not converge where halved cells and steps leave more of a difference than this: order 0.25.
@@ -165,6 +177,8 @@ class ErrorController:
             if self.estimate.lacks_model_errors():
                 self._renew_model_errors(self.estimate, resolution)
             self.next = self._next_resolution()
+            if self.next is not None and not any(kind == COSTLY_ACCURACY for kind, _ in self._notes):
+                self._notes += costly(self.runs, self.estimate.run, self.next)
         assert self.estimate is not None
         errors = self.estimate.errors
         if self.asked is not None:

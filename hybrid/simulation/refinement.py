@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import ceil, floor, log10, sqrt
 from typing import NamedTuple
@@ -23,6 +23,9 @@ MOST_OF_MODEL, OF_MODEL = 0.5, 0.25
 MOST_FINER = 3.0
 # Factor on cells or steps where the error is met in parts and missed in total.
 A_LITTLE = 0.8
+# Times the processor time of its last run beyond which an accuracy says what it will cost, and the kind of event; less
+# than the last, in s, is not worth a word.
+COSTLY, COSTLY_ACCURACY, LITTLE = 4.0, "costly accuracy", 0.5
 END_FORCE = next(iter(END_FORCES.values()))
 
 
@@ -97,6 +100,26 @@ def not_converged(found: Mapping[str, float], asked: RequestedAccuracy | None) -
     why = "finer cells and steps change as much as coarser ones did"
     end = "the error may be larger than its figure"
     return [(kind, f"{why}: {', '.join(names)}; {end}") for kind, names in texts.items()]
+
+
+def costly(runs: Sequence[float], before: RunSample, resolution: Resolution) -> list[tuple[str, str]]:
+    """Before a finer run: the event that says so where all runs take more than COSTLY times as long as it will.
+
+    runs: s of processor time, until now; before: the last result; resolution: of the finer one.
+    """
+    now = before.resolution
+    more = resolution.fineness / now.fineness * (now.step / resolution.step if resolution.step else 1.0)
+    if now.local and resolution.local:
+        more *= float(now.local / resolution.local) ** (1.0 / 3.0)
+    one = before.cpu * more
+    total = sum(runs) + one
+    if total <= COSTLY * one or total < LITTLE:
+        return []
+    text = (
+        f"run {len(runs) + 1} is made for this accuracy: all of them take about {total:.2g} s of processor time, "
+        f"{total / one:.2g} times that run alone"
+    )
+    return [(COSTLY_ACCURACY, text)]
 
 
 def _largest(errors: Errors, cause: str, name: str) -> float:

@@ -188,7 +188,7 @@ class RunStore:
                 detail = f"the reference run, {spec.name}, failed: nothing can be compared; {error.detail}"
                 raise ComputationError(error.outcome, error.t, error.s, detail.rstrip("; ")) from None
             return self.save(replace(row, cause=str(error).splitlines()[0]), {})
-        except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
+        except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError, ResultError) as error:
             if required:
                 raise
             return replace(row, cause=f"a bug: {type(error).__name__}: {error}"), {}

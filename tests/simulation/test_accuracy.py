@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,7 @@ from hybrid.simulation import error_estimate
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import OF_SIZES, SAFETY, Errors, Estimate
 from hybrid.simulation.error_order import ORDERS
-from hybrid.simulation.refinement import Free, Verdict, judge, not_converged, refined
+from hybrid.simulation.refinement import Free, Verdict, costly, judge, not_converged, refined
 from hybrid.simulation.result_checks import cubic_spline
 from hybrid.simulation.run_sample import RunSample
 
@@ -557,6 +558,18 @@ def test_notes_and_model_error_are_of_the_runs_that_count():
     assert final.cells == 900 and len(control.runs) == 6
     assert errors.largest("model", "position") == 0.0005
     assert control.notes == ()
+
+
+def test_an_accuracy_that_costs_more_than_four_times_its_last_run_says_so_before_it():
+    """Three runs of 1 s and two results of 2 s before a third that is half finer again: 10 s, 3.3 times; then 4.3."""
+    resolution = Resolution(1.0, 0.1, None, 1e-3)
+    before = replace(made_up(), resolution=resolution, cpu=2.0)
+    finer = replace(resolution, fineness=1.5)
+    assert costly([1.0, 1.0, 1.0, 2.0, 2.0], before, finer) == []
+    ((kind, text),) = costly([1.0, 1.0, 1.0, 2.0, 2.0, 3.0], before, finer)
+    assert kind == "costly accuracy" and "run 7" in text and "13 s" in text and "4.3 times" in text
+    assert costly([1.0, 1.0, 1.0, 2.0, 2.0, 3.0], before, replace(finer, step=0.05)) == []
+    assert costly([0.01, 0.01, 0.01, 0.02], replace(before, cpu=0.02), replace(finer, fineness=0.5)) == []
 
 
 def test_a_model_error_that_cannot_be_true_is_not_counted():

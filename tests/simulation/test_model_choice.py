@@ -128,3 +128,14 @@ def test_the_plan_predicts_each():
     assert [kind for kind, _ in hybrid.plan(CLAMPED).choice] == ["rod", "adaptive"]
     assert {zone.kind for zone in plan.zones} == {"rod"}
     assert hybrid.plan(TAUT | {"model": "rod"}).choice == ()
+    assert plan.no_choice == "" and hybrid.plan(CLAMPED).no_choice == "an end is clamped"
+
+
+def test_the_plan_predicts_the_number_of_runs():
+    """A pre-run, three to compare with and the result, and three finer ones; what is fixed cannot be made finer."""
+    plan = hybrid.plan(TAUT)
+    assert (plan.runs, plan.most_runs) == (5, 8)
+    fixed = TAUT | {"model": "rod", "mesh": {"cells": 20}, "time": {"duration": 2.0, "step": 0.05}, "accuracy": "1%"}
+    assert (hybrid.plan(fixed).runs, hybrid.plan(fixed).most_runs) == (4, 4)
+    result = hybrid.run(TAUT)
+    assert plan.runs - 1 <= result.attributes["effort_runs"] <= plan.most_runs

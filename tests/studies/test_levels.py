@@ -34,7 +34,7 @@ def values(
     shift: float, force: float, moment: list[list[float]], curvature: list[list[float]]
 ) -> dict[str, np.ndarray]:
     reaction = np.full((2, 3), [100.0 + force, 0.0, 0.0])
-    position = np.zeros((2, 2, 3)) + [shift, 0.0, 0.0]
+    position = np.full((2, 2, 3), [shift, 0.0, 0.0])
     return {"position": position, "reaction_start": reaction, "bending_moment": np.array(moment),
             "curvature": np.array(curvature)}  # fmt: skip
 
