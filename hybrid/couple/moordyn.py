@@ -13,6 +13,7 @@ from math import inf
 
 import numpy as np
 
+from hybrid.errors import Complaint, SceneError
 from hybrid.interop.moordyn.cables import chain_of
 from hybrid.interop.moordyn.deck import Deck, read_deck
 from hybrid.interop.moordyn.rows import read_source
@@ -22,11 +23,12 @@ from hybrid.model.bodies import frame_of
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
 from hybrid.scene.system import System
-from hybrid.simulation.system_stepping import SystemSimulation
+from hybrid.simulation.system_stepping import PointState, SystemSimulation
 
 # s: the longest step, and how long a system may be stepped.
 LONGEST_STEP, DURATION = 0.05, 1e7
 POINT_TYPE_FREE, POINT_TYPE_FIXED, POINT_TYPE_COUPLED = 0, 1, -1
+BODY_TYPE_COUPLED = -1
 _TYPES = {"free": POINT_TYPE_FREE, "coupled": POINT_TYPE_COUPLED}
 # Of a step: how far the clock of the caller may be from ours.
 CLOCK = 1e-6
@@ -38,7 +40,7 @@ class MoorDynBody:
     def __init__(self, id: int, place: Sequence[float], points: dict[str, Floats]) -> None:
         """points: places (3,) m in axes of the body, by name in the scene."""
         self.id, self.points = id, points
-        self.r, self.v = np.array(place, float), np.zeros(6)
+        self.r, self.v = np.array(place, float), np.zeros(6)  # m, rad and m/s, rad/s, after the last step
 
     def at(self, r: Floats, v: Floats) -> dict[str, tuple[Floats, Floats]]:
         """Places and velocities of its points where the body is at r (m, rad) and moves with v (m/s, rad/s)."""
@@ -63,7 +65,7 @@ class MoorDynLine:
     def node(self, i: int) -> int:
         """Node of the scene's line for node i from end A."""
         count = abs(self.last - self.first)
-        if not (isinstance(i, int) and 0 <= i <= count):
+        if isinstance(i, bool) or not (isinstance(i, int) and 0 <= i <= count):
             raise ValueError(f"i: expected a node from 0 to {count}, found {i!r}")
         return self.first + i if self.last >= self.first else self.first - i
 
@@ -76,7 +78,7 @@ class MoorDyn:
         made = system_of(self.deck)
         self.text, self.notes = made.text, made.notes
         self.simulation: SystemSimulation | None = None
-        self.dt, self.origin = LONGEST_STEP, inf
+        self.dt, self.origin, self.closed = LONGEST_STEP, inf, False
         scene, _ = parse_either(self.text)
         assert isinstance(scene, System)
         self.scene = scene
@@ -139,6 +141,18 @@ class MoorDyn:
             out[name] = x[at], v[at]
         return out
 
+    def note(self, x: Floats, v: Floats) -> None:
+        """Where coupled bodies are now, and how fast."""
+        for k, body in enumerate(self.bodies):
+            body.r, body.v = x[6 * k : 6 * k + 6].copy(), v[6 * k : 6 * k + 6].copy()
+
+    def point(self, name: str) -> PointState:
+        """A point now; before `Init` where the deck has it, at rest, without force."""
+        if self.simulation is None and self.origin == inf and not self.closed:
+            place = self.scene.first_place(name)
+            return PointState(np.array(place, float), np.zeros(3), np.zeros(3))
+        return self.running.point(name)
+
     def forces(self, x: Floats) -> list[float]:
         """Forces (and moments about the origin of bodies) of the lines on what the caller moves."""
         out: list[float] = []
@@ -155,16 +169,31 @@ class MoorDyn:
 # --- the functions of the package ------------------------------------------------------------------
 
 
+class DeckRefused(SceneError, RuntimeError):
+    """An input file that cannot be one scene, in its lines; a RuntimeError as scripts for MoorDyn expect it."""
+
+
 def Create(filepath: str = "") -> MoorDyn:
-    """A system from an input file of MoorDyn; SceneError, in lines of the file, where it cannot be one scene."""
-    return MoorDyn(filepath or "Mooring/lines.txt")
+    """A system from an input file of MoorDyn, Mooring/lines.txt if none is named.
+
+    DeckRefused, a SceneError and a RuntimeError: the file cannot be read, or cannot be one scene.
+    """
+    try:
+        return MoorDyn(filepath or "Mooring/lines.txt")
+    except SceneError as error:
+        raise DeckRefused(error.complaints, error.file) from None
+    except (OSError, TypeError) as error:
+        asked = Complaint("filepath", f"{filepath!r:.200}", "an input file of MoorDyn", "check the path")
+        raise DeckRefused([asked]) from error
 
 
 def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) -> int:
     """Find the equilibrium with coupled points and bodies at x (m, rad); v: their velocities (m/s, rad/s)."""
     if instance.simulation is not None:
         raise ValueError("the system is running already: Close it, or Create another")
-    places = instance.places(instance.numbers(x, "x"), instance.numbers(v, "v"))
+    first, speed = instance.numbers(x, "x"), instance.numbers(v, "v")
+    places = instance.places(first, speed)
+    instance.note(first, speed)
     data = instance.scene.model_dump(exclude_none=True)
     for name, (place, _) in places.items():
         data["points"][name] = {"kind": "fixed", "position": place.tolist()}
@@ -182,8 +211,8 @@ def Step(instance: MoorDyn, x: Sequence[float], v: Sequence[float], t: float, dt
     x, v: as of `Init`, at the time t; the first t is where the clock begins.
     """
     running, begin, speed = instance.running, instance.numbers(x, "x"), instance.numbers(v, "v")
-    if not (np.isfinite(t) and np.isfinite(dt) and dt > 0.0):
-        raise ValueError(f"t, dt: expected a time and a step > 0, in s, found {t!r}, {dt!r}")
+    if not (_is_number(t) and _is_number(dt) and dt > 0.0):
+        raise ValueError(f"t, dt: expected a time and a step > 0, in s, found {t!r:.60}, {dt!r:.60}")
     if instance.origin == inf:
         instance.origin = t - running.t
     if abs(t - instance.origin - running.t) > CLOCK * dt:
@@ -192,13 +221,14 @@ def Step(instance: MoorDyn, x: Sequence[float], v: Sequence[float], t: float, dt
     for name, (place, velocity) in instance.places(end, speed).items():
         running.set_point(name, place, velocity)
     running.advance(t - instance.origin + dt)
+    instance.note(end, speed)
     return instance.forces(end)
 
 
 def Close(instance: MoorDyn) -> int:
     """The system is over."""
     instance.running.close()
-    instance.simulation = None
+    instance.simulation, instance.closed = None, True
     return 0
 
 
@@ -214,8 +244,8 @@ def GetDt(instance: MoorDyn) -> float:
 
 def SetDt(instance: MoorDyn, dt: float) -> None:
     """The longest step, s; before `Init`."""
-    if instance.simulation is not None or not 0.0 < dt < inf:
-        raise ValueError(f"dt: expected a number > 0, in s, before Init; found {dt!r}")
+    if instance.simulation is not None or not (_is_number(dt) and dt > 0.0):
+        raise ValueError(f"dt: expected a number > 0, in s, before Init; found {dt!r:.60}")
     instance.dt = float(dt)
 
 
@@ -237,6 +267,30 @@ def GetPoint(instance: MoorDyn, point: int) -> MoorDynPoint:
     return instance.points[_number(point, len(instance.points), "point")]
 
 
+def GetNumberBodies(instance: MoorDyn) -> int:
+    """Coupled bodies; others are read from the result of a scene."""
+    return len(instance.bodies)
+
+
+def GetBody(instance: MoorDyn, body: int) -> MoorDynBody:
+    """Coupled body number `body`, from 1."""
+    return instance.bodies[_number(body, len(instance.bodies), "body")]
+
+
+def GetBodyID(instance: MoorDynBody) -> int:
+    return instance.id
+
+
+def GetBodyType(instance: MoorDynBody) -> int:
+    """BODY_TYPE_COUPLED: there are no others."""
+    return BODY_TYPE_COUPLED
+
+
+def GetBodyState(instance: MoorDynBody) -> tuple[tuple[float, ...], tuple[float, ...]]:
+    """Place (m, rad) and velocity (m/s, rad/s), six numbers each; before `Init` as the deck has them."""
+    return tuple(instance.r.tolist()), tuple(instance.v.tolist())
+
+
 def GetLineID(instance: MoorDynLine) -> int:
     return instance.id
 
@@ -252,17 +306,17 @@ def GetPointType(instance: MoorDynPoint) -> int:
 
 def GetPointPos(instance: MoorDynPoint) -> tuple[float, ...]:
     """Position, m."""
-    return tuple(instance.system.running.point(instance.name).position.tolist())
+    return tuple(instance.system.point(instance.name).position.tolist())
 
 
 def GetPointVel(instance: MoorDynPoint) -> tuple[float, ...]:
     """Velocity, m/s."""
-    return tuple(instance.system.running.point(instance.name).velocity.tolist())
+    return tuple(instance.system.point(instance.name).velocity.tolist())
 
 
 def GetPointForce(instance: MoorDynPoint) -> tuple[float, ...]:
     """Force of its lines on it, N."""
-    return tuple(instance.system.running.point(instance.name).force.tolist())
+    return tuple(instance.system.point(instance.name).force.tolist())
 
 
 def GetLineN(instance: MoorDynLine) -> int:
@@ -312,8 +366,8 @@ def GetLineMaxTen(instance: MoorDynLine) -> float:
 
 def GetFASTtens(instance: MoorDyn, n_lines: int) -> tuple[list[float], ...]:
     """Of each line the horizontal and the vertical tension at end B, then at end A, N."""
-    if n_lines != len(instance.lines):
-        raise ValueError(f"n_lines: expected {len(instance.lines)}, found {n_lines!r}")
+    if isinstance(n_lines, bool) or not isinstance(n_lines, int) or n_lines != len(instance.lines):
+        raise ValueError(f"n_lines: expected {len(instance.lines)}, found {n_lines!r:.60}")
     out: tuple[list[float], ...] = ([], [], [], [])
     for line in instance.lines:
         for k, node in ((0, GetLineN(line)), (2, 0)):
@@ -323,7 +377,20 @@ def GetFASTtens(instance: MoorDyn, n_lines: int) -> tuple[list[float], ...]:
     return out
 
 
+def _is_number(x: object) -> bool:
+    """Whether x is a finite number."""
+    return isinstance(x, int | float | np.integer | np.floating) and not isinstance(x, bool) and bool(np.isfinite(x))
+
+
 def _number(k: int, count: int, name: str) -> int:
-    if not (isinstance(k, int) and 1 <= k <= count):
-        raise ValueError(f"{name}: expected a number from 1 to {count}, found {k!r}")
+    if isinstance(k, bool) or not (isinstance(k, int) and 1 <= k <= count):
+        among = f"a number from 1 to {count}" if count else f"no call, because the deck has no {name}"
+        raise ValueError(f"{name}: expected {among}, found {k!r:.60}")
     return k - 1
+
+
+# --- names of older versions -----------------------------------------------------------------------
+
+GetConnection, GetNumberConnections = GetPoint, GetNumberPoints
+GetConnectID, GetConnectType, GetConnectPos = GetPointID, GetPointType, GetPointPos
+GetConnectVel, GetConnectForce = GetPointVel, GetPointForce

@@ -90,8 +90,7 @@ class SystemSimulation:
         it is.  ValueError: there is no such point, or it is free, on a body, or has a motion in the scene.
         """
         self._check_open()
-        if name not in self.scene.points:
-            raise ValueError(f"name: expected a point of the scene ({', '.join(self.scene.points)}), found {name!r}")
+        self._check_point(name)
         point = self.scene.points[name]
         if isinstance(point, FreePoint) or self.scene.body_of(name) is not None:
             raise ValueError(f"points.{name} is free or on a body: only fixed points are set")
@@ -143,8 +142,7 @@ class SystemSimulation:
     @one_thread
     def point(self, name: str) -> PointState:
         """Where a point is, and the force of its lines on it; of a free point that force is what moves it."""
-        if name not in self.scene.points:
-            raise ValueError(f"name: expected a point of the scene ({', '.join(self.scene.points)}), found {name!r}")
+        self._check_point(name)
         force = np.zeros(3)
         for line, end in self.scene.lines_at(name):
             at_end = end == "end"
@@ -165,9 +163,15 @@ class SystemSimulation:
         report = self._run.solver.work[self._line(name)].report
         return report[FORCE_A : FORCE_A + 3].copy(), report[FORCE_A + 3 : FORCE_A + 6].copy()
 
+    def _check_point(self, name: object) -> None:
+        if not isinstance(name, str) or name not in self.scene.points:
+            points = ", ".join(self.scene.points)
+            raise ValueError(f"name: expected a point of the scene ({points}), found {name!r:.60}")
+
     def _line(self, name: str) -> int:
-        if name not in self._run.model.names:
-            raise ValueError(f"name: expected a line of the scene ({', '.join(self._run.model.names)}), found {name!r}")
+        if not isinstance(name, str) or name not in self._run.model.names:
+            lines = ", ".join(self._run.model.names)
+            raise ValueError(f"name: expected a line of the scene ({lines}), found {name!r:.60}")
         return self._run.model.names.index(name)
 
     def result(self) -> Result:

@@ -1,0 +1,209 @@
+"""A hundred wrong uses of each interface beside Simulation: an error in words, no crash, and it goes on unchanged.
+
+`tests/simulation/test_stepping_wrong_uses.py` has those of `hybrid.Simulation`.
+"""
+
+from __future__ import annotations
+
+import threading
+from collections.abc import Callable, Iterator
+from math import inf, nan
+from pathlib import Path
+from typing import Any
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi3 import FMU3Slave
+
+import hybrid
+from hybrid.couple import moordyn
+
+DECK = Path(__file__).parents[1] / "data" / "moordyn" / "three_lines.txt"
+PLACES = [40.0, 0.0, -14.0, -20.0, 34.64, -14.0, -20.0, -34.64, -14.0]
+STILL = [0.0] * 9
+PLACE = PLACES[:3]
+
+NO_TIMES = [None, "x", nan, inf, -inf, -1.0, 0.0, [], [1.0], {}, object(), True, 1e300, b"a", 1 + 2j, np.zeros(3), "1.0",
+            (), set(), nan * np.ones(1), np.array("a")]  # fmt: skip
+NO_NAMES = ["", "middle", None, 0, 1.5, nan, [], ["line1"], {}, object(), True, b"line1", (), "LINE1", "point99", 1j,
+            np.zeros(2), "line1 ", "anchor"]  # fmt: skip
+NO_VECTORS = ["abc", nan, [1, 2], [1, 2, 3, 4], [1, nan, 3], [1, 2, "x"], {}, object(), np.zeros((3, 3)), [[1], [2], [3]],
+              [None] * 3, [inf, 0, 0], 1.0, [1j, 0, 0], [True, {}, 0], b"abc", [], [[]], np.zeros((1, 3)), "1 2 3"]  # fmt: skip
+NO_NUMBERS = ["abc", nan, STILL[:8], [*STILL, 0.0], [nan] * 9, [inf, *STILL[1:]], {}, object(), [[], []], [None] * 9,
+              ["x"] * 9, 1.0, [1j] * 9, None, b"abc", [], [{}] * 9, np.zeros((2, 9))]  # fmt: skip
+NO_INDICES = [0, -1, 99, 1.0, "1", None, nan, [], [1], {}, object(), b"1", 1j, inf, 10**30, (1,), np.zeros(2), True]
+
+
+def refused(uses: list[Callable[[], Any]]) -> int:
+    for k, use in enumerate(uses):
+        with pytest.raises(ValueError, match=r"\w+.*\w+") as caught:
+            use()
+        assert type(caught.value) is ValueError, f"use {k}: {caught.value!r}"
+    return len(uses)
+
+
+# --- several lines -------------------------------------------------------------------------------
+
+
+def system() -> hybrid.SystemSimulation:
+    data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
+    return hybrid.SystemSimulation(data | {"time": {"duration": 1.0, "step": 0.05}})
+
+
+def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
+    for x in NO_TIMES:
+        yield lambda x=x: s.advance(x)
+    for x in NO_NAMES:
+        yield lambda x=x: s.set_point(x, PLACE)
+        yield lambda x=x: s.point(x)
+        yield lambda x=x: s.line(x)
+        yield lambda x=x: s.forces(x)
+    for x in NO_VECTORS:
+        yield lambda x=x: s.set_point("point4", x)
+        yield lambda x=x: s.set_point("point4", PLACE, x)
+
+
+def test_wrong_uses_of_several_lines() -> None:
+    with system() as plain:
+        plain.advance(0.2)
+        expected = plain.line("line1").position
+    with system() as asked:
+        asked.advance(0.1)
+        count = refused(list(uses_of_a_system(asked)))
+        assert asked.t == 0.1
+        asked.advance(0.2)
+        assert np.array_equal(asked.line("line1").position, expected)
+    print(f"{count} wrong uses of SystemSimulation")
+    assert count > 100
+    assert refused([lambda: asked.advance(0.5), lambda: asked.set_point("point4", PLACE)]) == 2
+    asked.close()
+
+
+def test_two_threads_in_several_lines() -> None:
+    with system() as lines:
+        found: list[str] = []
+        busy = threading.Thread(target=lambda: lines.advance(1.0))
+        busy.start()
+        while busy.is_alive():
+            for use in (lambda: lines.point("point4"), lambda: lines.line("line1"), lambda: lines.advance(1.0)):
+                try:
+                    use()
+                except ValueError as error:
+                    found.append(str(error))
+        busy.join()
+        assert lines.t == pytest.approx(1.0)
+        assert any("another thread" in text for text in found)
+
+
+# --- MoorDyn's functions -------------------------------------------------------------------------
+
+
+def uses_of_moordyn(s: moordyn.MoorDyn) -> Iterator[Callable[[], Any]]:
+    for x in NO_NUMBERS:
+        yield lambda x=x: moordyn.Step(s, x, STILL, 0.0, 0.1)
+        yield lambda x=x: moordyn.Step(s, PLACES, x, 0.0, 0.1)
+        yield lambda x=x: moordyn.Init(s, x, STILL)
+    for x in NO_TIMES:
+        yield lambda x=x: moordyn.Step(s, PLACES, STILL, 0.0, x)
+    for x in [None, "x", nan, inf, -inf, [], [1.0], {}, object(), True, b"a", 1j, np.zeros(3)]:
+        yield lambda x=x: moordyn.Step(s, PLACES, STILL, x, 0.1)
+    for x in NO_INDICES:
+        yield lambda x=x: moordyn.GetLine(s, x)
+        yield lambda x=x: moordyn.GetPoint(s, x)
+        yield lambda x=x: moordyn.GetBody(s, x)
+    for x in [-1, 21, 1.0, "1", None, nan, [], {}, object(), True, 10**30, 1j]:
+        yield lambda x=x: moordyn.GetLineNodePos(moordyn.GetLine(s, 1), x)
+        yield lambda x=x: moordyn.GetLineNodeVel(moordyn.GetLine(s, 1), x)
+        yield lambda x=x: moordyn.GetLineNodeTen(moordyn.GetLine(s, 1), x)
+        yield lambda x=x: moordyn.GetFASTtens(s, x)
+        yield lambda x=x: moordyn.SetDt(s, x)
+
+
+def started() -> moordyn.MoorDyn:
+    made = moordyn.Create(str(DECK))
+    moordyn.Init(made, PLACES, STILL)
+    return made
+
+
+def test_wrong_uses_of_moordyns_functions() -> None:
+    plain, asked = started(), started()
+    expected = moordyn.Step(plain, PLACES, STILL, 0.0, 0.1)
+    count = refused(list(uses_of_moordyn(asked)))
+    assert moordyn.Step(asked, PLACES, STILL, 0.0, 0.1) == expected
+    assert refused([lambda: moordyn.Step(asked, PLACES, STILL, 0.0, 0.1)]) == 1  # the clock goes back
+    print(f"{count} wrong uses of MoorDyn's functions")
+    assert count > 100
+    for each in (plain, asked):
+        moordyn.Close(each)
+    assert refused([lambda: moordyn.Step(asked, PLACES, STILL, 0.1, 0.1), lambda: moordyn.Close(asked),
+                    lambda: moordyn.GetPointPos(moordyn.GetPoint(asked, 4))]) == 3  # fmt: skip
+
+
+# --- an FMU --------------------------------------------------------------------------------------
+
+SCENE = """
+cable: {sections: [{length: 12.0, mass: 2.0, axial_stiffness: 1e5, diameter: 0.02}]}
+ends: {start: {kind: pinned, position: [0, 0, 0]}, end: {kind: pinned, position: [10, 0, 0]}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 10}
+time: {duration: 2, step: 0.05}
+"""
+
+
+def test_wrong_uses_of_an_fmu(tmp_path: Path) -> None:
+    """Times, sizes, inputs that are no numbers, after each of them a step as if nothing had been asked; then closed."""
+    unit, said = hybrid.export_fmu(hybrid.parse_scene(SCENE), tmp_path / "line.fmu"), list[str]()
+    fmpy.extract(unit, tmp_path / "open")
+    description = fmpy.read_model_description(tmp_path / "open")
+    number = {x.name: x.valueReference for x in description.modelVariables}
+    name = description.coSimulation.modelIdentifier
+    cable = FMU3Slave(
+        guid=description.guid, unzipDirectory=str(tmp_path / "open"), modelIdentifier=name, instanceName="x"
+    )
+    cable.instantiate(loggingOn=True, logMessage=lambda _, status, category, message: said.append(message.decode()))
+    cable.enterInitializationMode()
+    cable.exitInitializationMode()
+
+    def wrong(t: float, step: float, inputs: dict[str, float] | None = None) -> None:
+        before = len(said)
+        for key, value in (inputs or {}).items():
+            cable.setFloat64([number[key]], [value])
+        with pytest.raises(Exception, match="fmi3DoStep"):
+            cable.doStep(currentCommunicationPoint=t, communicationStepSize=step)
+        assert any(len(text) > 20 for text in said[before:]), (t, step, inputs)
+        for key in inputs or {}:
+            cable.setFloat64([number[key]], [10.0 if key == "end.position.x" else 0.0])
+
+    bad = (nan, inf, -inf)
+    count = 0
+    for k in range(4):
+        t = 0.05 * k
+        uses: list[tuple[Any, ...]] = [(at, 0.05) for at in (*bad, -1.0, t + 0.1, t - 0.05, 1e300, 2.0)]
+        uses += [(t, size) for size in (*bad, -0.05, 0.0, 5.0, 1e300, -1e300)]
+        keys = [f"{end}.{what}.{x}" for end in ("start", "end") for what in ("position", "velocity") for x in "xyz"]
+        uses += [(t, 0.05, {key: bad[(j + k) % 3]}) for j, key in enumerate(keys)]
+        for use in uses:
+            wrong(*use)
+        count += len(uses)
+        cable.doStep(currentCommunicationPoint=t, communicationStepSize=0.05)
+    force = cable.getFloat64([number["end.force.x"], number["end.force.z"]])
+    saved = cable.getFMUState()
+    wrong(0.2, 0.05, {"end.position.x": 30.0})  # the step fails, and goes on from the saved state
+    wrong(0.2, 0.05)
+    cable.setFMUState(saved)
+    assert cable.getFloat64([number["end.force.x"], number["end.force.z"]]) == force
+    cable.doStep(currentCommunicationPoint=0.2, communicationStepSize=0.05)
+    print(f"{count + 2} wrong uses of an FMU")
+    assert count + 2 > 100
+    cable.terminate()
+    cable.freeInstance()
+    with hybrid.Simulation(hybrid.parse_scene(SCENE)) as same:
+        same.set_end("start", [0, 0, 0])
+        same.set_end("end", [10, 0, 0])
+        same.advance(0.05)
+        same.advance(0.1)
+        same.advance(0.15)
+        same.advance(0.2)
+        assert force == pytest.approx([same.forces().end[0], same.forces().end[2]], rel=1e-9)
