@@ -14,6 +14,7 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.compile import inner
+from hybrid.kernels.members import members_change, members_force
 from hybrid.kernels.rotations import (
     add,
     cross,
@@ -33,8 +34,9 @@ from hybrid.kernels.rotations import (
 # Of a state: origin (m) and frame, velocity, algorithmic and true acceleration, the same three of the rotation.
 PLACE, FRAME, V, A, VD, W, WA, WD, STATE = 0, 3, 12, 15, 18, 21, 24, 27, 30
 # Of a body: mass and damping matrices (6 x 6), weight less buoyancy upwards (N) and its arm (N m), height at which it
-# floats (m), stiffness of heave, roll and pitch, force and moment on it (inertial).
-MASS, DAMPING, LIFT, ARM, LEVEL, STIFFNESS, FORCE, MOMENT, NUMBERS = 0, 36, 72, 73, 76, 77, 80, 83, 86
+# floats (m), stiffness of heave, roll and pitch, force and moment on it (inertial), number of pieces of its members,
+# which follow (kernels.members).
+MASS, DAMPING, LIFT, ARM, LEVEL, STIFFNESS, FORCE, MOMENT, PIECES, NUMBERS = 0, 36, 72, 73, 76, 77, 80, 83, 86, 87
 # Worked in: displacement, rotation vector, frame at the start of the step, correction, force and moment of all but the
 # lines, and of the lines; kinetic and potential energy (J), powers of the lines, of damping and of what is given (W),
 # the same before the step, and their work (J).
@@ -129,6 +131,10 @@ def own_force(body, old, new, work):
     h = cross((-body[STIFFNESS + 2] * t[0], -body[STIFFNESS + 1] * t[1], 0.0), t)
     F = add(vector(body, FORCE), (0.0, 0.0, body[LIFT] - body[STIFFNESS] * height))
     M = add(vector(body, MOMENT), add(cross(arm, VERTICAL), mat_vec(R, h)))
+    spin, wet = mat_vec(R, w), 0.0
+    if body[PIECES] > 0.0:
+        by, about, wet = members_force(body, NUMBERS, int(body[PIECES]), R, vector(new, V), spin)
+        F, M = add(F, by), add(M, about)
     put(work, OWN, sub(F, mat_vec(R, f)))
     put(work, OWN + 3, sub(M, mat_vec(R, m)))
     work[KINETIC] = 0.5 * (dot(nu, p1) + dot(w, p2))
@@ -136,9 +142,8 @@ def own_force(body, old, new, work):
         0.5 * body[STIFFNESS] * height * height - body[LIFT] * (old[PLACE + 2] + work[U + 2]) - arm[2]
         + 0.5 * (body[STIFFNESS + 2] * t[0] * t[0] + body[STIFFNESS + 1] * t[1] * t[1])
     )  # fmt: skip
-    spin = mat_vec(R, w)
     work[POWER] = dot(vector(work, LINES), vector(new, V)) + dot(vector(work, LINES + 3), spin)
-    work[POWER + 1] = -dot(b1, nu) - dot(b2, w)
+    work[POWER + 1] = wet - dot(b1, nu) - dot(b2, w)
     work[POWER + 2] = dot(vector(body, FORCE), vector(new, V)) + dot(vector(body, MOMENT), spin)
 
 
@@ -173,6 +178,13 @@ def own_change(body, new, work, dr, turn, cv, ca):
     dF = sub((0.0, 0.0, -body[STIFFNESS] * dr[2]), add(mat_vec(R, df), cross(turn, mat_vec(R, f))))
     dM = cross(cross(turn, mat_vec(R, vector(body, ARM))), VERTICAL)
     dM = add(dM, add(mat_vec(R, dh), cross(turn, mat_vec(R, h))))
+    if body[PIECES] > 0.0:
+        spin = mat_vec(R, w)
+        dspin = add(cross(turn, spin), mat_vec(R, dw))
+        by, about = members_change(
+            body, NUMBERS, int(body[PIECES]), R, vector(new, V), spin, scale(cv, dr), dspin, turn
+        )
+        dF, dM = add(dF, by), add(dM, about)
     return dF, sub(dM, add(mat_vec(R, dm), cross(turn, mat_vec(R, m))))
 
 

@@ -17,6 +17,7 @@ from hybrid.kernels.bodies import (
     MASS,
     MOMENT,
     NUMBERS,
+    PIECES,
     PLACE,
     STATE,
     STIFFNESS,
@@ -24,6 +25,7 @@ from hybrid.kernels.bodies import (
 )
 from hybrid.kernels.state import Floats
 from hybrid.model.ends import EndLoad, end_load
+from hybrid.model.members import Members, pieces_of
 from hybrid.model.sea import Surroundings
 from hybrid.scene.bodies import FixedBody, FreeBody, turned
 from hybrid.scene.motion import EndMotion
@@ -49,6 +51,7 @@ class BodyModel:
     numbers: Floats  # (NUMBERS,) of kernels.bodies, without what is given to act on it
     start: Floats  # (STATE,) where it is first looked for
     loads: tuple[EndLoad, ...]  # forces and moments that are given
+    members: Members | None = None  # on which the water acts
 
     def load(self, t: float, since: float, out: Floats) -> None:
         """Write the force and the moment given at t (s; infinity: of full size) into `out` (NUMBERS,).
@@ -67,8 +70,10 @@ class BodyModel:
         return [x.until for x in self.loads if np.isfinite(x.until)]
 
 
-def body_model(name: str, body: FreeBody, density: float, gravity: float) -> BodyModel:
-    """The numbers of a free body in a fluid of a density (kg/m3)."""
+def body_model(
+    name: str, body: FreeBody, density: float, gravity: float, around: Surroundings | None = None
+) -> BodyModel:
+    """The numbers of a free body in a fluid of a density (kg/m3); around: the sea, for what has members."""
     numbers, start = np.zeros(NUMBERS), np.zeros(STATE)
     numbers[MASS : MASS + 36] = np.ravel(body.mass_matrix)
     if body.damping is not None:
@@ -85,7 +90,12 @@ def body_model(name: str, body: FreeBody, density: float, gravity: float) -> Bod
     loads = [
         end_load(x.what, 0, x.values, np.inf if x.until is None else x.until, x.ramp, x.rows) for x in body.end.loads
     ]
-    return BodyModel(name, numbers, start, tuple(loads))
+    if not body.members or around is None:
+        return BodyModel(name, numbers, start, tuple(loads))
+    members = Members(*pieces_of(body, density), around)
+    numbers[MASS : MASS + 36] += members.added_mass(start).ravel()
+    numbers[PIECES] = len(members.pieces)
+    return BodyModel(name, np.append(numbers, members.pieces), start, tuple(loads), members)
 
 
 class KnownMotion(EndMotion):

@@ -9,11 +9,13 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.members import PIECE
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
 from hybrid.model.initial_shape import dead_loads
+from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
@@ -52,10 +54,19 @@ class SystemModel:
             body.load(t, since, row)
 
     def body_numbers(self, t: float) -> Floats:
-        """(B, NUMBERS) of the free bodies at t (s)."""
-        out = np.array([body.numbers for body in self.bodies]).reshape(-1, NUMBERS)
+        """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first."""
+        out = np.zeros((len(self.bodies), max((x.numbers.size for x in self.bodies), default=NUMBERS)))
+        for row, body in zip(out, self.bodies, strict=True):
+            row[: body.numbers.size] = body.numbers
         self.load_bodies(t, out)
+        self.stir(t, self.body_places, 0.0, out)
         return out
+
+    def stir(self, t: float, bodies: Floats, dt: float, out: Floats) -> None:
+        """Write the water around members of bodies (B, STATE) at t (s), dt (s) later, into their numbers `out`."""
+        for body, state, row in zip(self.bodies, bodies, out, strict=True):
+            if body.members is not None:
+                body.members.stir(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
 
 
 def build_system(system: System, places: Floats | None = None, bodies: Floats | None = None) -> SystemModel:
@@ -67,7 +78,12 @@ def build_system(system: System, places: Floats | None = None, bodies: Floats | 
     free, free_bodies = system.free, list(system.free_bodies)
     environment = system.environment
     density = environment.fluid.density if environment.fluid is not None else 0.0
-    made = tuple(body_model(name, body, density, environment.gravity) for name, body in system.free_bodies.items())
+    around = None
+    if any(body.members for body in system.free_bodies.values()):
+        around = surroundings(system.scene_of(next(iter(system.lines))), 1)
+    made = tuple(
+        body_model(name, body, density, environment.gravity, around) for name, body in system.free_bodies.items()
+    )
     if places is None:
         places = np.array([system.first_place(x) for x in free], float).reshape(-1, 3)
     if bodies is None:

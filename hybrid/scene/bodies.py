@@ -25,6 +25,7 @@ from hybrid.scene.base import (
     Positive,
     Table,
     Vector,
+    Whole,
     Words,
     by_kind,
     numbers,
@@ -88,6 +89,28 @@ def no_pivot(matrix: Matrix, least: float) -> bool:
             for j in range(k, n):
                 rows[i][j] -= f * rows[k][j]
     return False
+
+
+class Member(Table):
+    """A cylinder of a body that water flows around: drag, added mass and the force of waves after Morison."""
+
+    start: Vector = Field(description="one end of its axis, from the origin of the body in axes of the body [m]")
+    end: Vector = Field(description="its other end [m]")
+    diameter: Positive = Field(description="diameter [m]")
+    drag: NonNegative = Field(default=0.0, description="drag coefficient Cd across the axis, on the diameter [-]")
+    axial_drag: NonNegative = Field(
+        default=0.0, description="drag coefficient along the axis, on the circumference pi x diameter [-]"
+    )
+    added_mass: NonNegative = Field(default=0.0, description="added mass coefficient Ca = Cm - 1 across the axis [-]")
+    pieces: Annotated[Whole, Field(ge=1, le=200)] = Field(
+        default=10, description="pieces into which it is cut; each feels the water at its middle [-]"
+    )
+
+    @model_validator(mode="after")
+    def _has_a_length(self) -> Member:
+        if math.dist(self.start, self.end) < 1e-6 * self.diameter:
+            refuse([Finding(("end",), "a place other than that of the start", "move one of the two")])
+        return self
 
 
 class Hydrostatics(Table):
@@ -162,6 +185,11 @@ class FreeBody(Table):
     )
     hydrostatics: Hydrostatics | None = Field(
         default=None, description="how the body floats at the surface; absent: it does not, and its weight counts"
+    )
+    members: tuple[Member, ...] = Field(
+        default=(),
+        description="cylinders fixed to the body on which waves, current and its own motion act; their buoyancy is in "
+        "`volume` or `hydrostatics`",
     )
     force: Loading | None = Field(default=None, description="force at the origin, inertial frame [N]")
     moment: Loading | None = Field(default=None, description="moment, inertial frame [N m]")

@@ -284,7 +284,9 @@ class System(Table):
         """What is wrong with the motion of a body, or with what is given to act on it."""
         body, still = self.bodies[name], Clamped(position=(0.0, 0.0, 0.0), tangent=(1.0, 0.0, 0.0))
         if isinstance(body, FreeBody):
-            in_water = [key for key in ("volume", "hydrostatics", "damping", "added_mass") if getattr(body, key)]
+            in_water = [
+                key for key in ("volume", "hydrostatics", "damping", "added_mass", "members") if getattr(body, key)
+            ]
             if in_water and self.environment.fluid is None:
                 expected = f"a fluid, because body {name} has {in_water[0]}"
                 yield Finding(("environment",), expected, "add `fluid: {density: 1025}`", "no fluid")

@@ -233,8 +233,8 @@ class SystemRun:
         self.make_solver()
         self._settle(self.solver)
         if self.system.environment.waves is not None:
-            text = "waves act on lines and points, not on the body"
-            for body in self.model.bodies:
+            text = "waves act on lines and points, not on the body, which has no members"
+            for body in (x for x in self.model.bodies if x.members is None):
                 self.recorder.event(0.0, 0.0, 0.0, "waves on body neglected", f"body {body.name}: {text}")
         for line, x, state in zip(self.lines, self.solver.lines, self.state.lines, strict=True):
             line.note_equilibrium(x, state, 0.0)
@@ -319,6 +319,7 @@ class SystemRun:
             model.sea.at(self.t)
             line.books.velocity[:] = model.ends.velocity
         self.model.load_bodies(self.t, solver.bodies, self.loaded)
+        self.model.stir(self.t, self.state.bodies, 0.0, solver.bodies)
         taken = solver.consistent_accelerations(self.state, accelerations, self.t)
         if taken.outcome != Outcome.OK:
             raise self._stopped(solver, taken, 0.0)
@@ -335,6 +336,7 @@ class SystemRun:
                 model.sea.at(t)
                 line.books.velocity[:] = model.ends.velocity
             self.model.load_bodies(t, solver.bodies, self.loaded)
+            self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
             taken = solver.step(self.state, self._other, t - self.t, rho, self.last_step, t)
             if taken.outcome != Outcome.OK:
                 dt, repeats = 0.5 * dt, repeats + 1

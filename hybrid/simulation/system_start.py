@@ -6,18 +6,32 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from hybrid.errors import ComputationError
+from hybrid.errors import ComputationError, Outcome
 from hybrid.model.system import SystemModel, balanced_places, build_system
 from hybrid.scene.system import System
 from hybrid.solve.system import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
+
+# Equilibria until the water around members no longer changes, and what of the largest number of a body counts as that.
+MOST_ROUNDS, SAME_WATER = 30, 1e-9
 
 
 def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
     """Equilibrium with the loads of time t (s; infinity: of full size).  ComputationError: none is found."""
     try:
         numbers = model.body_numbers(t)
-        return solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
+        found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
+        if not any(body.members for body in model.bodies):
+            return found
+        for _ in range(MOST_ROUNDS):  # members feel the water where they come to rest
+            before = numbers.copy()
+            still = np.inf if np.isinf(t) else t
+            model.stir(still, found.state.bodies, 0.0, numbers)
+            if np.abs(numbers - before).max() <= SAME_WATER * np.abs(numbers).max():
+                return found
+            start = [("members where they came to rest", found.state)]
+            found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, iter(start))
+        raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, "members of a body do not come to rest in this water")
     except LineFailed as failed:
         raise named(failed, model) from None
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
-from hybrid.kernels.bodies import ARM, FRAME, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
@@ -222,7 +222,7 @@ def _let_go(
         assert not isinstance(body, FreeBody)
         row = np.zeros(STATE)
         row[PLACE:FRAME], row[FRAME:V] = body.position, frame_of(body.rotation).ravel()
-        numbers, rows = np.vstack([bodies, np.zeros(NUMBERS)]), np.vstack([rows, row])
+        numbers, rows = np.vstack([bodies, np.zeros(bodies.shape[1])]), np.vstack([rows, row])
     lines = []
     for x, ends in zip(found.solver.lines, _ends(system), strict=True):
         # a point that is let go is numbered between the free points and the bodies

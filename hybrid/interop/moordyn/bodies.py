@@ -89,6 +89,7 @@ def body_row(body: Any, place: Triple, rotation: Triple, density: float, surface
     rest = ["0"] * 6
     if body.kind == "free":
         wrong += [key for key in ("hydrostatics", "damping") if getattr(body, key) is not None]
+        wrong += ["members"] if body.members else []
         wrong += [load.what for load in body.end.loads]
         if body.volume and math.dist(body.centre, body.centre_of_buoyancy) > 0.0:
             wrong.append("centre_of_buoyancy")  # MoorDyn's is the centre of mass
