@@ -201,6 +201,14 @@ class ErrorController:
         return max(verdicts, key=lambda found: found.ratio)
 
     @property
+    def allowed_force(self) -> float | None:
+        """Error, N, of forces at the ends that is asked; None: none is."""
+        if self.asked is None or self.estimate is None:
+            return None
+        part = self.asked.of_end_force
+        return part * self.estimate.run.largest_end_force if part is not None else self.asked.tension
+
+    @property
     def model_misses(self) -> str:
         """Where leaving bending out makes more of the error than is asked allows, how much; else empty."""
         if self.asked is None or self.estimate is None:

@@ -13,8 +13,9 @@ from hybrid.model.plan import output_times
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.error_control import ErrorController
 from hybrid.simulation.error_estimate import Errors, summary
-from hybrid.simulation.result_checks import undersampled_end_forces
-from hybrid.simulation.run_sample import RunSample
+from hybrid.simulation.refinement import END_FORCE
+from hybrid.simulation.result_checks import damped_jolts, undersampled_end_forces
+from hybrid.simulation.run_sample import END_FORCES, RunSample
 from hybrid.store.amend import Happened, amend
 from hybrid.store.format import Field
 
@@ -62,6 +63,9 @@ def write_errors(
             largest = {name: errors.largest("total", name) for name in errors.fields.get("total", {})}
             changes = [t for t, kind in happened if kind in ZONE_EVENTS]
             undersampled = undersampled_end_forces(np.array([0.0, *output_times(scene)]), result, largest, changes)
+            if control.asked is None or control.asked.asks(END_FORCE):
+                error = max(largest.get(name, 0.0) for name in END_FORCES.values())
+                undersampled += damped_jolts(scene, result, error, control.allowed_force)
         found = summary(errors) if errors is not None else {}
         if control.irregular:
             each = [summary(estimate.errors) for estimate in control.statistics.values()]

@@ -7,6 +7,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from hybrid.kernels.state import Floats
+from hybrid.scene.schema import Scene
 from hybrid.simulation.run_sample import RunSample
 from hybrid.store.reader import Result
 
@@ -14,6 +15,8 @@ from hybrid.store.reader import Result
 TIMES_THE_ERROR, PART = 2.0, 0.02
 # Outputs after a change of zones within which a shake is laid to it.
 SOON = 2.0
+# Steps to a period that show a vibration.
+STEPS_PER_VIBRATION = 12
 # Energy lost to the scheme that is worth a word, as a part of the largest kinetic energy, and of tension scale times
 # length: below, it is what Newton's tolerance leaves.
 NOTHING_LOST = 1e-6
@@ -81,6 +84,56 @@ def cubic_spline(x: Floats, y: Floats, at: Floats) -> Floats:
     return np.asarray(
         y[k] + p * (slope[k] - l * (2.0 * M[k] + M[k + 1]) / 6.0 + p * (0.5 * M[k] + p * (M[k + 1] - M[k]) / (6.0 * l)))
     )
+
+
+def jolts(scene: Scene) -> list[tuple[float, float, float]]:
+    """Where the slope of a load's history jumps: s; N, of the vibration along the line that starts; its period, s.
+
+    A jump a (N/s) at one end of a bar that is held at the other makes a triangle of a L/c about the slow answer, of
+    period 4 L/c; L/c is the time in which strain runs along it.  None in a line that does not stretch.
+    """
+    travel = 0.0
+    for section in scene.cable.sections:
+        if not isinstance(section.axial_stiffness, float):
+            return []
+        travel += section.length * float(np.sqrt(section.mass / section.axial_stiffness))
+    found = []
+    for load in (load for end in scene.ends.both for load in end.loads if load.what == "force"):
+        rows = np.array(load.rows)
+        if len(rows) < 2:
+            continue
+        times, values = rows[:, 0], rows[:, 1:]
+        slopes = np.diff(values, axis=0) / np.diff(times)[:, None]
+        jump = np.diff(np.vstack([np.zeros(3), slopes, np.zeros(3)]), axis=0)
+        sizes = np.linalg.norm(values, axis=1)
+        along = np.abs((jump * values).sum(axis=1)) / np.where(
+            sizes > 0.0, sizes, 1.0
+        )  # lines lie along what pulls them
+        found += [(float(t), float(a) * travel, 4.0 * travel) for t, a in zip(times, along, strict=True) if t > 0.0]
+    return found
+
+
+def damped_jolts(scene: Scene, result: RunSample, error: float, allowed: float | None) -> list[tuple[str, str]]:
+    """The event that says so where steps damp a vibration that a jump in the slope of a load starts (see `jolts`).
+
+    error: N, figure of the forces at the ends, which does not see it, as all runs damp it; allowed: N, None: not asked.
+    """
+    steps, worst = result.forces[:, 0], (0.0, 0.0, 0.0)
+    for jolt in jolts(scene):
+        t, size, period = jolt
+        near = steps[(steps >= t - 1e-9 * period) & (steps <= t + 2.0 * period)]
+        shown = near.size > 2.0 * STEPS_PER_VIBRATION
+        if not shown and t < steps[-1] and size > worst[1]:
+            worst = jolt
+    t, size, period = worst
+    if not size > (error if allowed is None else max(allowed - error, 0.0)):
+        return []
+    text = (
+        f"the slope of a force given at an end jumps at t = {t:.4g} s: a vibration along the line of about {size:.2g} N "
+        f"and a period of {period:.2g} s starts, which steps damp out, and the error figure of forces ({error:.2g} N) "
+        f"does not see it; time.step: {period / STEPS_PER_VIBRATION:.2g} shows it, or a smoother history has none"
+    )
+    return [("error uncertain", text)]
 
 
 def damped_vibrations(result: Result) -> tuple[tuple[str, str], ...]:

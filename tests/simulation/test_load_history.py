@@ -10,6 +10,7 @@ from bits import Stopping, differences, went_on
 
 import hybrid
 from hybrid.scene.read import scene_text
+from hybrid.simulation.result_checks import jolts
 
 ROWS: list[list[float]] = [[0, 0, 0, 0], [0.5, 3, 0, -1], [0.7, -2, 0, 0], [1.4, 1, 0, 0]]
 
@@ -156,3 +157,34 @@ def test_a_force_out_of_the_plane_is_refused_in_two_dimensions() -> None:
     rows = [[0, 1, 0, 0], [1, 0, 1, 0]]
     with pytest.raises(hybrid.SceneError, match=r"ends\.end\.force\.history"):
         hybrid.run(scene({"history": rows}, dimension=2))
+
+
+def pulled(time: dict[str, float], **changes: object) -> hybrid.Scene:
+    """A bar of 2 m, EA 2 kN, held at its start; its pull grows by 10 N/s for 0.3 s: L/c = 0.0316 s."""
+    history = [[0, 0, 0, 10], [0.1, 0, 0, 10], [0.4, 0, 0, 13], [1, 0, 0, 13]]
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "free", "force": {"history": history}}}
+    more = {"ends": ends, "initial": "equilibrium", "time": time, "output": {"every": 0.002, "points": 5}}
+    return hybrid.validate_scene(scene([0, 0, 1]).model_dump(exclude_none=True) | more | changes)
+
+
+def test_a_slope_that_jumps_shakes_the_line_by_as_much_as_is_said() -> None:
+    made = pulled({"duration": 0.35, "step": 2e-4})
+    travel = 2.0 * np.sqrt(0.5 / 2e3)
+    assert [x for x, _, _ in jolts(made)] == [0.1, 0.4, 1.0]
+    _, size, period = jolts(made)[0]
+    assert (size, period) == pytest.approx((10.0 * travel, 4.0 * travel))
+    with hybrid.run(made) as result:
+        slow = 10.0 + 10.0 * np.clip(result.t - 0.1, 0.0, 0.3)
+        shake = np.abs(np.linalg.norm(result["reaction_start"][()], axis=1) - slow)[result.t > 0.1]
+        assert shake.max() == pytest.approx(size, rel=0.1)
+        assert "error uncertain" not in {x.kind for x in result.events}
+
+
+def test_a_shake_that_steps_damp_makes_the_figure_uncertain() -> None:
+    """The figure of 0.1 % does not see 0.3 N of 13: runs of all steps damp it."""
+    asked = pulled({"duration": 1.2}, accuracy={"tension": "1%"}, mesh=None, output={"every": 0.05, "points": 5})
+    with hybrid.run(asked) as result:
+        texts = [x.text for x in result.events if x.kind == "error uncertain"]
+        steps = np.diff(result.steps["t"])
+    assert steps.max() > 0.01
+    assert any("slope of a force" in x and "0.32 N" in x for x in texts), texts
