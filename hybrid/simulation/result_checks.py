@@ -129,7 +129,7 @@ def damped_jolts(scene: Scene, result: RunSample, error: float, allowed: float |
     if not size > (error if allowed is None else max(allowed - error, 0.0)):
         return []
     text = (
-        f"the slope of a force given at an end jumps at t = {t:.4g} s: a vibration along the line of about {size:.2g} N "
+        f"the slope of a force given at an end jumps at t = {t:.4g} s: a vibration along the line of {size:.2g} N "
         f"and a period of {period:.2g} s starts, which steps damp out, and the error figure of forces ({error:.2g} N) "
         f"does not see it; time.step: {period / STEPS_PER_VIBRATION:.2g} shows it, or a smoother history has none"
     )
