@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from itertools import pairwise
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -43,7 +44,7 @@ SHORTEST = 2.0  # base cells that make a zone
 # What a checkpoint holds of the manager; the rest follows from the scene, the layout and the next step.
 CHECKPOINTED = (
     "tolerance", "held", "ratios", "seen", "grown", "leaving", "haste", "calm_since", "calmed", "patience", "released",
-    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age",
+    "going", "next_review", "total_twist", "past", "recent", "age", "recent_age", "largest",
 )  # fmt: skip
 
 
@@ -85,8 +86,8 @@ def _flag(k: int, text: str) -> Any:
 
 # Arrays of `Zones` that are the same for every layout.
 OF_BASE = (
-    "clock", "counts", "clamped", "tangents", "moments", "ratios", "rod", "leaving", "grown", "haste", "parts", "H",
-    "next_rod", "here", "plan", "calm",
+    "clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits", "ratios", "rod",
+    "leaving", "grown", "haste", "parts", "H", "next_rod", "here", "plan", "calm",
 )  # fmt: skip
 
 
@@ -109,17 +110,19 @@ class DomainManager:
         left: float = 1.0,
         on_base: LineOnBase | None = None,
         curvature_error: float | None = None,
+        asked: Mapping[int, float] = MappingProxyType({}),
     ) -> None:
         """tolerance: m; given: (n,) 1 force_rod, -1 force_catenary, 0 adaptive; scale: tension scale, N.
 
         left: part of the bending error of catenaries that remains in results (1: no correction);
         dwell: hold time, s; pace: ramp time of bending stiffness, s (None: dwell); on_base: of the model.
-        curvature_error: part of the largest curvature that the length of cells may make it wrong by, in the cells of
-        rods, which follow it; None: they stay as they are.
+        curvature_error: part of the largest curvature that the length of cells, which follow it, may make it wrong by;
+        None: they stay as they are.  asked: parts of the largest tension, curvature and moment (numbers of
+        kernels.cell_errors) that leaving bending out may make, where one is asked.
         """
         n = layout.rod.size
         self.cable, self.layout, self.dwell, self.given = cable, layout, dwell, given
-        self.pace, self.held, self.left = pace or dwell, False, left
+        self.pace, self.held = pace or dwell, False
         self.scale, self.user, self.free = scale, user, (given >= 0).astype(np.int8)
         places = layout.starts[-1] + 1
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
@@ -127,7 +130,9 @@ class DomainManager:
         )
         self.zones.parts[:], self.zones.H[:] = layout.parts, np.diff(layout.base)
         self.zones.clock[z.SHARE] = curvature_error or 0.0
-        self.tolerance = tolerance
+        self.tolerance, self.zones.clock[z.LEFT] = tolerance, left
+        for quantity, part in asked.items():
+            self.zones.asked[quantity] = part
         self.zones.clock[z.PACE] = self.pace
         self.zones.clamped[:] = cable.held_tangent
         self.seen = np.zeros((len(CRITERIA), n))  # ratios since the last output
@@ -149,9 +154,7 @@ class DomainManager:
 
     # --- what the compiled run knows ----------------------------------------------------------------
 
-    tolerance = property(
-        lambda self: self._tolerance, lambda self, x: self._set_tolerance(x), doc="Error of position, m."
-    )
+    tolerance = _number(z.TOLERANCE, "Error of position, m.")
     next_review = _number(z.NEXT_REVIEW, "When the next review is due, s.")
     loudest = _number(z.LOUDEST, "Largest ratio among catenaries at the last evaluation.")
     torque = _number(z.TORQUE, "Torque, N m, that a rod from end to end would carry, where there is none.")
@@ -160,9 +163,6 @@ class DomainManager:
     age, recent_age = _number(z.AGE, "Of `past`, s."), _number(z.RECENT_AGE, "Of `recent`, s.")
     going, coming = _flag(z.GOING, "Some stiffness is ramped down."), _flag(z.COMING, "Some is ramped up.")
     twisted = _flag(z.HOLDS_TWIST, "Both ends hold the twist.")
-
-    def _set_tolerance(self, tolerance: float) -> None:
-        self._tolerance, self.zones.clock[z.TOLERANCE] = tolerance, tolerance / self.left
 
     @property
     def ratios(self) -> Floats:
@@ -232,7 +232,7 @@ class DomainManager:
     def checkpoint(self) -> dict[str, Any]:
         """State besides the layout."""
         zones = self.zones
-        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "haste")}
+        of_zones = {name: getattr(zones, name) for name in ("ratios", "grown", "leaving", "haste", "largest")}
         known = {name: getattr(zones, name) if self.past.size else np.zeros(0) for name in ("past", "recent")}
         return {name: getattr(self, name) for name in CHECKPOINTED if name not in of_zones | known} | of_zones | known
 
@@ -243,8 +243,9 @@ class DomainManager:
         loudest, grown = saved["calmed"][0], saved["grown"]
         if not (good and 0.0 <= loudest.min(initial=0.0) <= loudest.max(initial=0.0) < len(CRITERIA)):
             raise ValueError("invalid checkpoint of the domain manager")
-        if not (0.0 <= grown.min() <= grown.max() <= 1.0 and min(saved["age"], saved["recent_age"]) >= 0.0):
-            raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time")
+        least = min(saved["age"], saved["recent_age"], *saved["largest"])
+        if not (0.0 <= grown.min() <= grown.max() <= 1.0 and least >= 0.0):
+            raise ValueError("invalid checkpoint: a part of stiffness outside 0 to 1, or a negative time or size")
         for name in CHECKPOINTED:
             if name in ("past", "recent"):
                 getattr(zones, name)[: saved[name].size] = saved[name]

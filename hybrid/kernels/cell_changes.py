@@ -32,7 +32,7 @@ from hybrid.kernels.zone_transfer import carry_push
 class LayoutJob(NamedTuple):
     """Where nodes should be, and what that makes of the cells (written; with room for all).  K finest cells."""
 
-    plan: NDArray[np.bool_]  # (K+1,) of the finest mesh, nodes of rods
+    plan: NDArray[np.bool_]  # (K+1,) of the finest mesh, nodes besides those of base cells
     rod: NDArray[np.bool_]  # (n,)
     parts: NDArray[np.int64]  # (n,) finest cells of base cells
     finest: Floats  # (K+1,) m
@@ -98,7 +98,7 @@ def lay_out(table):
     for j in range(job.parts.shape[0]):
         job.first[j] = i
         for k in range(begin, begin + job.parts[j]):
-            if k == begin or (job.rod[j] and job.plan[k]):
+            if k == begin or job.plan[k]:
                 job.place[i], job.s[i], job.of[i], job.rods[i] = k, job.finest[k], j, job.rod[j]
                 i += 1
         begin += job.parts[j]

@@ -15,12 +15,12 @@ from __future__ import annotations
 import math
 
 from hybrid.kernels.bed import bed_under
+from hybrid.kernels.cell_errors import layer_length, longest_cell, node_curvature, second_difference
 from hybrid.kernels.compile import inner
-from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import dot, scale, sub
-from hybrid.kernels.zone_criteria import SMOOTH, depth, kink_at, raise_ratio
+from hybrid.kernels.zone_criteria import depth
 
 TURN = 0.3  # rad that a cell turns through
 SHORTEST_CELL = 0.6  # of l0
@@ -40,38 +40,18 @@ def bending_length(kinds, T, i):
     """l0 at node i."""
     n = T.shape[0]
     low = min(T[max(i - 1, 0)], T[min(i, n - 1)])
-    EI, w = kinds.EI[i], kinds.w[i]
-    bend = math.sqrt(EI / max(low, kinds.floor[i], 1e-300))
-    return min(bend, (EI / w) ** (1.0 / 3.0)) if w > 0.0 else bend
+    return layer_length(kinds.EI[i], kinds.w[i], max(low, kinds.floor[i], 1e-300))
 
 
 @inner
-def node_curvature(line, turn, i):
-    """kappa at node i; at a joint that of the rod beside it, because a joint has a kink."""
-    n = line.h.shape[0]
-    if 0 < i < n and line.spin[i] != line.spin[i - 1]:
-        i = i + 1 if line.spin[i] else i - 1
-    return turn[i] / line.hn[i] if 0 < i < n or line.element[i] else 0.0
-
-
-@inner
-def second_difference(line, turn, i):
-    """|kappa''| at an inner node i."""
-    a, b = line.s[i] - line.s[i - 1], line.s[i + 1] - line.s[i]
-    k = node_curvature(line, turn, i)
-    before, after = node_curvature(line, turn, i - 1), node_curvature(line, turn, i + 1)
-    return abs(2.0 * ((after - k) / b - (k - before) / a) / (a + b))
-
-
-@inner
-def wanted_length(line, kinds, T, i, error):
-    """W at node i; error: 1/m, that interpolation may make."""
+def wanted_length(line, kinds, T, i, limits):
+    """W at node i; limits: (4,) errors that interpolation may make."""
     n, turn = T.shape[0], kinds.turn
     bends = 0.0
     for k in range(max(i - 1, 1), min(i + 2, n)):
         bends = max(bends, second_difference(line, turn, k))
-    W = math.sqrt(8.0 * error / bends) if bends > 0.0 else math.inf
     k = node_curvature(line, turn, i)
+    W = longest_cell(kinds.EI[i], kinds.w[i], k, bends, limits)
     if k > 0.0:
         W = min(W, TURN / k)
     return max(W, SHORTEST_CELL * bending_length(kinds, T, i))
@@ -102,12 +82,12 @@ def lower_at_edge(line, sea, state, zones, i, dt):
 
 
 @inner
-def find_wanted(line, sea, state, zones, error, dt):
+def find_wanted(line, sea, state, zones, dt):
     """Wanted lengths at nodes for the next step, of dt, into zones.wanted, graded."""
     kinds, T, W, s = zones.kinds, state.T, zones.wanted, line.s
     n = T.shape[0]
     for i in range(n + 1):
-        W[i] = wanted_length(line, kinds, T, i, error)
+        W[i] = wanted_length(line, kinds, T, i, zones.limits)
     if line.bits & SEABED:
         for i in range(n):
             if (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
@@ -143,7 +123,7 @@ def halves(zones, p, a, size, unit):
 
 @inner
 def plan_base_cell(zones, p, begin, size, unit):
-    """Nodes of a base cell that is rod, of `size` finest cells, into zones.plan; whether some must be there at once.
+    """Nodes of a base cell of `size` finest cells, into zones.plan; whether some must be there at once.
 
     p: its first node now.  Parts in their order along the line: the one that begins at an offset is as long as the largest power of two in it.
     """
@@ -164,12 +144,12 @@ def plan_base_cell(zones, p, begin, size, unit):
 
 
 @inner
-def plan_cells(line, sea, state, zones, error, dt):
-    """Places of the finest mesh where nodes should be into zones.plan; whether rods need more of them at once, or many
+def plan_cells(line, sea, state, zones, dt):
+    """Places of the finest mesh where nodes should be into zones.plan; whether some are needed at once, or many
 
     may go; dt: s, of the step before, which the next one is taken to be as long as.
     """
-    find_wanted(line, sea, state, zones, error, dt)
+    find_wanted(line, sea, state, zones, dt)
     begin, p, at_once = 0, 0, False
     for k in range(zones.plan.shape[0]):
         zones.plan[k] = False
@@ -178,48 +158,13 @@ def plan_cells(line, sea, state, zones, error, dt):
         while zones.place[p] < begin:
             p += 1
         zones.plan[begin] = True
-        if zones.next_rod[j]:
-            at_once |= plan_base_cell(zones, p, begin, size, zones.H[j] / size)
+        at_once |= plan_base_cell(zones, p, begin, size, zones.H[j] / size)
         begin += size
     zones.plan[begin] = True
     gone = 0
     for k in range(zones.plan.shape[0]):
         gone += zones.here[k] and not zones.plan[k]
     return at_once or gone > SAVED * line.h.shape[0]
-
-
-# --- kinds ----------------------------------------------------------------------------------------
-
-
-@inner
-def missing_curvature(line, zones, T, i, H):
-    """Curvature, 1/m, that node i would be wrong by in a catenary of one cell of length H, but for a contact edge."""
-    kinds, n = zones.kinds, T.shape[0]
-    turn, l0 = kinds.turn, bending_length(kinds, T, i)
-    if line.element[i] and (i == 0 or i == n or kinds.node[i] != SMOOTH):
-        return turn[i] / line.hn[i]
-    if i == 0 or i == n:
-        return turn[i] / l0
-    if kinds.node[i] != SMOOTH or line.spin[i] != line.spin[i - 1]:
-        return kink_at(line, turn, i) / (2.0 * l0)
-    if 1 < i < n - 1 and line.spin[i - 2] == line.spin[i + 1]:  # away from joints, whose kink is no curvature
-        return max(l0 * l0, 0.125 * H * H) * second_difference(line, turn, i)
-    return 0.0
-
-
-@inner
-def weigh_curvature(line, sea, state, zones, error):
-    """Raise ratios to those of the curvature that catenaries would leave out, over the one allowed, 1/m."""
-    kinds, T = zones.kinds, state.T
-    n, of = T.shape[0], kinds.base_of_cell
-    for i in range(n + 1):
-        ja, jb = of[max(i - 1, 0)], of[min(i, n - 1)]
-        row = CLAMP if i == 0 or i == n else (BEND if kinds.node[i] == SMOOTH else POINT)
-        H = max(zones.H[ja], zones.H[jb])
-        raise_ratio(zones.ratios, row, ja, jb, missing_curvature(line, zones, T, i, H) / error)
-        if line.bits & SEABED and i < n and (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
-            jump = kinds.w[i] / max(T[i], kinds.floor[i], 1e-300)  # of the curvature, which a rod rounds off
-            raise_ratio(zones.ratios, EDGE, jb, jb, 0.5 * jump / error)
 
 
 # --- lengths ----------------------------------------------------------------------------------------
@@ -263,13 +208,3 @@ def follow_arcs(line, state, zones):
     for c in range(line.h.shape[0]):
         aim = line.s[c + 1] - line.s[c] - arc_less_chord(line, state, zones, c)
         zones.true[c] += SMOOTHED * (aim - zones.true[c])
-
-
-@inner
-def largest_curvature(line, turn):
-    """Of all inner nodes without a joint, and of clamps."""
-    most, n = 0.0, line.h.shape[0]
-    for i in range(n + 1):
-        if line.element[i] or (0 < i < n and line.spin[i] == line.spin[i - 1]):
-            most = max(most, turn[i] / line.hn[i])
-    return most

@@ -2,12 +2,11 @@
 
 Every criterion is a ratio, what is there over what a catenary can stand: at 1 a stretch becomes a
 rod, and below the criterion's `off` it may become a catenary again.  Errors of position that leaving
-bending out would make are lengths, and count against the tolerance (m) of the scene (docs/theory.md, 13).
+bending out would make (e_k of kernels.cell_errors) count against the shares that the scene allows: of position, tension,
+curvature and moment.  Slack, a torque near to a loop and contact have no bound in a catenary (docs/theory.md, 13).
 
     symbol   meaning                                          shape  unit
     EI       bending stiffness at a node                      -      N m2
-    lam      sqrt(EI/T), over which bending fades             -      m
-    kappa    curvature at a node                              -      1/m
     T, ahead tension now, and as it will be                   -      N
     turn     |d_b - d_a| of the chords at a node              -      rad
     Mt       torque                                           -      N m
@@ -23,6 +22,18 @@ from numpy.typing import NDArray
 
 from hybrid.kernels.bed import bed_under
 from hybrid.kernels.cell import chord
+from hybrid.kernels.cell_errors import (
+    CURVATURE,
+    MOMENT,
+    CellError,
+    lack_at_clamp,
+    lack_at_edge,
+    lack_at_kink,
+    lack_of_bend,
+    lack_of_torque,
+    over_shares,
+    second_difference,
+)
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import BEND, CLAMP, EDGE, POINT, SLACK, TORSION
 from hybrid.kernels.element import relative_rotation
@@ -69,7 +80,11 @@ def depth(sea, r, i):
 
 @inner
 def find_turns(line, tangents, e, a1, torque, turn, twisting):
-    """Turns of the nodes, rad, and torques of the nodes between cells, N m, into `turn` and `twisting`."""
+    """Turns of the nodes, rad, and torques of the nodes between cells, N m, into `turn` and `twisting`.
+
+    tangents: (2, 3) of clamped ends, zero where there is none; torque: N m, of all the line as far as its rods do not
+    know it.
+    """
     n = e.shape[0]
     turn[0], turn[n] = 0.0, 0.0
     d0 = get3(tangents, 0)
@@ -144,46 +159,74 @@ def blank_kinds(cells: int, base: int) -> NodeKinds:
 
 
 @inner
-def raise_ratios(line, sea, tangents, state, past, ahead, tolerance, torque, kinds, ratios):
+def bends_at(line, turn, shares, i):
+    """|kappa''| at inner node i, 1/m^3, where curvature counts; none beside a joint, whose kink is no curvature."""
+    n = line.h.shape[0]
+    if shares[CURVATURE] < math.inf and 1 < i < n - 1 and line.spin[i - 2] == line.spin[i + 1]:
+        return second_difference(line, turn, i)
+    return 0.0
+
+
+@inner
+def lack_of_node(line, kinds, shares, i, T):
+    """What a catenary would lack at node i, at tension T, N; and the criterion that this is."""
+    n, turn, EI, w = line.h.shape[0], kinds.turn, kinds.EI[i], kinds.w[i]
+    kappa = turn[i] / line.hn[i]
+    along = shares[CURVATURE] < math.inf or shares[MOMENT] < math.inf
+    if i == 0 or i == n:
+        lack = lack_at_clamp(EI, w, T, turn[i])
+        if along and line.element[i]:
+            lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
+        return lack, CLAMP
+    if kinds.node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
+        lack = lack_at_kink(EI, w, T, kink_at(line, turn, i))
+        if along and line.element[i]:
+            lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
+        return lack, POINT
+    lack = lack_of_bend(EI, w, T, kappa + kinds.bent[i], bends_at(line, turn, shares, i))
+    return lack, POINT if kinds.node[i] == STEP else BEND
+
+
+@inner
+def weigh_edge(line, sea, state, kinds, shares, i, T, ratios):
+    """Raise the ratio of the base cells at inner node i, if contact with the seabed begins beside it."""
+    p, r = depth(sea, state.r, i) > 0.0, state.r
+    if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
+        of = kinds.base_of_cell
+        raise_ratio(ratios, EDGE, of[i - 1], of[i], over_shares(lack_at_edge(kinds.EI[i], kinds.w[i], T), shares))
+
+
+@inner
+def raise_ratios(line, sea, state, past, ahead, shares, kinds, ratios):
     """Raise ratios (criteria, base cells) to those of a state: the largest of every criterion in each base cell.
 
-    tangents: (2, 3) of clamped ends, zero where there is none; past: (N,) N, tensions some time ago; ahead: how far
-    their change since then goes on; tolerance: m; torque: N m, of all the line as far as its rods do not know it.
+    past: (N,) N, tensions some time ago; ahead: how far their change since then goes on; shares: (4,) of
+    kernels.cell_errors; kinds: with the turns of this state.
     """
     a = ahead
-    EI, w, bent, node, floor = kinds.EI, kinds.w, kinds.bent, kinds.node, kinds.floor
-    base_of_cell, turn, twisting = kinds.base_of_cell, kinds.turn, kinds.twisting
-    r, e, T, a1 = state.r, state.e, state.T, state.a1
-    n = e.shape[0]
-    find_turns(line, tangents, e, a1, torque, turn, twisting)
+    floor, of, turn, twisting = kinds.floor, kinds.base_of_cell, kinds.turn, kinds.twisting
+    n = state.e.shape[0]
     whole = 0.0
     for i in range(n + 1):
         whole += turn[i]
     for i in range(n + 1):
-        ja = base_of_cell[i - 1] if i > 0 else base_of_cell[0]
-        jb = base_of_cell[i] if i < n else base_of_cell[n - 1]
-        now, ahead = tensions_at(T, past, a, i)
+        ja, jb = of[max(i - 1, 0)], of[min(i, n - 1)]
+        now, ahead = tensions_at(state.T, past, a, i)
         slack = min(floor[i] / ahead, FORESEEN) if ahead > 0.0 else FORESEEN
         if not floor[i] <= slack * now:
             slack = floor[i] / now if now > 0.0 else MOST
         raise_ratio(ratios, SLACK, ja, jb, slack)
-        T1 = max(floor[i], 1e-300)
-        T1 = now if now > T1 else T1
+        T = max(floor[i], 1e-300)
+        T = now if now > T else T
+        lack, criterion = lack_of_node(line, kinds, shares, i, T)
+        raise_ratio(ratios, criterion, ja, jb, over_shares(lack, shares))
         if i == 0 or i == n:
-            raise_ratio(ratios, CLAMP, ja, jb, math.sqrt(EI[i] / T1) * turn[i] / tolerance)
             continue
-        Mt = twisting[i]
-        loop = max(Mt * Mt / (2.0 * EI[i] * TWISTED), abs(Mt) * whole / tolerance)
-        raise_ratio(ratios, TORSION, ja, jb, loop / (2.0 * T1))
-        if node[i] == LOAD or line.spin[i] != line.spin[i - 1]:  # a joint has a kink too
-            raise_ratio(ratios, POINT, ja, jb, math.sqrt(EI[i] / T1) * kink_at(line, turn, i) / tolerance)
-        else:
-            bend = EI[i] * (turn[i] / line.hn[i] + bent[i]) / (T1 * tolerance)
-            raise_ratio(ratios, POINT if node[i] == STEP else BEND, ja, jb, bend)
+        loop = twisting[i] * twisting[i] / (4.0 * kinds.EI[i] * TWISTED * T)
+        loop = max(loop, over_shares(lack_of_torque(T, twisting[i], whole), shares))
+        raise_ratio(ratios, TORSION, ja, jb, loop)
         if line.bits & SEABED:
-            p = depth(sea, r, i) > 0.0
-            if p != (depth(sea, r, i - 1) > 0.0) or p != (depth(sea, r, i + 1) > 0.0):
-                raise_ratio(ratios, EDGE, ja, jb, EI[i] * w[i] / (T1 * T1 * tolerance))
+            weigh_edge(line, sea, state, kinds, shares, i, T, ratios)
 
 
 @inner

@@ -15,14 +15,17 @@ from numpy.typing import NDArray
 from hybrid.kernels import books as b
 from hybrid.kernels.books import COUNT_SIZE, WORKS
 from hybrid.kernels.cell import chord
-from hybrid.kernels.cell_lengths import (
-    FADE,
-    arc_less_chord,
-    follow_arcs,
-    largest_curvature,
-    plan_cells,
-    weigh_curvature,
+from hybrid.kernels.cell_errors import (
+    CURVATURE,
+    MOMENT,
+    POSITION,
+    QUANTITIES,
+    TENSION,
+    lack_of_moment,
+    lack_of_torque,
+    over_shares,
 )
+from hybrid.kernels.cell_lengths import FADE, arc_less_chord, follow_arcs, plan_cells
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.criteria import CLAMP, CONTACT, CRITERIA, TORSION
 from hybrid.kernels.energies import observe
@@ -37,6 +40,7 @@ from hybrid.kernels.zone_criteria import (
     NodeKinds,
     blank_kinds,
     end_turn,
+    find_turns,
     largest_ratio,
     raise_ratio,
     raise_ratios,
@@ -54,7 +58,7 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     PACE,  # ramp time of bending stiffness
     AGE, RECENT_AGE,  # of the tensions `past` and `recent`
     NEXT_REVIEW,
-    TOLERANCE,  # m, of the errors that criteria compare with, of results that are corrected more
+    TOLERANCE,  # m, of position
     LOUDEST,  # largest ratio among catenaries, at the last evaluation
     TORQUE,  # N m, that a rod from end to end would carry, where there is none
     TOTAL_TWIST,  # rad, of the ends against each other
@@ -62,7 +66,7 @@ REJECT_RATIO = 4.0  # a step that ends with a catenary above this is rejected, a
     LETTING_GO,  # over which lengths become true
     CALM_STEP, RAMP_STEP,  # longest steps: while nothing is ramped, and else
     SHARE,  # of the largest curvature that the length of cells may make it wrong by, where they follow it; 0: they stay
-    PEAK,  # 1/m, largest curvature of rods of late
+    LEFT,  # part of what catenaries leave out that remains in results: 1, but for results that are corrected
 ) = range(16)  # fmt: skip
 CLOCK_SIZE = 16
 # Flags of `counts`.
@@ -90,6 +94,11 @@ class Zones(NamedTuple):
     moments: Floats  # (2, 3) N m, given at the ends
     past: Floats  # (N,) N, tensions some time ago
     recent: Floats  # (N,) N, later ones, which will take their place
+    # Of tension, curvature and moment (kernels.cell_errors; of position the tolerance stands):
+    asked: Floats  # (4,) parts of the largest that leaving bending out may make; 0: nothing is asked
+    largest: Floats  # (4,) N, 1/m, N m, of late
+    shares: Floats  # (4,) m, N, 1/m, N m, what leaving bending out may make (written)
+    limits: Floats  # (4,) and what the length of cells may make (written)
     ratios: Floats  # (criteria, n), largest since the last review
     rod: NDArray[np.bool_]  # (n,)
     leaving: NDArray[np.bool_]  # (n,) rods whose stiffness is ramped down
@@ -124,7 +133,7 @@ def blank_zones(cells: int, base: int) -> Zones:
         clock=z(CLOCK_SIZE), counts=z(FLAG_COUNT, np.int64),
         kinds=blank_kinds(cells, base),
         clamped=z(2), tangents=z((2, 3)), moments=z((2, 3)), past=z(cells), recent=z(cells),
-        ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
+        asked=z(QUANTITIES), largest=z(QUANTITIES), shares=z(QUANTITIES), limits=z(QUANTITIES), ratios=z((len(CRITERIA), base)), rod=z(base, bool), leaving=z(base, bool), grown=np.ones(base),
         haste=np.ones(base), parts=np.ones(base, np.int64), H=np.ones(base), next_rod=z(base, bool),
         here=z(base + 1, bool), plan=z(base + 1, bool), calm=z(base + 1, np.int64), place=z(nodes, np.int64),
         wanted=z(nodes), share=z(nodes), stiff=z((nodes, 3)), true=z(cells), lengths=z(cells), lack=z(cells),
@@ -211,7 +220,7 @@ def weigh_moments(state, zones):
 
     What of it turns about the cable is a torque, whether rods feel it already or not.
     """
-    kinds, ratios, tolerance = zones.kinds, zones.ratios, zones.clock[TOLERANCE]
+    kinds, ratios, shares = zones.kinds, zones.ratios, zones.shares
     n, last = state.T.shape[0], ratios.shape[1] - 1
     turned = 0.0
     for i in range(n + 1):
@@ -220,11 +229,12 @@ def weigh_moments(state, zones):
         cell, node, j = (n - 1, n, last) if k else (0, 0, 0)
         M = get3(zones.moments, k)
         T = max(state.T[cell], kinds.floor[node], 1e-300)
-        ratios[CLAMP, j] = max(ratios[CLAMP, j], min(math.sqrt(dot(M, M)) / (T * tolerance), MOST))
+        bent = over_shares(lack_of_moment(kinds.EI[node], T, math.sqrt(dot(M, M))), shares)
+        ratios[CLAMP, j] = max(ratios[CLAMP, j], min(bent, MOST))
         along = abs(dot(M, chord(get3(state.e, cell))[0]))
         loosest = max(lowest(state.T), lowest(kinds.floor), 1e-300)
-        twisting = along * along / (2.0 * lowest(kinds.EI) * TWISTED)
-        torsion = min(max(twisting, along * turned / tolerance) / (2.0 * loosest), MOST)
+        twisting = along * along / (4.0 * lowest(kinds.EI) * TWISTED * loosest)
+        torsion = min(max(twisting, over_shares(lack_of_torque(loosest, along, turned), shares)), MOST)
         for c in range(last + 1):
             ratios[TORSION, c] = max(ratios[TORSION, c], torsion)
 
@@ -235,6 +245,26 @@ def weigh_contact(near, zones):
     of, last = zones.kinds.base_of_cell, zones.kinds.base_of_cell.shape[0] - 1
     for i in range(near.shape[0]):
         raise_ratio(zones.ratios, CONTACT, of[max(i - 1, 0)], of[min(i, last)], near[i])
+
+
+@inner
+def find_shares(line, state, zones):
+    """What may be left out of each quantity, and what lengths may make, by the largest of late."""
+    kinds, z, n = zones.kinds, zones.clock, line.h.shape[0]
+    kappa, moment, tension = 0.0, 0.0, 0.0
+    for i in range(n + 1):
+        if line.element[i] or (0 < i < n and line.spin[i] == line.spin[i - 1]):  # not the kink of a joint
+            kappa = max(kappa, kinds.turn[i] / line.hn[i])
+            moment = max(moment, kinds.EI[i] * kinds.turn[i] / line.hn[i])
+    for c in range(n):
+        tension = max(tension, state.T[c])
+    for k, size in ((TENSION, tension), (CURVATURE, kappa), (MOMENT, moment)):
+        zones.largest[k] = max(zones.largest[k], size)
+        share = zones.asked[k] * zones.largest[k] / z[LEFT]
+        zones.shares[k], zones.limits[k] = share if share > 0.0 else math.inf, math.inf
+    zones.shares[POSITION], zones.limits[POSITION] = z[TOLERANCE] / z[LEFT], z[TOLERANCE]
+    if z[SHARE] > 0.0 and zones.largest[CURVATURE] > 0.0:
+        zones.limits[CURVATURE] = z[SHARE] * zones.largest[CURVATURE]
 
 
 @inner
@@ -254,16 +284,12 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     for k in range(2):
         for j in range(3):
             zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
-    raise_ratios(
-        line, sea, zones.tangents, state, zones.past, ahead, z[TOLERANCE], z[TORQUE], zones.kinds, zones.ratios
-    )
+    find_turns(line, zones.tangents, state.e, state.a1, z[TORQUE], zones.kinds.turn, zones.kinds.twisting)
+    find_shares(line, state, zones)
+    raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
     if flags[LOADED]:
         weigh_moments(state, zones)
     weigh_contact(near, zones)
-    if z[SHARE] > 0.0:
-        z[PEAK] = max(z[PEAK], largest_curvature(line, zones.kinds.turn))
-        if z[PEAK] > 0.0:
-            weigh_curvature(line, sea, state, zones, z[SHARE] * z[PEAK])
     z[LOUDEST] = largest_ratio(line, zones.kinds, zones.ratios)
 
 
@@ -314,11 +340,10 @@ def book(line, ends, before, state, dt, zones):
 def other_cells(line, sea, state, zones, dt):
     """Whether rods should have other cells, after a step of dt."""
     z = zones.clock
-    z[PEAK] *= math.exp(-dt / (FADE * z[PACE]))
     for j in range(zones.rod.shape[0]):
         zones.next_rod[j] = zones.rod[j]
     z[DT] = dt
-    return plan_cells(line, sea, state, zones, z[SHARE] * z[PEAK], dt)
+    return plan_cells(line, sea, state, zones, dt)
 
 
 @inner
@@ -353,8 +378,7 @@ def take_arcs(table):
 def plan_nodes(table):
     """Places of nodes for the state `new` of a job and rods zones.next_rod, into zones.plan."""
     job = read(table)
-    z = job.zones.clock
-    plan_cells(job.line, job.sea, job.new, job.zones, z[SHARE] * z[PEAK], z[DT])
+    plan_cells(job.line, job.sea, job.new, job.zones, job.zones.clock[DT])
 
 
 @kernel
@@ -373,6 +397,8 @@ def follow_zones(table):
     state, before = job.old, job.new
     if count[b.PARITY]:
         state, before = before, state
+    for k in range(QUANTITIES):
+        zones.largest[k] *= math.exp(-clock[b.LAST_DT] / (FADE * zones.clock[PACE]))
     job.work[0, b.ZONES] += book(line, ends, before, state, clock[b.LAST_DT], zones)
     if zones.clock[SHARE] > 0.0:
         follow_arcs(line, state, zones)

@@ -1,4 +1,4 @@
-"""A mesh whose rods come and go: base cells, each either one catenary cell or several rod cells."""
+"""A mesh whose rods come and go: base cells, each one catenary cell, or several cells of one kind."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ class _Fields(NamedTuple):
     base: Floats  # (n+1,) m, nodes that are always there
     parts: np.ndarray  # (n,) rod cells in a base cell, where they are shortest
     rod: np.ndarray  # (n,) bool
-    here: np.ndarray | None = None  # (K+1,) bool, nodes of the finest mesh that rods have; None: all of them
+    here: np.ndarray | None = None  # (K+1,) bool, nodes of the finest mesh that are there; None: all that rods have
 
 
 class Layout(_Fields):
@@ -35,9 +35,7 @@ class Layout(_Fields):
     @cached_property
     def places(self) -> np.ndarray:
         """(N+1,) numbers of the nodes on the finest mesh."""
-        there = np.append(np.repeat(self.rod, self.parts), True)
-        if self.here is not None:
-            there &= self.here
+        there = np.append(np.repeat(self.rod, self.parts), True) if self.here is None else self.here.copy()
         there[self.starts] = True
         return np.flatnonzero(there)
 

@@ -311,7 +311,7 @@ class CellChanges:
         ends, sea = owner.model.ends.at(t), owner.model.sea.at(t)
         switching.zones.next_rod[:] = change.rod
         if switching.plan(change.rod, sea, ends, self._run.state) is None:
-            switching.zones.plan[:] = True
+            switching.zones.plan[:] = np.append(np.repeat(change.rod, switching.zones.parts), True)
         for k, clamp in enumerate(switching.clamps(ends)):
             self._held[k] = clamp is not None
             if clamp is not None:

@@ -9,6 +9,7 @@ import numpy as np
 from hybrid.adapt.manager import DomainManager
 from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.state import Ends, Line, State
 from hybrid.kernels.torque_transfer import carry_torque
@@ -16,7 +17,7 @@ from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import picked
 from hybrid.model.layout import Layout
-from hybrid.model.resolution import Resolution, follows_curvature
+from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.equilibrium import equilibrium_of, solve_model
@@ -31,6 +32,8 @@ SLOWEST, FASTEST = 2.0, 10
 STRICTER = (1.0, 0.5, 0.25)
 # Rounds of zones and equilibrium at the start: each only adds rod, so they end.
 MOST_ROUNDS = 10
+# Share of what is asked of tension, curvature or moment along the line that leaving bending out may make.
+OF_ALONG = 0.5
 
 
 def zones_at_start(
@@ -54,16 +57,27 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     pace = max(HOLD * model.time_scale, LEAST_STEPS_HELD * step)
     hold = wanted.hold_time if wanted.hold_time is not None else pace
     curvature_error = wanted.curvature_error if follows_curvature(scene) else None
+    asked = shares_asked(scene, curvature_error)
     if curvature_error is not None:  # finer meshes have smaller errors: of second order
         curvature_error /= resolution.fineness**2
     manager = DomainManager(
         model.cable, model.layout, resolution.zones * model.length, hold, given_zones(scene, model.layout),
         model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
         LEFT if model.corrected else 1.0, model.on_base,
-        curvature_error,
+        curvature_error, asked,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager
+
+
+def shares_asked(scene: Scene, curvature_error: float | None) -> dict[int, float]:
+    """Parts of the largest tension, curvature and moment along the line that leaving bending out may make."""
+    wanted = requested_accuracy(scene)
+    parts = (wanted.of_tension, wanted.of_curvature, wanted.of_moment) if wanted is not None else (None,) * 3
+    asked = {k: OF_ALONG * part for k, part in zip((TENSION, CURVATURE, MOMENT), parts, strict=True) if part}
+    if curvature_error is not None:
+        asked[CURVATURE] = min(curvature_error, asked.get(CURVATURE, np.inf))
+    return asked
 
 
 def equilibrium_zones(model: Model, manager: DomainManager, t: float, found: Equilibrium) -> tuple[Model, Equilibrium]:

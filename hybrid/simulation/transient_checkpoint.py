@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels import books as b
+from hybrid.kernels.cell_errors import CURVATURE, QUANTITIES
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import SAME_TIME
 from hybrid.kernels.state import blank_state
@@ -72,7 +73,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
         saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
     if isinstance(saved.get("zoning"), dict):
-        older |= {"zoning": {"following": None} | saved["zoning"]}
+        older |= {"zoning": zoning_of_today(saved["zoning"])}
         saved = {name: x for name, x in saved.items() if name != "zoning"}
     saved = matched(older | dict(saved), template, "state")
     clock, count, books = compiled.clock, compiled.count, compiled.books
@@ -114,6 +115,18 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if not complete:
         run.evaluate_forces()
     count[b.PHASE] = b.BEGIN_STEP
+
+
+def zoning_of_today(saved: dict[str, Any]) -> dict[str, Any]:
+    """The zones of a checkpoint, of an older version too: that had no cells that follow, or one largest curvature."""
+    saved = {"following": None} | saved
+    following, manager, largest = saved["following"], saved.get("manager"), np.zeros(QUANTITIES)
+    if isinstance(following, dict) and isinstance(following.get("peak"), float):
+        largest[CURVATURE] = following["peak"]
+        saved["following"] = {name: x for name, x in following.items() if name != "peak"}
+    if isinstance(manager, dict):
+        saved["manager"] = {"largest": largest} | manager
+    return saved
 
 
 def _restore_envelope(run: Transient, saved: Mapping[str, Any] | None) -> None:

@@ -133,7 +133,7 @@ class ZoneSwitching:
         relaxing = {name: getattr(zones, name) for name in RELAXING} if zones.counts[z.RELAXING] else None
         following = None
         if zones.clock[z.SHARE] > 0.0:
-            following = {"true": zones.true, "calm": zones.calm, "peak": float(zones.clock[z.PEAK])}
+            following = {"true": zones.true, "calm": zones.calm}
         return {
             "following": following,
             "manager": self.manager.checkpoint(), "h": line.h, "kb": line.kb, "force": line.force,
@@ -159,11 +159,11 @@ class ZoneSwitching:
                 getattr(zones, name)[:] = x
             zones.counts[z.RELAXING] = 1
         if (following := saved["following"]) is not None:
-            needs: dict[str, Any] = {"true": zones.true, "calm": zones.calm, "peak": 0.0}
+            needs = {"true": zones.true, "calm": zones.calm}
             found = matched(following, needs, "following")
-            if not (found["true"].min() > 0.0 and found["peak"] >= 0.0):
-                raise ValueError("lengths or a curvature that no line has")
-            zones.true[:], zones.calm[:], zones.clock[z.PEAK] = found["true"], found["calm"], found["peak"]
+            if not found["true"].min() > 0.0:
+                raise ValueError("lengths that no line has")
+            zones.true[:], zones.calm[:] = found["true"], found["calm"]
         line.h[:], line.kb[:], line.force[:] = saved["h"], saved["kb"], saved["force"]
         zones.lengths[:] = line.h
         if strain.size:

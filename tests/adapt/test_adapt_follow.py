@@ -12,7 +12,6 @@ from problems import order
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
-from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
@@ -33,7 +32,6 @@ def planned(curvature_error, shape, n=8, parts=64, length=10.0):
     state = state_on(line, shape, 1e4)  # taut: the layer is as short as the cells
     manager = DomainManager(what, zones, 1e-2, 1.0, np.ones(n, int), 1.0, curvature_error=curvature_error)
     manager.evaluate_criteria(line, no_sea(line.h.size), still(), state, 0.0)
-    manager.zones.clock[z.PEAK] = (manager.zones.kinds.turn[1:-1] / line.hn[1:-1]).max()
     manager.zones.next_rod[:] = True
     table = Table(blank_zone_job())
     table.bind(line=line, new=state, zones=manager.zones)
