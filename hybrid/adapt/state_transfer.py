@@ -32,12 +32,13 @@ def transfer_to(
     kinks: np.ndarray,
     twist: Floats,
     clamps: Sequence[Clamp | None] = (None, None),
+    shifts: bool = True,
 ) -> Transfer:
     """What carries a state from one layout to another of the same base.
 
     line, target: the old and the new line; kinks: (n+1,) bool, base nodes where tangent and tension may jump (point
     loads); twist: (n,) 1/m, twist to give to the frames of base cells that become rod; clamps: first director and
-    tangent of what holds the twist of the two ends, None: nothing does.
+    tangent of what holds the twist of the two ends, None: nothing does; shifts: whether momentum is kept exactly.
     """
     held, frames = np.zeros(2, bool), np.zeros((2, 2, 3))
     for k, clamp in enumerate(clamps):
@@ -46,7 +47,7 @@ def transfer_to(
     out = states(target.h.size, turn=np.zeros((len(target.torsion), 3)))
     return Transfer(
         line, target, state, out, old.places, new.places, new.base_of_cell, old.first, kinks, twist,
-        frames, held, blank_match(line.h.size, target.h.size),
+        frames, held, np.array([shifts]), blank_match(line.h.size, target.h.size),
     )  # fmt: skip
 
 

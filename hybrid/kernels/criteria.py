@@ -25,8 +25,10 @@ CRITERIA: tuple[Criterion, ...] = (
     Criterion("bend", "bending length EI kappa/T over the tolerance", 0.25),
     Criterion("slack", "tension floor over tension, now or as it will be a horizon ahead", 0.5),
     Criterion("clamp", "lambda times the angle at a clamp, or moment at an end over T, over the tolerance", 0.25),
-    Criterion("point", "lambda times the kink at a point load, a jump of section or a joint, over the tolerance", 0.25),
-    Criterion("edge", "EI w/T^2 where contact with the seabed begins, over the tolerance", 0.25),
+    Criterion(
+        "point", "lambda times half the kink at a point load, a step of section or a joint, over the tolerance", 0.25
+    ),
+    Criterion("edge", "EI w/(2 T^2) where contact with the seabed begins, over the tolerance", 0.25),
     Criterion("torsion", "torque^2/(4 EI T) over a half, or torque x turn of the line/(2 T) over the tolerance", 0.25),
     Criterion("given", "what the scene or a function of the user asks for", 0.5),
     Criterion("contact", "two diameters over the distance of the line to itself, now or as it will be", 0.5),

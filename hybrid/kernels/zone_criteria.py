@@ -31,6 +31,7 @@ from hybrid.kernels.cell_errors import (
     lack_at_kink,
     lack_of_bend,
     lack_of_torque,
+    node_curvature,
     over_shares,
     second_difference,
 )
@@ -175,6 +176,9 @@ def lack_of_node(line, kinds, shares, i, T):
     along = shares[CURVATURE] < math.inf or shares[MOMENT] < math.inf
     if i == 0 or i == n:
         lack = lack_at_clamp(EI, w, T, turn[i])
+        if along and not line.element[i] and turn[i] == 0.0:  # a pin, where the curvature of a rod fades away
+            k = min(max(i, 1), n - 1)
+            lack = CellError(0.0, 0.0, node_curvature(line, turn, k), 0.0)
         if along and line.element[i]:
             lack = CellError(lack.position, lack.tension, kappa, EI * kappa)
         return lack, CLAMP

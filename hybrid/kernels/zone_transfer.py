@@ -1,8 +1,9 @@
 """From the old cells to the new ones: nothing that stays moves, and nothing is lost.
 
 Nodes that stay keep their positions to the last bit.  Nodes that appear lie on cubics through the old nodes, so that a
-rod begins without kinks; nodes that go are dropped.  Mass is exact by construction, linear momentum by a small shift of
-the velocities of the nodes concerned, stretch by stretch.  The length that a chord gains or loses when an arc becomes
+rod begins without kinks; nodes that go are dropped.  Mass is exact by construction, linear momentum, where zones change
+by themselves, by a small shift of the velocities of the nodes concerned, stretch by stretch; where cells follow the
+curvature to second order.  The length that a chord gains or loses when an arc becomes
 chords (or chords an arc) is kept: every new cell is given the unstretched length that makes its tension what it was, and
 is let go to its true length slowly (kernels.zone_step).
 """
@@ -60,6 +61,7 @@ class Transfer(NamedTuple):
     twist: Floats  # (n,) 1/m, twist to give to the frames of base cells that become rod
     clamps: Floats  # (2, 2, 3) first director and tangent of what holds the twist of an end
     held: NDArray[np.bool_]  # (2,) whether something does
+    shifts: NDArray[np.bool_]  # (1,) whether momentum is kept by a shift of velocities
     match: Match
 
 
@@ -68,7 +70,7 @@ def blank_transfer() -> Transfer:
     line, state, whole = blank_line(1), blank_state(1), np.zeros(2, np.int64)
     return Transfer(
         line, line, state, state, whole, whole, whole, whole, np.zeros(2, bool), np.zeros(1), np.zeros((2, 2, 3)),
-        np.zeros(2, bool), blank_match(1, 1),
+        np.zeros(2, bool), np.ones(1, bool), blank_match(1, 1),
     )  # fmt: skip
 
 
@@ -427,7 +429,8 @@ def transfer_state(job):
     carry_nodes(state.vd, out.vd, line.s, target.s, match)
     carry_linearly(state.slip, out.slip, line.s, target.s, match)
     carry_cells(job)
-    keep_momentum(job)
+    if job.shifts[0]:  # of cells that follow it would be a kick at every change
+        keep_momentum(job)
     carry_frames(job)
 
 

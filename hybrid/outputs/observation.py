@@ -25,6 +25,9 @@ from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
 from hybrid.solve.bending_corrector import Shift
 
+# Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
+UNRESOLVED = 3.0
+
 
 def cross(a: Floats, b: Floats) -> Floats:
     """a x b of vectors (n, 3, nb)."""
@@ -266,7 +269,24 @@ class Observation:
                     side[row, 0] = np.maximum(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
                 else:
                     side[row, 0] = side[one, 0]
+        self._bend_on_through_joints(out)
         return out
+
+    def _bend_on_through_joints(self, strains: Floats) -> None:
+        """At a joint, curvature of a rod whose cell is too long to show how the bend fades: that of the catenary."""
+        kinds, spans = [zone.kind for zone in self.grid.parts], self.grid.spans
+        for k in range(1, len(kinds)):
+            if kinds[k - 1] == kinds[k]:
+                continue
+            last, first = spans[k - 1][2] + spans[k - 1][1] - spans[k - 1][0], spans[k][2]
+            node, rod = spans[k][0], kinds[k] == "rod"
+            cell, inner = (node, node + 1) if rod else (node - 1, node - 1)
+            if not self.line.element[inner]:
+                continue
+            EI = self.batch.stiffness(inner, self.line).T[:2].mean(axis=0) * self.line.hn[inner]
+            long = self.line.h[cell] ** 2 * self.T[cell] > UNRESOLVED**2 * EI
+            mine, its = (first, last) if rod else (last, first)
+            strains[mine, 0] = np.where(long, strains[its, 0], strains[mine, 0])
 
     def _strains_of_rod(self, side: Floats, a: int, b: int) -> None:
         """Curvature and twist (b - a + 1, 2, nb) of a rod from node a to node b."""

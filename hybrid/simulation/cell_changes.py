@@ -89,6 +89,7 @@ class CellChanges:
         self._match = Room(Packed(blank_joined), self.most), Room(Packed(blank_single), self.most)
         self.side, self.cells, self.adopted, self._stale = 0, 0, False, False
         self._views: dict[Any, Any] = {}  # while tables are bound
+        self._shifts = np.zeros(1, bool)
         self._follows = bool(owner.switching.zones.clock[z.SHARE] > 0.0)
         self._binding = self._bound = False
         self._tension_floor = TENSION_FLOOR, LEAST_TENSION * manager.scale
@@ -202,7 +203,7 @@ class CellChanges:
             transfer = Transfer(
                 self._line(k, n), self._line(to, m), self._state(k, parity, n), self._state(to, 0, m),
                 self._layout(k, n).place, at.place, at.of, sides[k].first, self._switching.kinks, self._twist,
-                self._clamps, self._held, match,
+                self._clamps, self._held, self._shifts, match,
             )  # fmt: skip
             return {
                 "transfer": transfer, "ends": ends, "sea": self._sea_on(n), "target_sea": self._sea_on(m),

@@ -296,4 +296,5 @@ class ZoneSwitching:
     def _transfer(self, old: Layout, new: Layout, line: Line, target: Line, ends: Ends, state: State) -> Transfer:
         """What carries the state to the new nodes."""
         none = np.zeros(new.rod.size)
-        return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends))
+        shifts = not self.zones.clock[z.SHARE] > 0.0
+        return transfer_to(old, new, line, target, state, self.kinks, none, self.clamps(ends), shifts)

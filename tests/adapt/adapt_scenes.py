@@ -81,10 +81,10 @@ def bending(**more: Any) -> Scene:
 
 
 def kinking(**more: Any) -> Scene:
-    """A clump of 30 N on a light cable: sqrt(EI/T) 2 sin(angle/2) from 22 to 200 mm; the tolerance is 120 mm."""
+    """A clump of 30 N on a light cable: sqrt(EI/T) sin(angle/2) from 11 to 100 mm; the tolerance is 60 mm."""
     clump = [{"kind": "clump", "at": 5.0, "mass": 3.0}]
     return breathing(
-        9.9, 8.0, {"tolerance": 0.012, "rod_cell": 0.05} | more.pop("model", {}), mass=0.1, attachments=clump, **more
+        9.9, 8.0, {"tolerance": 0.006, "rod_cell": 0.05} | more.pop("model", {}), mass=0.1, attachments=clump, **more
     )
 
 
@@ -190,12 +190,12 @@ def bend(result: Result, tolerance: float, floor: float = FLOORED) -> Floats:
 
 
 def kink(result: Result, tolerance: float, node: int, floor: float) -> Floats:
-    """(nt,): sqrt(EI/T) times the angle at a node over the tolerance, from the chords of the two base cells."""
+    """(nt,): sqrt(EI/T) times half the angle at a node over the tolerance, from the chords of the two base cells."""
     r = result.position[:, ::2]
     d = np.diff(r[:, node - 1 : node + 2], axis=1)
     d = d / np.linalg.norm(d, axis=2)[:, :, None]
     angle = np.linalg.norm(d[:, 1] - d[:, 0], axis=1)
-    return np.sqrt(EI / np.maximum(at_nodes(result)[:, node], floor)) * angle / tolerance
+    return np.sqrt(EI / np.maximum(at_nodes(result)[:, node], floor)) * 0.5 * angle / tolerance
 
 
 COMES, GOES = ("split", "grow", "retry"), ("merge", "shrink")

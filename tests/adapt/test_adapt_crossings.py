@@ -61,7 +61,7 @@ def cells_of(node_ratio: Floats) -> Floats:
 
 def ratios(result: hybrid.Result, name: str, most: bool = True) -> dict[str, Floats]:
     """Criteria (nt, n) of one of the scenes; at a clump within a rod what is weighed lies between two: least and most."""
-    tolerance = {"slack": 1.0, "deep": 0.4, "bend": 0.0444, "point": 0.12, "clamp": 0.015, "edge": 0.016}[name]
+    tolerance = {"slack": 1.0, "deep": 0.4, "bend": 0.0444, "point": 0.06, "clamp": 0.015, "edge": 0.016}[name]
     mass = {"point": 0.1, "clamp": 0.2}.get(name, 1.0)
     floor = FLOORED * mass ** (2 / 3)
     node = bend(result, tolerance, floor)
@@ -136,7 +136,7 @@ def test_on_at_a_clamp():
 
 
 def test_on_where_a_cable_leaves_the_bed():
-    """The rod begins about the edge of contact, where bend and edge are the same length EI w/T^2."""
+    """The rod begins about the edge of contact, where bend is EI w/T^2, and edge half of it."""
     result = ran("edge")
     first = comes(result)[0]
     assert first.text.startswith(("edge", "bend"))
@@ -210,7 +210,8 @@ def test_off_as_the_manager_saw_it(name, tmp_path):
         text["time"]["duration"] = 8.0
         result = told(Scene.model_validate(text))
     came, gone = comes(result), goes(result)
-    assert came[0].criterion == name and all(e.value <= e.threshold for e in gone)
+    asked = ("edge", "bend") if name == "edge" else (name,)  # the line beside an edge bends as much
+    assert came[0].criterion in asked and all(e.value <= e.threshold for e in gone)
     ratio = result[f"criteria/{name}"].max(axis=1)
     assert came[0].t == pytest.approx(result.times[np.flatnonzero(ratio > 1.0)[0]], abs=2 * DT)
     loud = np.max([result[f"criteria/{k}"] / off for k, off in OFF.items()], axis=0)
@@ -259,7 +260,7 @@ def test_zones_are_what_events_say(name):
 @pytest.mark.parametrize("name", ["deep", "bend", "point"])
 def test_no_further_from_the_rod_than_the_tolerance(name):
     """Against the rod of full length: what leaving bending out costs stays below what the scene allows."""
-    allowed = {"deep": 0.4, "bend": 0.0444, "point": 0.12}[name]
+    allowed = {"deep": 0.4, "bend": 0.0444, "point": 0.06}[name]
     apart = np.linalg.norm(ran(name).position - ran(name, "rod").position, axis=2)
     assert apart.max() < allowed
     assert apart.max() > 1e-4  # and it is a hybrid
