@@ -212,7 +212,7 @@ def test_off_as_the_manager_saw_it(name, tmp_path):
     came, gone = comes(result), goes(result)
     asked = ("edge", "bend") if name == "edge" else (name,)  # the line beside an edge bends as much
     assert came[0].criterion in asked and all(e.value <= e.threshold for e in gone)
-    ratio = result[f"criteria/{name}"].max(axis=1)
+    ratio = result[f"criteria/{came[0].criterion}"].max(axis=1)
     assert came[0].t == pytest.approx(result.times[np.flatnonzero(ratio > 1.0)[0]], abs=2 * DT)
     loud = np.max([result[f"criteria/{k}"] / off for k, off in OFF.items()], axis=0)
     is_rod = np.array([flags_of(rods(result, k)) for k in range(len(result.times))])

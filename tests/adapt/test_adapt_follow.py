@@ -12,10 +12,14 @@ from problems import order
 
 import hybrid
 from hybrid.adapt.manager import DomainManager
+from hybrid.kernels import books as b
 from hybrid.kernels.binding import Table
+from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.state import no_sea
 from hybrid.kernels.zone_step import blank_zone_job, plan_nodes, take_arcs
 from hybrid.simulation.cell_changes import CellChanges
+from hybrid.simulation.initial_zones import shares_asked
+from hybrid.simulation.transient_checkpoint import zoning_of_today
 
 EXAMPLES = Path(__file__).parents[2] / "examples"
 # A line that touches down, its upper end heaving; the layer at the touchdown is 0.4 m long and goes to and fro over 20 m.
@@ -120,8 +124,8 @@ def test_a_run_whose_cells_follow_is_continued_to_the_last_bit(tmp_path: Path) -
     more = hybrid.resume(tmp_path / "r.h5", until=6.0)
     for name in ("position", "tension", "curvature", "work/zones"):
         np.testing.assert_array_equal(more[name], whole[name], err_msg=name)
-    for a, b in zip(more.mesh, whole.mesh, strict=True):
-        np.testing.assert_array_equal(a.s, b.s)
+    for mine, its in zip(more.mesh, whole.mesh, strict=True):
+        np.testing.assert_array_equal(mine.s, its.s)
 
 
 @pytest.mark.parametrize("friction", ["", "environment.seabed.friction=0.4"])
@@ -137,3 +141,53 @@ def test_changes_in_arrays_made_once_are_those_of_new_arrays(friction: str, monk
     for name in ("position", "velocity", "tension", "curvature", "work/zones", "energy/bending", "envelope/tension_max",
                  "envelope/curvature_t_max", "envelope/displacement_max", "steps/iterations"):  # fmt: skip
         assert np.array_equal(once[name], anew[name], equal_nan=True), name
+
+
+def test_kinds_and_cells_keep_the_share() -> None:
+    """Where kinds follow as well, the field of curvature is within about what is asked, joints and pins included."""
+    scene = [*TOUCHDOWN[:4], "model={kind: adaptive, curvature_error: 0.05}", "mesh={cells: 24}", "output.every=0.5"]
+    found = hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", scene))
+    rod = hybrid.run(
+        hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*scene[:4], scene[-1], "model=rod", "mesh={cells: 1200}"])
+    )
+    kinds = [set(mesh.kinds) for mesh in found.mesh]
+    assert any("catenary" in kind for kind in kinds)
+    assert np.abs(found.curvature - rod.curvature)[2:].max() < 0.055 * rod.curvature.max()
+
+
+def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.MonkeyPatch) -> None:
+    """In every change of a run, to 1e-3 of that of the line at its largest speed."""
+    left, change = [], CellChanges.change
+
+    def measured(self: CellChanges, *given) -> float:
+        k, n, parity = self.side, self.cells, int(self._run.count[b.PARITY])
+        line, state = self._line(k, n), self._state(k, parity, n)
+        size, before = line.mass.sum() * np.linalg.norm(state.v, axis=1).max(), line.mass @ state.v
+        booked = change(self, *given)
+        line, state = self._line(self.side, self.cells), self._state(self.side, 0, self.cells)
+        left.append(np.linalg.norm(line.mass @ state.v - before) / size)
+        return booked
+
+    monkeypatch.setattr(CellChanges, "change", measured)
+    hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", list(TOUCHDOWN)))
+    assert len(left) > 50 and 0.0 < np.median(left) < 1e-4 and max(left) < 1e-3, max(left)
+
+
+@pytest.mark.parametrize(
+    "asked, share", [("curvature", CURVATURE), ("bending_moment", MOMENT), ("line_tension", TENSION)]
+)
+def test_what_is_asked_along_the_line_is_a_share_of_the_rule(asked: str, share: int) -> None:
+    """Half of it; a curvature error that is smaller stands."""
+    scene = hybrid.load_scene(EXAMPLES / "touchdown.yaml", [f"accuracy={{{asked}: 4%}}", "model=adaptive"])
+    assert shares_asked(scene, None) == {share: 0.02}
+    assert shares_asked(scene, 0.01)[CURVATURE] == 0.01 and shares_asked(scene, 0.03)[share] == 0.02
+
+
+def test_zones_of_an_older_checkpoint() -> None:
+    """It had one largest curvature, or none."""
+    rest = {"true": np.ones(3), "calm": np.zeros(4)}
+    found = zoning_of_today({"manager": {"ratios": 1}, "following": rest | {"peak": 0.2}})
+    assert found["following"] == rest and found["manager"]["largest"].tolist() == [0, 0, 0.2, 0]
+    assert zoning_of_today({"manager": {"ratios": 1}})["following"] is None
+    own = {"largest": np.ones(4)}
+    assert zoning_of_today({"manager": own, "following": rest})["manager"]["largest"].tolist() == [1, 1, 1, 1]

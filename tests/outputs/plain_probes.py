@@ -206,6 +206,15 @@ class Plain:
                         side[row, 0] = max(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
                     elif b - a >= 2:
                         side[row, 0] = side[one, 0]
+        for k in range(1, len(self.grid.parts)):  # a cell of a rod that is too long to show how its bend fades
+            before, after = self.grid.parts[k - 1].kind, self.grid.parts[k].kind
+            node, _, right = self.grid.spans[k]
+            left = right - 1
+            inner, cell = (node + 1, node) if after == "rod" else (node - 1, node - 1)
+            if before != after and line.element[inner]:
+                EI = line.kb[inner, :2].mean() * line.hn[inner]
+                if line.h[cell] ** 2 * self.state.T[cell] > UNRESOLVED**2 * EI:
+                    out[left if before == "rod" else right, 0] = out[right if before == "rod" else left, 0]
         return out
 
     def _strain_of_moment(self, node: int, cell: int) -> tuple[float, float]:
