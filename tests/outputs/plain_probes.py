@@ -13,6 +13,7 @@ from hybrid.kernels.report import CONTACT_FORCE, FORCE_A
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
+from hybrid.outputs.observation import UNRESOLVED
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.touchdown import Touchdown
