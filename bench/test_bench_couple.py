@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import time
 from importlib import import_module
+from importlib.metadata import files
 from pathlib import Path
 from typing import Any
 
@@ -75,3 +76,44 @@ def test_one_script_on_both(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cap
             print(f"{k + 1:6}" + "".join(f"{100.0 * (x - 1.0):10.3f}" for x in off))
             assert all(abs(x - 1.0) < 0.01 for x in off)
         print(f"CPU: hybrid {mine:.2f} s, MoorDyn {spent:.2f} s with steps of 0.002 s")
+
+
+def on_a_body(path: Path) -> Path:
+    """That deck with its coupled points on one coupled body at (0, 0, -14)."""
+    text = deck(path).read_text(encoding="utf-8")
+    for k, (x, y) in enumerate(((40, 0), (-20, 34.64), (-20, -34.64)), 4):
+        old = next(line for line in text.splitlines() if line.startswith(f"{k}    Coupled"))
+        text = text.replace(old, f"{k}  Body1  {x} {y} 0  0 0 0 0")
+    rows = [
+        "---------------------- BODIES ---", "ID Attachment X0 Y0 Z0 r0 p0 y0 Mass CG* I* Volume CdA* Ca*",
+        "(#) (word) (m) (m) (m) (deg) (deg) (deg) (kg) (m) (kg-m^2) (m^3) (m^2) (-)",
+        "1 Coupled 0 0 -14 0 0 0 0 0 0 0 0 0",
+    ]  # fmt: skip
+    mark = "---------------------- POINTS"
+    assert mark in text
+    path.write_text(text.replace(mark, "\n".join([*rows, mark])), encoding="utf-8")
+    return path
+
+
+def test_moordyns_own_example_script(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """`example/simpledemo.py` as MoorDyn's package installs it, with a deck where it asks for one: only its import differs."""
+    pytest.importorskip("moordyn")
+    found = [x for x in files("moordyn") or [] if x.name == "simpledemo.py"]
+    if not found:
+        pytest.skip("this package of MoorDyn has no example")
+    script = Path(str(found[0].locate())).read_text(encoding="utf-8")
+    assert "import moordyn\n" in script and "<file name>" in script
+    monkeypatch.chdir(tmp_path)
+    script = script.replace("<file name>", str(on_a_body(tmp_path / "body.txt")))
+    forces = []
+    for package in ("moordyn", "hybrid.couple.moordyn"):
+        names: dict[str, Any] = {}
+        exec(script.replace("import moordyn\n", f"import {package} as moordyn\n"), names)
+        forces.append(np.array(names["f"]))
+    off = np.abs(forces[1] - forces[0])
+    size = np.abs(forces[0][:3]).max(), np.abs(forces[0][:3]).max() * 40.0
+    print(
+        f"forces {off[:3].max() / size[0]:.1e}, moments {off[3:].max() / size[1]:.1e} of the largest force (times 40 m)"
+    )
+    assert off[:3].max() < 0.01 * size[0]
+    assert off[3:].max() < 0.01 * size[1]

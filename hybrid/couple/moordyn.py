@@ -20,6 +20,7 @@ from hybrid.interop.moordyn.rows import read_source
 from hybrid.interop.moordyn.systems import JOINTS, system_of
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import frame_of
+from hybrid.scene.analysis import CatenaryModel
 from hybrid.scene.points import Fairlead
 from hybrid.scene.read import parse_either
 from hybrid.scene.system import System
@@ -199,6 +200,9 @@ def Init(instance: MoorDyn, x: Sequence[float] = (), v: Sequence[float] = ()) ->
         data["points"][name] = {"kind": "fixed", "position": place.tolist()}
     for body in instance.bodies:  # its points are what the caller moves
         data["bodies"].pop(f"body{body.id}", None)
+    for name, line in instance.scene.lines.items():
+        if isinstance(line.chosen_model, CatenaryModel):  # it may go slack, as in MoorDyn
+            data["lines"][name]["model"] = {"kind": "catenary", "slack": "warn"}
     data["time"] = {"duration": DURATION, "step": instance.dt}
     data["output"] = data.get("output", {}) | {"every": DURATION}
     instance.simulation = SystemSimulation(data)

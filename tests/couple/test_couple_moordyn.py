@@ -172,3 +172,32 @@ def test_points_of_a_system_are_set_by_name() -> None:
     assert result.lines["line1"].tension.shape[0] == result.times.size
     with pytest.raises(ValueError, match="over"):
         system.advance(1.0)
+
+
+def test_scripts_that_ask_the_deck_where_things_are(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The calls of MoorDyn's example and of its smallest test: states before Init, names of older versions."""
+    system = moordyn.Create(str(on_a_body(tmp_path / "body.txt")))
+    assert moordyn.GetNumberBodies(system) == 1
+    body = moordyn.GetBody(system, 1)
+    assert moordyn.GetBodyID(body) == 1 and moordyn.GetBodyType(body) == moordyn.BODY_TYPE_COUPLED
+    x, xd = (np.array(part) for part in moordyn.GetBodyState(body))
+    assert x.tolist() == [0, 0, -14, 0, 0, 0] and not xd.any()
+    moordyn.Init(system, x, xd)
+    f = moordyn.Step(system, x, [0.1, 0, 0, 0, 0, 0], 0.0, 0.5)
+    assert len(f) == 6
+    state, rates = moordyn.GetBodyState(body)
+    assert state == pytest.approx([0.05, 0, -14, 0, 0, 0]) and rates[0] == 0.1
+    moordyn.Close(system)
+
+    (tmp_path / "Mooring").mkdir()
+    (tmp_path / "Mooring" / "lines.txt").write_text(DECK.read_text(encoding="utf-8"), encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    system = moordyn.Create()
+    places = [x for k in (4, 5, 6) for x in moordyn.GetConnectPos(moordyn.GetConnection(system, k))]
+    assert places == PLACES
+    assert not any(moordyn.GetPointForce(moordyn.GetPoint(system, 4)))
+    assert moordyn.Init(system, places, STILL) == 0 and moordyn.Close(system) == 0
+    with pytest.raises(RuntimeError, match="file"):
+        moordyn.Create("file.invalid")
+    with pytest.raises(hybrid.SceneError):
+        moordyn.Create("file.invalid")
