@@ -31,7 +31,10 @@ if TYPE_CHECKING:
     from hybrid.simulation.system_stiffness import offsets, stiffness
     from hybrid.store.reader import Result
     from hybrid.store.reader import open_result as open
+    from hybrid.store.study_file import open_study
     from hybrid.studies.levels import trade_levels
+    from hybrid.studies.study import case_of as study_case
+    from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade
     from hybrid.view.plots import plot_summary as plot
     from hybrid.view.plots import plot_zones
@@ -67,6 +70,9 @@ _HOME = {
     "scene_text": ("hybrid.scene.read", "scene_text"),
     "static": ("hybrid.simulation.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
+    "study": ("hybrid.studies.study", "study"),
+    "study_case": ("hybrid.studies.study", "case_of"),
+    "open_study": ("hybrid.store.study_file", "open_study"),
     "trade": ("hybrid.studies.tradeoff", "trade"),
     "trade_levels": ("hybrid.studies.levels", "trade_levels"),
     "validate_scene": ("hybrid.scene.read", "validate_scene"),
@@ -92,6 +98,7 @@ __all__ = [
     "load_system",
     "offsets",
     "open",
+    "open_study",
     "parse_scene",
     "plan",
     "plot",
@@ -102,6 +109,8 @@ __all__ = [
     "scene_text",
     "static",
     "stiffness",
+    "study",
+    "study_case",
     "trade",
     "trade_levels",
     "validate_scene",

@@ -19,6 +19,7 @@ import typer
 import hybrid
 import hybrid.cli.result_commands  # registers its commands
 import hybrid.cli.statistics_command
+import hybrid.cli.study_command
 from hybrid.cli.app import (
     REFUSED,
     Drawn,

@@ -17,7 +17,7 @@ from rich.console import Console as RichConsole
 
 import hybrid
 from hybrid.cli.pipe import reader_has_gone
-from hybrid.cli.progress_line import ProgressLine
+from hybrid.cli.progress_line import ProgressLine, span
 from hybrid.errors import EXPECTED, weight_of_event
 
 if TYPE_CHECKING:
@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
     from hybrid.studies.runs import StudyProgress
+    from hybrid.studies.study import StudyRunning
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost
@@ -134,6 +135,30 @@ class Console:
                 last = now
                 what = run.what + (f", {run.part:.0%}" if run.part else "")
                 bar.update(task, total=run.total, completed=run.done, description=what, refresh=True)
+
+            yield tell
+
+    @contextmanager
+    def study_running(self) -> Iterator[Callable[[StudyRunning], None] | None]:
+        """What `hybrid.study` calls: a bar over all cases with failures, time left and dask's dashboard; JSON lines."""
+        from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeElapsedColumn
+
+        if self.quiet or self.as_json:
+            yield None if self.quiet else lambda now: self.json("progress", **asdict(now), left=now.left)
+            return
+        columns = (BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
+        with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True) as bar:
+            task, begun = bar.add_task("starting workers"), [-1, 0.0]
+
+            def tell(now: StudyRunning) -> None:
+                ended = now.done + now.failed
+                if begun[0] < 0:  # what an earlier call has done says nothing of the pace
+                    begun[:] = [ended, now.elapsed]
+                pace = (now.elapsed - begun[1]) / (ended - begun[0]) if ended > begun[0] else None
+                parts = [f"{now.failed} failed"] if now.failed else []
+                parts += [f"{span(pace * now.left)} left"] if pace is not None else []
+                parts += [now.dashboard] if now.dashboard else []
+                bar.update(task, total=now.total, completed=ended, description=", ".join(parts))
 
             yield tell
 

@@ -68,7 +68,7 @@ def load_system(path: str | Path, overrides: Sequence[str] = ()) -> System:
 
 def read_either(path: str | PathLike[str], overrides: Sequence[str] = ()) -> tuple[Scene | System, list[RenamedKey]]:
     """Read a scene file of one cable or of several lines; with the notes on renamed keys."""
-    return parse_either(_text_of(Path(path)), str(path), overrides)
+    return parse_either(text_of(Path(path)), str(path), overrides)
 
 
 def as_scene(scene: SceneLike) -> Scene:
@@ -101,13 +101,13 @@ def load_scene(path: str | Path, overrides: Sequence[str] = ()) -> Scene:
 
 def read_scene(path: str | Path, overrides: Sequence[str] = ()) -> tuple[Scene, list[RenamedKey]]:
     """Read a scene file as `load_scene` does; with the notes on renamed keys, instead of warnings."""
-    return _parsed(_text_of(path), str(path), overrides)
+    return _parsed(text_of(path), str(path), overrides)
 
 
 HDF5 = b"\x89HDF\r\n\x1a\n"  # how files of that format begin
 
 
-def _text_of(path: str | Path) -> str:
+def text_of(path: str | Path) -> str:
     """The text of a scene file; SceneError where there is none."""
     try:
         content = b""
@@ -186,7 +186,7 @@ def parse_either(text: str, file: str = "", overrides: Sequence[str] = ()) -> tu
 def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
     """The same refusal with line and column of what was found only after reading (cells, steps, motions)."""
     try:
-        root, _ = from_text(_text_of(path))
+        root, _ = from_text(text_of(path))
     except (SceneError, Unreadable):
         return error
     if isinstance(root.value, dict):
@@ -199,7 +199,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
         if complaint.line is None and place is not None:
             complaint = replace(complaint, line=place[0], column=place[1])
         complaints.append(complaint)
-    return SceneError(_in_order(complaints), error.file or str(path))
+    return SceneError(in_order(complaints), error.file or str(path))
 
 
 def validate_scene(data: Any) -> Scene:
@@ -319,9 +319,9 @@ def _validated(
             tables = _readable_tables(data) if isinstance(data, dict) else {}
             found += [(finding, False) for finding in contradictions(tables)]
         found += [(finding, False) for finding in motion_findings(tables)]
-    complaints = complaints + [_complaint(root, finding, at_key) for finding, at_key in found]
+    complaints = complaints + [complaint_of(root, finding, at_key) for finding, at_key in found]
     if complaints or scene is None:
-        raise SceneError(_in_order(complaints), file)
+        raise SceneError(in_order(complaints), file)
     return scene, _notes(data, scene, root, file)
 
 
@@ -346,7 +346,8 @@ def _readable_tables(data: dict[str, Any]) -> dict[str, Any]:
     return tables
 
 
-def _complaint(root: Node, finding: Finding, at_key: bool) -> Complaint:
+def complaint_of(root: Node, finding: Finding, at_key: bool) -> Complaint:
+    """A finding as a complaint with line and column; at_key: of the key, not of its value."""
     at, node, place, missing = _find(root, finding.at, at_key)
     given = finding.given or ("nothing" if missing else node.show())
     if at_key and not missing:
@@ -377,7 +378,7 @@ def _find(root: Node, path: Place, at_key: bool) -> tuple[Place, Node, Spot | No
     return tuple(at), node, place, False
 
 
-def _in_order(complaints: Iterable[Complaint]) -> list[Complaint]:
+def in_order(complaints: Iterable[Complaint]) -> list[Complaint]:
     """Every complaint once, in the order of the file; those without a line last."""
     once = list(dict.fromkeys(complaints))
     return sorted(once, key=lambda c: (c.line is None, c.line or 0, c.column or 0))

@@ -53,7 +53,7 @@ def usual_names(result: Result) -> list[str]:
 def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
     """A history of a result.  times: from and to (s); at: arc lengths (m), None: all output points.
 
-    ResultError for what is no history of numbers, a window with no two values in it, or a place outside.
+    ResultError for what is no history of numbers, a window with no value in it, or a place outside.
     """
     stored = f"steps/{name}" if f"steps/{name}" in result and name not in result else ALIASES.get(name, name)
     values = result[stored]
@@ -72,12 +72,9 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
     first, last = times or (None, None)
     a, b = -np.inf if first is None else first, np.inf if last is None else last
     inside = (t >= a) & (t <= b)
-    if inside.sum() < 2:
+    if not inside.any():
         over = f"{t[0]:.6g} to {t[-1]:.6g} s" if t.size else "none"
-        raise ResultError(
-            f"{int(inside.sum())} values of '{name}' lie between t = {a:g} and {b:g} s\n"
-            f"    expected: 2 at least, of {over}"
-        )
+        raise ResultError(f"no value of '{name}' lies between t = {a:g} and {b:g} s\n    expected: a window in {over}")
     basis = "every step" if dims[0] == "steps/t" else "every output"
     return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
 

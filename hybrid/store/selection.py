@@ -213,14 +213,14 @@ def error_name(part: Part, name: str) -> tuple[str, str]:
     return "", ""
 
 
-def optional_package(package: str, what: str) -> Any:
+def optional_package(package: str, what: str, extra: str = "export") -> Any:
     """A package that only an export needs; ResultError with the command that installs it when it is not there."""
     try:
         return import_module(package)
     except ImportError as error:
         raise ResultError(
             f"{what} needs the package '{package}', which cannot be imported\n"
-            f'    detail:   {error}\n    try:      pip install "hybrid-cable[export]"'
+            f'    detail:   {error}\n    try:      pip install "hybrid-cable[{extra}]"'
         ) from error
 
 

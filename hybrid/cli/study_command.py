@@ -1,0 +1,122 @@
+"""The command study: many runs of one scene with other values."""
+
+from __future__ import annotations
+
+import time as clock
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+import hybrid
+from hybrid.cli.app import Json, Quiet, UsageError, app, flag, session
+
+if TYPE_CHECKING:
+    from hybrid.cli.console import Console
+
+# Reasons of failed cases that are printed, those of most cases first.
+REASONS_SHOWN = 5
+
+
+@app.command()
+def study(
+    source: Annotated[
+        Path, typer.Argument(metavar="STUDY.yaml", help="The study file; with --case its results.", show_default=False)
+    ],
+    output: Annotated[
+        Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Results (Zarr); else STUDY.zarr there.")
+    ] = None,
+    workers: Annotated[int | None, typer.Option(metavar="N", min=1, help="Processes; else one for each core.")] = None,
+    scheduler: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Of a dask scheduler, such as tcp://host:8786, instead.")
+    ] = None,
+    batch: Annotated[int | None, typer.Option(metavar="N", min=1, help="Cases in a batch; else by their cost.")] = None,
+    netcdf: Annotated[Path | None, typer.Option(metavar="FILE.nc", help="The results as netCDF as well.")] = None,
+    case: Annotated[
+        int | None, typer.Option(metavar="N", min=0, help="Run one case of STUDY.zarr again, with its whole result.")
+    ] = None,
+    overwrite: Annotated[bool, flag("--overwrite", help="Begin anew where there is a study.")] = False,
+    quiet: Quiet = False, as_json: Json = False,
+) -> None:  # fmt: skip
+    """Compute a scene with other values of its keys, many times; a second call does what is missing."""
+    with session(as_json, quiet) as console:
+        if case is not None:
+            target = console.will_write(output or Path(f"{source.stem}.case{case}.h5"))
+            result = hybrid.study_case(source, case, target)
+            console.events(result.events)
+            console.done(f"case {case}", target, status=result.status)
+            return
+        if source.is_dir():
+            raise UsageError(f"{source} is a folder; a study file is expected, or --case N for one case of it")
+        console.source = ""
+        folder = output or source.with_suffix(".zarr")
+        console.left = f"{folder} keeps what is done; the same command goes on"
+        begin = clock.perf_counter()
+        with console.study_running() as listener:
+            found = hybrid.study(
+                source, folder, workers=workers, scheduler=scheduler, batch=batch, overwrite=overwrite,
+                progress=listener,
+            )  # fmt: skip
+        _show(console, found, folder, clock.perf_counter() - begin, netcdf)
+
+
+def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path | None) -> None:
+    """Ranges of what was kept, reasons of what failed, and where it is."""
+    from hybrid.cli.progress_line import span
+    from hybrid.store.study_file import DONE, FAILED, counts_of
+
+    counts = counts_of(found["status"].values)
+    done = found.isel(case=found["status"].values == DONE)
+    failed = found.isel(case=found["status"].values == FAILED)
+    rows = ranges_of(done)
+    for row in rows:
+        console.json("range", **row)
+    if rows:
+        console.show(lambda: _table(rows))
+    reasons: dict[str, list[int]] = {}
+    for number, reason in zip(failed["case"].values.tolist(), failed["reason"].values.tolist(), strict=True):
+        reasons.setdefault(_kind(str(reason)), []).append(number)
+    for text, numbers in sorted(reasons.items(), key=lambda x: -len(x[1]))[:REASONS_SHOWN]:
+        console.json("failed", reason=text, cases=numbers)
+        console.note(f"note: {len(numbers)} failed, such as case {numbers[0]}: {text}")
+    if netcdf is not None:
+        found.to_netcdf(netcdf, engine="h5netcdf")
+    text = f"{counts['done']} cases done, {counts['failed']} failed, in {span(wall)} of wall time"
+    console.done(text, folder, netcdf, **counts, wall=wall)
+
+
+def ranges_of(done: Any) -> list[dict[str, Any]]:
+    """Of each number that was kept: least, median and largest value of all cases, and the case of the largest."""
+    import numpy as np
+
+    rows = []
+    for name in done.data_vars:
+        values = done[name].values
+        if done[name].dims != ("case",) or values.dtype.kind != "f" or name == "cpu" or not np.isfinite(values).any():
+            continue
+        worst = int(np.nanargmax(values))
+        rows.append({
+            "name": str(name), "unit": done[name].attrs.get("units", ""), "least": float(np.nanmin(values)),
+            "median": float(np.nanmedian(values)), "largest": float(values[worst]),
+            "case": int(done["case"].values[worst]),
+        })  # fmt: skip
+    return sorted(rows, key=lambda row: row["name"])
+
+
+def _kind(reason: str) -> str:
+    """A reason without its place and time, so that those of one kind are counted together."""
+    return reason.split(" (t = ")[0]
+
+
+def _table(rows: list[dict[str, Any]]) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=True)
+    for title in ("least", "median", "largest", "in case"):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in rows:
+        name = f"{row['name']} ({row['unit']})" if row["unit"] else row["name"]
+        figures = (f"{row[key]:.5g}" for key in ("least", "median", "largest"))
+        table.add_row(name, *figures, str(row["case"]))
+    return table

@@ -1,0 +1,253 @@
+"""The study file: a scene, what is varied in it, and what is kept of each run."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import BeforeValidator, Discriminator, Field, Tag, ValidationError, model_validator
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.base import Finding, Number, Positive, Table, Text, Truth, Whole, Words, refuse, table_or_list
+from hybrid.scene.read import complaint_of, in_order, text_of
+from hybrid.scene.schema_messages import explain
+from hybrid.scene.yaml_source import Node, Unreadable, from_data, from_text
+
+# Runs of a study: a million scenes are planned in a minute, and nobody computes more of them.
+MOST_CASES = 1_000_000
+# Columns of the table of cases that a variable must not be called.
+TAKEN = ("case", "status", "reason", "events", "cpu", "steps", "position", "time")
+
+_NAME = re.compile(r"[A-Za-z_]\w*")
+
+
+def _is_value(value: Any) -> Any:
+    if isinstance(value, bool | int | float | str) or (
+        isinstance(value, list | tuple | dict) and not isinstance(value, str)
+    ):
+        return value
+    refuse([Finding((), "a value that the key can have", "a number, a word, a list or a table")])
+    raise AssertionError
+
+
+Value = Annotated[Any, BeforeValidator(_is_value), Words("a value that the key can have")]
+Values = Annotated[tuple[Value, ...], Field(min_length=1)]
+Names = Annotated[tuple[Text, ...], Field(min_length=1)]
+
+
+class Range(Table):
+    """Values of a key of the scene: a list, evenly spaced from one to another, or between two bounds in a sample; none
+    where a table of cases has them."""
+
+    key: Text | None = Field(
+        default=None, description="key of the scene, such as cable.sections[0].mass; absent: the name of the variable"
+    )
+    keys: Names | None = Field(default=None, description="several keys that get the same value")
+    values: Values | None = Field(default=None, description="its values, one after the other")
+    begin: Number | None = Field(default=None, alias="from", description="first of evenly spaced values")
+    end: Number | None = Field(default=None, alias="to", description="last of evenly spaced values")
+    step: Positive | None = Field(default=None, description="distance of evenly spaced values")
+    count: Annotated[Whole, Field(ge=1, le=MOST_CASES)] | None = Field(
+        default=None, description="number of evenly spaced values"
+    )
+    low: Number | None = Field(default=None, description="of a sample: lowest value")
+    high: Number | None = Field(default=None, description="of a sample: highest value")
+    unit: Text | None = Field(default=None, description="its unit, for tables and axes")
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        ways = {
+            "values": self.values is not None,
+            "from, to": self.begin is not None or self.end is not None,
+            "low, high": self.low is not None or self.high is not None,
+        }
+        given = [name for name, there in ways.items() if there]
+        if len(given) > 1:
+            refuse([Finding((), f"one of {', '.join(ways)}; not {' and '.join(given)}", "values: [1, 2, 3]")])
+        if "from, to" in given:
+            if self.begin is None or self.end is None or (self.step is None) == (self.count is None):
+                refuse([Finding((), "from, to, and one of step and count", "{from: 8, to: 14, step: 2}")])
+            elif not self.end >= self.begin:
+                refuse([Finding(("to",), f"a number >= from, {self.begin:g}")])
+            elif self.count == 1 and self.end > self.begin:
+                refuse([Finding(("count",), "2 or more, from one number to another")])
+        elif self.step is not None or self.count is not None:
+            refuse([Finding(("step" if self.step is not None else "count",), "nothing, without from and to")])
+        if "low, high" in given and (self.low is None or self.high is None or not self.high > self.low):
+            refuse([Finding(("high",), "low and high, the second above the first", "{low: 1, high: 3}")])
+        if self.key is not None and self.keys is not None:
+            refuse([Finding(("keys",), "nothing, because key is given", "list it among the keys")])
+        return self
+
+    def listed(self) -> list[Any] | None:
+        """Its values; None: of a sample, or of a table of cases."""
+        if self.values is not None:
+            return list(self.values)
+        if self.begin is None or self.end is None:
+            return None
+        if self.count is not None:
+            width = (self.end - self.begin) / max(self.count - 1, 1)
+            found = [self.begin + k * width for k in range(self.count)]
+        else:
+            assert self.step is not None
+            number = int((self.end - self.begin) / self.step + 1e-9) + 1
+            found = [self.begin + k * self.step for k in range(number)]
+        whole = all(float(x).is_integer() for x in (self.begin, self.end, *found))
+        return [int(x) if whole else float(f"{x:.12g}") for x in found]
+
+
+class Sample(Table):
+    """A sample of variables between bounds."""
+
+    method: Literal["sobol", "latin_hypercube"] = Field(description="how the sample fills the space of its variables")
+    count: Annotated[Whole, Field(ge=1, le=MOST_CASES)] = Field(description="number of cases; of sobol a power of two")
+    seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="seed of its random numbers")
+
+    @model_validator(mode="after")
+    def _power_of_two(self) -> Self:
+        if self.method == "sobol" and self.count & (self.count - 1):
+            near = 1 << (self.count.bit_length() - 1)
+            refuse([Finding(("count",), "a power of two, for sobol", f"{near} or {2 * near}")])
+        return self
+
+
+TAKES = (
+    "max", "min", "mean", "deviation", "skewness", "period", "significant", "extreme", "fractile", "damage", "history",
+    "profile",
+)  # fmt: skip
+
+
+class Kept(Table):
+    """What is kept of one quantity of each run."""
+
+    quantity: Text = Field(description="a quantity of the result, such as tension or end_force_end")
+    at: (
+        Annotated[
+            Annotated[Number, Tag("<table>")] | Annotated[tuple[Number, ...], Field(min_length=1), Tag("<list>")],
+            Discriminator(table_or_list),
+        ]
+        | None
+    ) = Field(default=None, description="arc length, or several; absent: the worst along the line [m]")
+    take: Annotated[tuple[Literal[TAKES], ...], Field(min_length=1)] = Field(  # type: ignore[valid-type]
+        default=("max",), description="what of its history: max, min, mean, deviation, skewness, period, significant, "
+        "extreme (most probable largest in `hours`), fractile (90 % of that), damage, history, profile (max along s)"
+    )  # fmt: skip
+    times: tuple[Number, Number] | None = Field(default=None, description="only from one time to another [s]")
+    hours: Positive = Field(default=3.0, description="of extreme and fractile [h]")
+    curve: Text | None = Field(default=None, description="of damage: a curve of fatigue")
+    strength: Positive | None = Field(default=None, description="of damage by a T-N curve: reference strength [N]")
+    section: tuple[Positive, Positive, Positive] | None = Field(
+        default=None, description="of damage by an S-N curve: area m2, outer diameter m, Young's modulus Pa"
+    )
+
+    @model_validator(mode="after")
+    def _of_damage(self) -> Self:
+        if ("damage" in self.take) != (self.curve is not None):
+            refuse([Finding(("curve",), "a curve of fatigue with take: [damage], and nothing without", "D sea")])
+        if self.curve is None and (self.strength or self.section):
+            refuse([Finding(("strength" if self.strength else "section",), "nothing, without take: [damage]")])
+        return self
+
+
+class Study(Table):
+    """A scene, what is varied in it, and what is kept of each run."""
+
+    title: Text = Field(default="", description="one line that names it")
+    scene: Text = Field(description="the scene file, relative to the study file")
+    static: Truth = Field(default=False, description="equilibria alone, no motion")
+    vary: dict[str, Range] = Field(default_factory=dict, description="variables by name: which key, which values")
+    combine: Literal["grid", "zip"] = Field(
+        default="grid", description="grid: every value with every other; zip: first with first, second with second"
+    )
+    sample: Sample | None = Field(default=None, description="a sample of the variables that have low and high")
+    cases: Text | None = Field(
+        default=None, description="CSV file of cases, relative to the study file; its columns are keys of the scene or "
+        "names of variables in `vary` without values",
+    )  # fmt: skip
+    carry: tuple[Text, ...] = Field(
+        default=(), description="columns of the table of cases that are no keys, such as probabilities: kept beside "
+        "the results"
+    )  # fmt: skip
+    only_if: Text | None = Field(
+        default=None, description="condition on variables; other cases are left out, such as Hs < 0.1 * Tp**2"
+    )
+    derive: dict[str, Text] = Field(default_factory=dict, description="columns computed from variables, by name")
+    collect: dict[str, Kept] | None = Field(
+        default=None, description="what is kept of each run, by name; absent: largest tension, end forces, curvature"
+    )
+
+    @model_validator(mode="after")
+    def _contradictions(self) -> Self:
+        refuse(self._findings())
+        return self
+
+    def _findings(self) -> list[Finding]:
+        found = []
+        for name in (*self.derive, *(self.collect or ())):
+            if not _NAME.fullmatch(name) or name in TAKEN:
+                table = "derive" if name in self.derive else "collect"
+                found.append(Finding((table, name), "a name of letters and digits, none of " + ", ".join(TAKEN)))
+        for name, each in self.vary.items():
+            if each.key is None and each.keys is None:
+                continue
+            if not _NAME.fullmatch(name) or name in TAKEN:
+                found.append(Finding(("vary", name), "a name of letters and digits, none of " + ", ".join(TAKEN)))
+        sampled = [name for name, each in self.vary.items() if each.low is not None]
+        empty = [name for name, x in self.vary.items() if x.low is None and x.listed() is None]
+        if empty and self.cases is None:
+            expected = "values; from and to; or low and high; or a table of cases with a column of this name"
+            found += [Finding(("vary", name), expected, "values: [1, 2, 3]") for name in empty]
+        if sampled and self.sample is None:
+            fix = "sample: {method: latin_hypercube, count: 50}"
+            found.append(Finding(("sample",), f"a sample, because {', '.join(sampled)} has low and high", fix))
+        if self.sample is not None and not sampled:
+            found.append(Finding(("sample",), "variables with low and high", "vary: {EI: {key: .., low: 1, high: 3}}"))
+        if self.carry and self.cases is None:
+            found.append(
+                Finding(("carry",), "a table of cases, of which columns are carried along", "cases: cases.csv")
+            )
+        if not self.vary and self.cases is None:
+            found.append(Finding(("vary",), "variables, or a table of cases", "vary: {Hs: {key: .., values: [2, 4]}}"))
+        lengths = {name: len(each.listed() or ()) for name, each in self.vary.items() if each.listed() is not None}
+        if self.combine == "zip" and len(set(lengths.values())) > 1:
+            sizes = ", ".join(f"{name} {n}" for name, n in lengths.items())
+            found.append(Finding(("combine",), f"lists of equal length to zip ({sizes})", "combine: grid"))
+        return found
+
+
+def _wrapped(data: Any) -> Any:
+    """The same with lists of values in `vary` as tables: `seed: [1, 2]` is `seed: {values: [1, 2]}`."""
+    vary = data.get("vary") if isinstance(data, Mapping) else None
+    if not isinstance(vary, Mapping):
+        return data
+    return {**data, "vary": {k: {"values": x} if isinstance(x, list | tuple) else x for k, x in vary.items()}}
+
+
+def read_study(path: str | Path) -> Study:
+    """Read a study file; paths in it become absolute.  SceneError with every complaint, with line and column."""
+    try:
+        root, complaints = from_text(text_of(path))
+    except Unreadable as error:
+        raise SceneError([error.complaint], str(path)) from None
+    return _validated(root.plain(), root, complaints, str(path), Path(path).parent)
+
+
+def study_from(data: Mapping[str, Any], folder: str | Path = ".") -> Study:
+    """A study from Python data; files in it are relative to `folder`."""
+    return _validated(dict(data), from_data(dict(data)), [], "", Path(folder))
+
+
+def _validated(data: Any, root: Node, complaints: list[Complaint], file: str, folder: Path) -> Study:
+    if not isinstance(data, dict):
+        raise SceneError([Complaint("study", "no table", "a table with scene and vary", "see docs/studies.md")], file)
+    try:
+        study = Study.model_validate(_wrapped(data))
+    except ValidationError as error:
+        found = [each for one in error.errors(include_url=False) for each in explain(Study, one)]
+        raise SceneError(in_order(complaints + [complaint_of(root, *each) for each in found]), file) from None
+    if complaints:
+        raise SceneError(in_order(complaints), file)
+    paths = {name: str((folder / given).absolute()) for name in ("scene", "cases") if (given := getattr(study, name))}
+    return study.model_copy(update=paths)

@@ -1,0 +1,181 @@
+"""The results of a study on disk: a Zarr group with one chunk for each batch of cases.
+
+Every array lies along `case`.  A chunk is written completely or not at all, and the `status` of a batch after all else:
+a batch with a status is there.  One that was cut off is computed again, and its chunks are replaced.
+
+Layout::
+
+    attributes   format, identity (hash of the study), batch (cases in a chunk), title, study (JSON), created, versions
+    case (n)     number of the case
+    <variable> (n)                   what was varied, and what was derived from it
+    status (n)   0: not done, 1: done, 2: failed
+    reason (n)   why a case failed; events (n): kinds of events of its run, by weight
+    cpu (n) s    processor time of the run; steps (n)
+    <collected> (n, ...)             NaN where a case is not done or has failed
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Mapping, Sequence
+from datetime import UTC, datetime
+from importlib.metadata import version
+from pathlib import Path
+from shutil import rmtree
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.store.selection import optional_package
+
+if TYPE_CHECKING:
+    import xarray
+
+FORMAT = "hybrid-cable study 1"
+OPEN, DONE, FAILED = 0, 1, 2
+# What is known of every case, with unit and description.
+OWN: dict[str, tuple[str, str, Any, Any]] = {
+    "status": ("", "0: not done, 1: done, 2: failed", "i1", OPEN),
+    "reason": ("", "why the case failed", str, ""),
+    "events": ("", "kinds of events of its run, the weightiest first", str, ""),
+    "cpu": ("s", "processor time of the run", "f8", np.nan),
+    "steps": ("", "time steps of the run", "i8", -1),
+}
+
+
+class Column(NamedTuple):
+    """An array of a study: unit, description, the names of its dimensions beside `case`, and its values."""
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+    values: np.ndarray
+
+
+class StudyFile:
+    """Results of a study that grow batch by batch."""
+
+    def __init__(self, path: str | Path) -> None:
+        self.path = Path(path)
+        zarr = optional_package("zarr", "a study", "studies")
+        try:
+            self._group = zarr.open_group(str(self.path), mode="r+")
+            found = str(self._group.attrs.get("format", ""))
+        except (OSError, KeyError, ValueError, FileNotFoundError) as error:
+            raise ResultError(
+                f"{path} is no study\n    detail:   {error}\n    try:      hybrid study STUDY.yaml"
+            ) from None
+        if found != FORMAT:
+            raise ResultError(
+                f"{path} is no study of this release\n    given:    format '{found}'\n    expected: '{FORMAT}'"
+            )
+        self.batch = int(self._group.attrs["batch"])
+        self.cases = int(self._group["case"].shape[0])
+
+    @classmethod
+    def create(
+        cls, path: str | Path, columns: Mapping[str, Column], cases: int, batch: int, attributes: Mapping[str, Any]
+    ) -> StudyFile:
+        """Begin a study; columns: what is varied and derived.  ResultError if the folder cannot be made."""
+        zarr = optional_package("zarr", "a study", "studies")
+        made = {"created": datetime.now(UTC).isoformat(timespec="seconds"), "version_hybrid": version("hybrid-cable")}
+        draft = Path(path).with_name(f".{Path(path).name}.new")
+        try:
+            if draft.exists():
+                rmtree(draft)
+            group = zarr.open_group(str(draft), mode="w", zarr_format=3)
+            numbers = Column("", "number of the case", (), np.arange(cases))
+            for name, column in ({"case": numbers} | dict(columns)).items():
+                array = cls._array(group, name, column, cases, cases, str if column.values.dtype.kind in "UO" else None)
+                array[:] = column.values.astype(object) if column.values.dtype.kind in "UO" else column.values
+            for name, (unit, text, kind, empty) in OWN.items():
+                group.create_array(
+                    name, shape=(cases,), chunks=(batch,), dtype=kind, fill_value=empty, dimension_names=["case"],
+                    attributes={"units": unit, "long_name": text},
+                )  # fmt: skip
+            group.attrs.update(made | dict(attributes) | {"batch": batch, "format": FORMAT})
+            draft.rename(path)
+        except OSError as error:
+            raise ResultError(
+                f"{path} cannot be made\n    detail:   {error}\n    try:      -o with another name"
+            ) from None
+        return cls(path)
+
+    @staticmethod
+    def _array(group: Any, name: str, column: Column, cases: int, batch: int, kind: Any = None) -> Any:
+        inside = () if column.values.ndim == 1 else column.values.shape[1:]
+        return group.create_array(
+            name, shape=(cases, *inside), chunks=(batch, *inside), dtype=kind or column.values.dtype,
+            fill_value=np.nan if column.values.dtype.kind == "f" else None, dimension_names=["case", *column.dims],
+            attributes={"units": column.unit, "long_name": column.description},
+        )  # fmt: skip
+
+    @property
+    def attributes(self) -> dict[str, Any]:
+        return dict(self._group.attrs)
+
+    @property
+    def status(self) -> np.ndarray:
+        """Status (n,) of every case."""
+        return np.asarray(self._group["status"][:])
+
+    def open_batches(self) -> list[int]:
+        """Numbers of the batches that are not done."""
+        status = self.status
+        return [k for k in range(-(-self.cases // self.batch)) if (status[self.slice_of(k)] == OPEN).any()]
+
+    def slice_of(self, batch: int) -> slice:
+        """The cases of a batch."""
+        return slice(batch * self.batch, min((batch + 1) * self.batch, self.cases))
+
+    def add(self, batch: int, columns: Mapping[str, Column], coordinates: Mapping[str, Column]) -> None:
+        """Write what a batch has found: its collected columns (m, ...), those of OWN, and coordinates of dimensions.
+
+        Cases whose arrays have another shape than those of the study, or other coordinates, must have failed before.
+        """
+        where = self.slice_of(batch)
+        known = set(self._group.array_keys())
+        for name, column in coordinates.items():
+            if name not in known:
+                array = self._group.create_array(
+                    name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype,
+                    dimension_names=[name], attributes={"units": column.unit, "long_name": column.description},
+                )  # fmt: skip
+                array[:] = column.values
+        for name, column in columns.items():
+            if name == "status":
+                continue
+            if name not in known:
+                self._array(self._group, name, column, self.cases, self.batch)
+            text = column.values.dtype.kind in "UO"
+            self._group[name][where] = column.values.astype(object) if text else column.values
+        self._group["status"][where] = columns["status"].values
+
+    def coordinate(self, name: str) -> np.ndarray | None:
+        """Values of a dimension; None: there is none yet."""
+        return np.asarray(self._group[name][:]) if name in self._group else None
+
+    def reopen(self, cases: Iterable[int]) -> None:
+        """Make cases open again, to be computed anew."""
+        status = self.status
+        status[list(cases)] = OPEN
+        self._group["status"][:] = status
+
+
+def open_study(path: str | Path) -> xarray.Dataset:
+    """The results of a study as a Dataset over `case`, with variables, statuses and what was collected.
+
+    ResultError when there is no study.  A study that is being computed is read as it is now.
+    """
+    xr = optional_package("xarray", "a study", "studies")
+    StudyFile(path)
+    found = xr.open_zarr(str(path), consolidated=False, chunks=None).load()
+    names = json.loads(found.attrs["variables"])
+    return found.set_coords([name for name in ("case", *names) if name in found])
+
+
+def counts_of(status: Sequence[int] | np.ndarray) -> dict[str, int]:
+    """How many cases are done, failed and left."""
+    values = np.asarray(status)
+    return {name: int((values == k).sum()) for name, k in (("done", DONE), ("failed", FAILED), ("left", OPEN))}

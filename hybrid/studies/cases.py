@@ -1,0 +1,227 @@
+"""The cases of a study: a table of variables, and the scene of each row."""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import math
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from copy import deepcopy
+from dataclasses import dataclass
+from itertools import pairwise, product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import Complaint, SceneError
+from hybrid.scene.read import parse_either, text_of, validate_scene
+from hybrid.scene.schema import Scene
+from hybrid.scene.study import MOST_CASES, TAKEN, Study
+from hybrid.store.selection import optional_package
+
+Row = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Cases:
+    """The scene as data, the keys that each variable sets, and one row of values for each case.
+
+    derived: values (n,) of columns computed from them, by name; units: of variables, by name.
+    """
+
+    base: dict[str, Any]
+    keys: dict[str, tuple[str, ...]]
+    rows: list[Row]
+    derived: dict[str, np.ndarray]
+    units: dict[str, str]
+    static: bool
+
+    def scene(self, case: int) -> Scene:
+        """The scene of a case; SceneError if it is refused."""
+        return scene_of(self.base, self.keys, self.rows[case])
+
+    @property
+    def identity(self) -> str:
+        """A hash of all that decides results, files that the scene reads included."""
+        digest = hashlib.sha256(json.dumps([self.base, self.keys, self.static], sort_keys=True).encode())
+        for row in self.rows:
+            digest.update(json.dumps(row, sort_keys=True).encode())
+        for file in sorted(_files_in(self.base) | {x for row in self.rows for x in _files_in(row)}):
+            digest.update(Path(file).read_bytes())
+        return digest.hexdigest()[:16]
+
+
+def cases_of(study: Study) -> Cases:
+    """The cases of a study; SceneError if its scene, its keys or its table of cases is refused, or none is left."""
+    text = text_of(study.scene)
+    scene, _ = parse_either(text, study.scene)
+    if not isinstance(scene, Scene):
+        fix = "a scene with `cable` and `ends`"
+        raise SceneError([Complaint("scene", f"{len(scene.lines)} lines", "a scene of one cable", fix)], study.scene)
+    if not study.static:
+        scene.require_time()
+    keys = {name: each.keys or (each.key or name,) for name, each in study.vary.items()}
+    units = {name: each.unit or "" for name, each in study.vary.items()}
+    rows = _rows(study)
+    for name in rows[0] if rows else ():
+        keys.setdefault(name, () if name in study.carry else (name,))
+        units.setdefault(name, "")
+    short = short_names(keys)
+    keys = {short[name]: paths for name, paths in keys.items()}
+    units = {short[name]: unit for name, unit in units.items()}
+    rows = _chosen(study, [{short[name]: value for name, value in row.items()} for row in rows])
+    if not rows:
+        raise SceneError([Complaint("only_if", str(study.only_if), "a condition that some case fulfils", "relax it")])
+    _check_keys(text, study.scene, keys, rows[0])
+    base = scene.model_dump(mode="json", exclude_none=True)
+    return Cases(base, keys, rows, _derived(study, rows), units, study.static)
+
+
+def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:
+    """The scene with the values of a row; SceneError if it is refused."""
+    data = deepcopy(dict(base))
+    for name, paths in keys.items():
+        for path in paths:
+            _set(data, path, row[name])
+    return validate_scene(data)
+
+
+def short_names(names: Iterable[str]) -> dict[str, str]:
+    """A short name for each variable, some of which are named by their keys: the last word, if no other has it."""
+    short = {name: re.findall(r"[A-Za-z_]\w*", name)[-1] for name in names}
+    found: dict[str, str] = {}
+    for name, last in short.items():
+        free = list(short.values()).count(last) == 1 and last not in TAKEN
+        found[name] = last if free else re.sub(r"\W+", "_", name).strip("_")
+    return found
+
+
+def _rows(study: Study) -> list[Row]:
+    """Rows of variables, before any condition."""
+    lists = {name: values for name, each in study.vary.items() if (values := each.listed()) is not None}
+    tables = [_read_table(study)] if study.cases is not None else []
+    sampled = {name: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
+    if study.sample is not None:
+        tables.append(_sample(study, sampled))
+    if lists and study.combine == "zip":
+        tables.append([dict(zip(lists, values, strict=True)) for values in zip(*lists.values(), strict=True)])
+    elif lists:
+        _refuse_too_many([len(x) for x in lists.values()])
+        tables.append([dict(zip(lists, values, strict=True)) for values in product(*lists.values())])
+    _refuse_too_many([len(x) for x in tables])
+    return [{k: v for part in parts for k, v in part.items()} for parts in product(*tables)]
+
+
+def _refuse_too_many(counts: list[int]) -> None:
+    if math.prod(counts) > MOST_CASES:
+        given = " x ".join(map(str, counts))
+        raise SceneError([Complaint("vary", f"{given} cases", f"{MOST_CASES} at most", "a sample, or fewer values")])
+
+
+def _sample(study: Study, bounds: Mapping[str, tuple[Any, Any]]) -> list[Row]:
+    from scipy.stats import qmc
+
+    assert study.sample is not None
+    kind = qmc.Sobol if study.sample.method == "sobol" else qmc.LatinHypercube
+    points = kind(len(bounds), rng=np.random.default_rng(study.sample.seed)).random(study.sample.count)
+    low, high = np.array([x[0] for x in bounds.values()]), np.array([x[1] for x in bounds.values()])
+    return [dict(zip(bounds, row.tolist(), strict=True)) for row in low + (high - low) * points]
+
+
+def _read_table(study: Study) -> list[Row]:
+    """Rows of the CSV file of cases: numbers where they are, else words."""
+    assert study.cases is not None
+    lines = text_of(study.cases).splitlines()
+    numbered = [(i + 1, line) for i, line in enumerate(lines) if line.strip() and not line.startswith("#")]
+    if len(numbered) < 2:
+        raise SceneError([Complaint("cases", study.cases, "a header and a row for each case")], study.cases)
+    header = [x.strip() for x in next(csv.reader([numbered[0][1]]))]
+    if len(set(header)) < len(header) or not all(header):
+        raise SceneError(
+            [Complaint("cases", ",".join(header), "a name for each column", line=numbered[0][0])], study.cases
+        )
+    rows = []
+    for line, text in numbered[1:]:
+        found = [_number_or_word(x.strip()) for x in next(csv.reader([text]))]
+        if len(found) != len(header):
+            raise SceneError(
+                [Complaint("cases", f"{len(found)} values", f"{len(header)}, one for each column", line=line)],
+                study.cases,
+            )
+        rows.append(dict(zip(header, found, strict=True)))
+    empty = [name for name, each in study.vary.items() if each.listed() is None and each.low is None]
+    if absent := [name for name in (*study.carry, *empty) if name not in header]:
+        expected = f"columns of the table: {', '.join(header)}"
+        raise SceneError([Complaint("cases", ", ".join(absent), expected, "add the column")], study.cases)
+    both = set(header) & {name for name, each in study.vary.items() if each.listed() is not None}
+    if both:
+        raise SceneError([Complaint("vary", ", ".join(both), "in vary or in the table of cases, not in both")])
+    return rows
+
+
+def _number_or_word(text: str) -> Any:
+    for kind in (int, float):
+        try:
+            return kind(text)
+        except ValueError:
+            continue
+    return text
+
+
+def _chosen(study: Study, rows: list[Row]) -> list[Row]:
+    """The rows that fulfil the condition."""
+    if study.only_if is None:
+        return rows
+    return [row for row, is_in in zip(rows, _evaluated("only_if", study.only_if, rows), strict=True) if is_in]
+
+
+def _derived(study: Study, rows: list[Row]) -> dict[str, np.ndarray]:
+    return {name: np.array(_evaluated(f"derive.{name}", text, rows)) for name, text in study.derive.items()}
+
+
+def _evaluated(where: str, text: str, rows: list[Row]) -> list[Any]:
+    """The value of an expression for each row; SceneError for what is none, or a name that is not known."""
+    package = optional_package("simpleeval", "a condition", "studies")
+    functions = {name: getattr(math, name) for name in ("sqrt", "exp", "log", "sin", "cos", "tan", "radians", "pi")}
+    pi = functions.pop("pi")
+    functions |= {"abs": abs, "min": min, "max": max, "round": round}
+    evaluator = package.SimpleEval(functions=functions)
+    try:
+        tree = evaluator.parse(text)
+        found = []
+        for row in rows:
+            evaluator.names = {"pi": pi} | row
+            found.append(evaluator.eval(text, tree))
+        return found
+    except Exception as error:
+        expected = f"arithmetic and comparisons of {', '.join(rows[0])}"
+        raise SceneError([Complaint(where, text, expected, str(error))]) from None
+
+
+def _check_keys(text: str, file: str, keys: Mapping[str, Sequence[str]], row: Row) -> None:
+    """SceneError if a key is none of the scene, or the first case is refused; with the names of the keys."""
+    settings = [f"{path}={json.dumps(row[name])}" for name, paths in keys.items() for path in paths]
+    parse_either(text, file, settings)
+
+
+def _set(data: Any, path: str, value: Any) -> None:
+    """Set a value in tables and lists; tables that are not there are made."""
+    parts: list[str | int] = [int(x) if x.isdigit() else x for x in re.findall(r"\w+", path)]
+    for part, after in pairwise(parts):
+        if isinstance(data, dict) and not isinstance(data.get(part), dict | list):
+            data[part] = {} if isinstance(after, str) else []
+        data = data[part]
+    data[parts[-1]] = value
+
+
+def _files_in(data: Any) -> set[str]:
+    """Paths of files that tables name."""
+    if isinstance(data, dict):
+        named = {x for k, x in data.items() if k in ("file", "rao", "depths") and isinstance(x, str)}
+        return {x for x in named if Path(x).is_file()} | set().union(*(_files_in(x) for x in data.values()))
+    if isinstance(data, list):
+        return set().union(*(_files_in(x) for x in data))
+    return set()

@@ -1,0 +1,127 @@
+"""What a study keeps of each run: numbers, histories and profiles, with units."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import NamedTuple
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.scene.study import Kept
+from hybrid.statistics import extremes, moments
+from hybrid.store.histories import history_of, lies_along
+from hybrid.store.reader import Result
+
+Floats = np.ndarray
+HOUR = 3600.0
+# What is kept where a study does not say: name, quantity, what of it.
+USUAL: dict[str, tuple[str, tuple[str, ...]]] = {
+    "end_force_start": ("end_force_start", ("max", "min", "mean", "deviation")),
+    "end_force_end": ("end_force_end", ("max", "min", "mean", "deviation")),
+    "tension": ("tension", ("max", "min")),
+    "curvature": ("curvature", ("max",)),
+}
+AT_REST: dict[str, tuple[str, tuple[str, ...]]] = {
+    "tension": ("tension", ("max", "min", "profile")), "curvature": ("curvature", ("max",)),
+}  # fmt: skip
+# Of a summary, and its unit; none: that of the quantity.
+OF_SUMMARY = {
+    "mean": ("mean", None), "deviation": ("deviation", None), "skewness": ("skewness", ""),
+    "period": ("crossing_period", "s"), "significant": ("significant_range", None),
+}  # fmt: skip
+WORDS = {
+    "max": "largest", "min": "smallest", "mean": "mean", "deviation": "standard deviation", "skewness": "skewness",
+    "period": "period between up-crossings of the mean", "significant": "significant range",
+    "extreme": "most probable largest in", "fractile": "90 % fractile of the largest in", "damage": "fatigue damage",
+    "history": "history", "profile": "largest at each place",
+}  # fmt: skip
+
+
+class Variable(NamedTuple):
+    """One thing that is kept: its unit, what it is, its dimensions beside `case`, and their coordinates with units."""
+
+    unit: str
+    description: str
+    dims: tuple[str, ...]
+    coordinates: Mapping[str, tuple[str, Floats]]
+
+
+def usual(static: bool) -> dict[str, Kept]:
+    """What is kept where a study does not say."""
+    return {name: Kept(quantity=q, take=take) for name, (q, take) in (AT_REST if static else USUAL).items()}
+
+
+def collected(result: Result, wanted: Mapping[str, Kept]) -> dict[str, tuple[Variable, Floats]]:
+    """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken.
+
+    ResultError for a quantity that the result does not have, or what cannot be taken of it.
+    """
+    found: dict[str, tuple[Variable, Floats]] = {}
+    for name, kept in wanted.items():
+        for take in kept.take:
+            key = f"{name}_{take}" if len(kept.take) > 1 or take in ("history", "profile") else name
+            found[key] = _taken(result, name, kept, take)
+    return found
+
+
+def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, Floats]:
+    """One thing that is kept of a result under the name `own`; its times and places are dimensions of that name."""
+    name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
+    if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
+        values = result[f"envelope/{name}_{take}"]  # of every step
+        worst = np.nanmax(values) if take == "max" else np.nanmin(values)
+        return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
+    places = {f"{own}_at": ("m", at)} if at is not None and at.size > 1 else {}
+    dims = tuple(places)
+    if take == "damage":
+        assert kept.curve is not None
+        s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
+        text = f"fatigue damage by {kept.curve}"
+        if at is None:
+            return Variable("", text, ("s",), {"s": ("m", s)}), damage
+        return Variable("", text, dims, places), damage if dims else damage[0]
+    if at is not None and not lies_along(result, name):
+        raise ResultError(f"'{name}' has no value at an arc length")
+    history = history_of(result, name, kept.times, at)
+    unit, about = history.unit, f"{name}, {history.basis}"
+    values = history.values
+    if take == "profile":
+        if history.s is None:
+            raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
+        return Variable(unit, f"{WORDS[take]}: {about}", ("s",), {"s": ("m", history.s)}), values.max(axis=0)
+    if take == "history":
+        if history.s is not None and at is None:
+            raise ResultError(f"a history of '{name}' is at a place\n    try:      at: [0]")
+        time = f"{own}_time"
+        along = {time: ("s", history.t)} | places
+        return Variable(unit, about, (time, *dims), along), values if dims else values.reshape(-1)
+    flat = values.reshape(history.t.size, -1)
+    text = f"{WORDS[take]} {about}"
+    if take in ("extreme", "fractile"):
+        found = [_extreme(history.t, flat[:, k], kept.hours, take) for k in range(flat.shape[1])]
+        return _placed(Variable(unit, f"{text} ({kept.hours:g} h)", dims, places), np.array(found))
+    if take in ("max", "min"):
+        return _placed(
+            Variable(unit, text, dims, places), flat.max(axis=0) if take == "max" else flat.min(axis=0), take
+        )
+    attribute, other = OF_SUMMARY[take]
+    summary = moments.summary(history.t, flat)
+    variable = Variable(unit if other is None else other, text, dims, places)
+    return _placed(variable, getattr(summary, attribute))
+
+
+def _extreme(t: Floats, x: Floats, hours: float, take: str) -> float:
+    """NaN where there are too few peaks."""
+    try:
+        found = extremes.of_record(t, x, hours * HOUR)
+    except ResultError:
+        return np.nan
+    return found.most_probable if take == "extreme" else found.fractile
+
+
+def _placed(variable: Variable, values: Floats, take: str = "max") -> tuple[Variable, Floats]:
+    """Values (n,) at the places that are wanted; without any the largest of all (of smallest values the smallest)."""
+    if variable.dims:
+        return variable, values
+    return variable, np.asarray((np.nanmin if take == "min" else np.nanmax)(values) if values.size else np.nan)

@@ -1,0 +1,330 @@
+"""Studies: which cases there are, what is kept, and that nothing is lost or done twice."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time as clock
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.cli.commands import main
+from hybrid.errors import ResultError, SceneError
+from hybrid.scene.study import read_study, study_from
+from hybrid.store.study_file import DONE, FAILED, OPEN, StudyFile
+from hybrid.studies.cases import cases_of, short_names
+
+SCENE = """
+environment: {fluid: {density: 1025}}
+cable:
+  sections: [{length: 60, mass: 8, diameter: 0.04, axial_stiffness: 1.0e+7, drag: {normal: 1.2}}]
+ends:
+  start: {kind: pinned, position: [0, 0, -40]}
+  end: {kind: pinned, position: [35, 0, 0], motion: {heave: {amplitude: 1.0, period: 5.0}, ramp: 5}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 16}
+time: {duration: 6, step: 0.1}
+output: {every: 0.5}
+"""
+STUDY = """
+title: heave
+scene: scene.yaml
+vary:
+  A: {key: ends.end.motion.heave.amplitude, values: [0.2, 0.5, 30], unit: m}
+  T: {key: ends.end.motion.heave.period, from: 4, to: 7, step: 1, unit: s}
+only_if: A < 1 or T == 4
+derive: {acceleration: A * (2 * pi / T)**2}
+collect:
+  force: {quantity: end_force_end, take: [max, mean]}
+  tension: {quantity: tension, at: [0, 30], take: [max, history]}
+  shape: {quantity: tension, take: [profile]}
+"""
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("study")
+    (folder / "scene.yaml").write_text(SCENE)
+    (folder / "heave.yaml").write_text(STUDY)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def found(folder: Path) -> object:
+    return hybrid.study(folder / "heave.yaml", workers=2, batch=2)
+
+
+# ---- cases ----------------------------------------------------------------------------------------
+
+
+def rows(folder: Path, **study: object) -> list[dict]:
+    return cases_of(study_from({"scene": "scene.yaml"} | study, folder)).rows
+
+
+STEP, CELLS = "time.step", "mesh.cells"
+
+
+def test_grid_zip_and_ranges(folder: Path) -> None:
+    """A grid has every value with every other, the last fastest; whole numbers stay whole."""
+    grid = rows(folder, vary={STEP: [0.1, 0.2], CELLS: {"from": 8, "to": 12, "step": 2}})
+    assert grid == [{"step": s, "cells": c} for s in (0.1, 0.2) for c in (8, 10, 12)]
+    assert all(isinstance(row["cells"], int) for row in grid)
+    zipped = rows(folder, vary={STEP: [0.1, 0.2], CELLS: [8, 12]}, combine="zip")
+    assert zipped == [{"step": 0.1, "cells": 8}, {"step": 0.2, "cells": 12}]
+    assert [r["step"] for r in rows(folder, vary={STEP: {"from": 0.1, "to": 0.3, "count": 3}})] == [0.1, 0.2, 0.3]
+
+
+def test_conditions_and_derived_columns(folder: Path) -> None:
+    study = study_from(
+        {
+            "scene": "scene.yaml", "vary": {STEP: [0.1, 0.2], CELLS: [8, 12]}, "only_if": "step * cells < 2",
+            "derive": {"work": "cells / step"},
+        },
+        folder,
+    )  # fmt: skip
+    cases = cases_of(study)
+    assert cases.rows == [{"step": 0.1, "cells": 8}, {"step": 0.1, "cells": 12}, {"step": 0.2, "cells": 8}]
+    assert cases.derived["work"] == pytest.approx([80.0, 120.0, 40.0])
+
+
+@pytest.mark.parametrize("method", ["sobol", "latin_hypercube"])
+def test_samples_fill_their_bounds(folder: Path, method: str) -> None:
+    """Every quarter of each axis has a quarter of the points; the same seed gives the same sample."""
+    vary = {STEP: {"low": 0.1, "high": 0.2}, "m": {"key": "cable.sections[0].mass", "low": 5, "high": 9}}
+    sample = {"method": method, "count": 32, "seed": 3}
+    found = rows(folder, vary=vary, sample=sample)
+    for name, low, high in (("step", 0.1, 0.2), ("m", 5.0, 9.0)):
+        counts, _ = np.histogram([row[name] for row in found], 4, (low, high))
+        assert counts.tolist() == [8, 8, 8, 8]
+    assert found == rows(folder, vary=vary, sample=sample) != rows(folder, vary=vary, sample=sample | {"seed": 4})
+
+
+def test_a_table_of_cases(folder: Path) -> None:
+    """Columns are keys of the scene or names of variables; a table is crossed with what is listed."""
+    (folder / "cases.csv").write_text("# two\ntime.step, ends.start.position\n0.1, far\n0.2, near\n")
+    with pytest.raises(SceneError, match="position"):
+        rows(folder, cases="cases.csv")
+    (folder / "cases.csv").write_text("time.step\n0.1\n0.2\n")
+    found = rows(folder, cases="cases.csv", vary={CELLS: [8, 12]})
+    assert found == [{"step": s, "cells": c} for s in (0.1, 0.2) for c in (8, 12)]
+    (folder / "cases.csv").write_text("time.step\n0.1, 3\n")
+    with pytest.raises(SceneError, match="one for each column"):
+        rows(folder, cases="cases.csv")
+
+
+def test_short_names_are_unlike() -> None:
+    names = short_names(["time.step", "a.b", "c.b", "cable.sections[0].mass", "x.case"])
+    assert list(names.values()) == ["step", "a_b", "c_b", "mass", "x_case"]
+
+
+@pytest.mark.parametrize(
+    ("study", "text"),
+    [
+        ({"vary": {"time.stepp": [0.1]}}, "did you mean"),
+        ({"vary": {STEP: [-1.0]}}, "time.step"),
+        ({"vary": {STEP: []}}, "vary.time.step"),
+        ({"vary": {STEP: {"from": 1, "to": 0, "count": 3}}}, ">= from"),
+        ({"vary": {STEP: {"low": 0.1, "high": 0.2}}}, "a sample, because"),
+        ({"vary": {STEP: [0.1]}, "sample": {"method": "sobol", "count": 6}}, "power of two"),
+        ({"vary": {STEP: [0.1, 0.2], CELLS: [8, 9, 10]}, "combine": "zip"}, "equal length"),
+        ({"vary": {STEP: [0.1]}, "only_if": "step > 1"}, "only_if"),
+        ({"vary": {STEP: [0.1]}, "only_if": "stepp > 1"}, "of step"),
+        ({"vary": {STEP: [0.1]}, "only_if": "__import__('os')"}, "arithmetic"),
+        ({"vary": {STEP: [0.1]}, "collect": {"x": {"quantity": "tension", "take": ["damage"]}}}, "curve of fatigue"),
+        ({"vary": {STEP: [0.1]}, "collect": {"case": {"quantity": "tension"}}}, "a name of letters"),
+        ({}, "variables, or a table"),
+        ({"vary": {STEP: [0.1] * 1001, CELLS: [8] * 1001}}, "cases"),
+        ({"vary": {STEP: [0.1]}, "cases": "nowhere.csv"}, "nowhere.csv"),
+    ],
+)  # fmt: skip
+def test_what_is_no_study_is_refused(folder: Path, study: dict, text: str) -> None:
+    with pytest.raises(SceneError, match=text):
+        cases_of(study_from({"scene": "scene.yaml"} | study, folder))
+
+
+def test_complaints_have_line_and_column(folder: Path) -> None:
+    file = folder / "wrong.yaml"
+    file.write_text("scene: scene.yaml\nvary:\n  A: {key: time.step, from: 1}\ncolect: {}\n")
+    with pytest.raises(SceneError) as refused:
+        read_study(file)
+    assert [(c.line, c.where) for c in refused.value.complaints] == [(3, "vary.A"), (4, "colect")]
+    assert "collect" in refused.value.complaints[1].fix
+
+
+# ---- runs -----------------------------------------------------------------------------------------
+
+
+def test_every_case_is_the_run_of_its_scene(folder: Path, found: object) -> None:
+    """What is kept is, to the last bit, what the run alone gives; failures have their reason."""
+    ds = found
+    assert ds["status"].values.tolist() == [DONE] * 8 + [FAILED]
+    assert "compression" in str(ds["reason"].values[8]) and np.isnan(ds["force_max"].values[8])
+    assert ds["A"].attrs["units"] == "m" and ds["tension_max"].dims == ("case", "tension_at")
+    assert ds["acceleration"].values[0] == pytest.approx(0.2 * (2 * np.pi / 4.0) ** 2)
+    for case in (0, 5):
+        settings = [
+            f"ends.end.motion.heave.amplitude={ds['A'].values[case]}",
+            f"ends.end.motion.heave.period={ds['T'].values[case]}",
+        ]
+        result = hybrid.run(hybrid.load_scene(folder / "scene.yaml", settings))
+        assert ds["force_max"].values[case] == result["steps/end_force_end"].max()
+        assert np.array_equal(ds["shape_profile"].values[case], result.tension.max(axis=0))
+        assert np.array_equal(
+            ds["tension_history"].values[case], result.at(s=[0.0, 30.0], names=["tension"])["tension"]
+        )
+        assert ds["steps"].values[case] == len(result["steps/t"])
+
+
+def test_other_workers_and_batches_give_the_same(folder: Path, found: object, tmp_path: Path) -> None:
+    alone = hybrid.study(folder / "heave.yaml", tmp_path / "alone.zarr", workers=1, batch=9)
+    for name in alone.data_vars:
+        if name != "cpu":
+            assert np.array_equal(alone[name].values, found[name].values, equal_nan=name not in ("reason", "events"))
+
+
+def test_a_second_call_does_what_is_missing(folder: Path, found: object, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A complete study starts no worker; of an incomplete one only the open batches are computed."""
+    from hybrid.studies import study as module
+
+    monkeypatch.setattr(module, "_client", None)
+    again = hybrid.study(folder / "heave.yaml")
+    assert again.equals(found)
+
+
+def test_open_batches_are_computed_again(folder: Path, found: object, tmp_path: Path) -> None:
+    import shutil
+
+    copy = tmp_path / "copy.zarr"
+    shutil.copytree(folder / "heave.zarr", copy)
+    file = StudyFile(copy)
+    file.reopen([2, 3])
+    assert file.open_batches() == [1] and (file.status == OPEN).sum() == 2
+    before = hybrid.open_study(copy)["cpu"].values
+    after = hybrid.study(folder / "heave.yaml", copy, workers=1)
+    assert after["force_max"].equals(found["force_max"])
+    changed = np.flatnonzero(after["cpu"].values != before)
+    assert set(changed.tolist()) <= {2, 3} and changed.size
+
+
+def test_another_study_is_not_mixed_in(folder: Path, found: object, tmp_path: Path) -> None:
+    """A changed value, what is kept, or the scene: refused, and the results stay; --overwrite begins anew."""
+    target = folder / "heave.zarr"
+    changes = [
+        STUDY.replace("0.5, 30", "0.6, 30"),
+        STUDY.replace("[max, mean]", "[max, min]"),
+        STUDY.replace("scene: scene.yaml", "scene: other.yaml"),
+    ]
+    (folder / "other.yaml").write_text(SCENE.replace("mass: 8", "mass: 9"))
+    for text in changes:
+        (folder / "changed.yaml").write_text(text)
+        with pytest.raises(ResultError, match="another study"):
+            hybrid.study(folder / "changed.yaml", target)
+    assert hybrid.open_study(target).equals(found)
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "letter.txt").write_text("dear")
+    with pytest.raises(ResultError, match="no study"):
+        hybrid.study(folder / "heave.yaml", tmp_path / "mine", overwrite=True)
+    assert (tmp_path / "mine" / "letter.txt").exists()
+
+
+def test_one_case_again_with_its_whole_result(folder: Path, found: object, tmp_path: Path) -> None:
+    result = hybrid.study_case(folder / "heave.zarr", 5, tmp_path / "case.h5")
+    assert result["steps/end_force_end"].max() == found["force_max"].values[5]
+    with pytest.raises(ResultError, match="0 to 8"):
+        hybrid.study_case(folder / "heave.zarr", 9)
+
+
+def test_equilibria_and_quantities_that_are_not_there(folder: Path, tmp_path: Path) -> None:
+    """A study at rest; a quantity that a result does not have is the reason of a failure, not the end of the study."""
+    vary = {"cable.sections[0].mass": [6, 8]}
+    rest = hybrid.study(folder / "scene.yaml", tmp_path / "rest.zarr", vary=vary, static=True, workers=1)
+    expected = hybrid.static(hybrid.load_scene(folder / "scene.yaml", ["cable.sections[0].mass=6"])).tension.max()
+    assert rest["tension_max"].values[0] == pytest.approx(expected, rel=1e-12)
+    wrong = {"x": {"quantity": "tensoin"}}
+    lost = hybrid.study(folder / "scene.yaml", tmp_path / "lost.zarr", vary=vary, collect=wrong, static=True, workers=1)
+    assert lost["status"].values.tolist() == [FAILED, FAILED] and "tension" in str(lost["reason"].values[0])
+
+
+def test_the_command_says_ranges_and_reasons(
+    folder: Path, found: object, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    with pytest.raises(SystemExit) as ended:
+        main(["study", str(folder / "heave.yaml"), "--json", "--netcdf", str(tmp_path / "x.nc")])
+    assert not ended.value.code
+    lines = [json.loads(line) for line in capsys.readouterr().out.splitlines()]
+    largest = next(x for x in lines if x.get("name") == "force_max")
+    assert largest["largest"] == np.nanmax(found["force_max"].values) and largest["case"] == 4
+    assert next(x for x in lines if x["event"] == "failed")["cases"] == [8]
+    import xarray
+
+    with xarray.open_dataset(tmp_path / "x.nc", engine="h5netcdf") as kept:
+        assert np.array_equal(kept["force_max"].values, found["force_max"].values, equal_nan=True)
+
+
+def test_a_script_needs_no_guard(folder: Path, tmp_path: Path) -> None:
+    """Workers do not import the script that calls: it may call at its top level."""
+    script = tmp_path / "script.py"
+    script.write_text(
+        "import hybrid\nprint('once')\n"
+        f"found = hybrid.study({str(folder / 'scene.yaml')!r}, 'own.zarr', vary={{'cable.sections[0].mass': [6, 7]}}, "
+        "static=True, workers=2)\nprint(found.sizes['case'])\n"
+    )
+    done = subprocess.run([sys.executable, str(script)], cwd=tmp_path, capture_output=True, text=True, timeout=300)
+    assert done.stdout.split() == ["once", "2"], done.stderr
+
+
+# ---- kills ----------------------------------------------------------------------------------------
+
+
+def workers_of(pid: int) -> list[int]:
+    """Processes below one, its workers among them."""
+    found = []
+    for entry in Path("/proc").glob("[0-9]*"):
+        try:
+            fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
+        except OSError:
+            continue
+        if int(fields[1]) == pid:
+            found += [int(entry.name), *workers_of(int(entry.name))]
+    return found
+
+
+def killed_study(folder: Path, target: Path, what: str, seed: int) -> None:
+    """Start a study, kill it or one of its workers at a random moment after its first batch, and see it end."""
+    program = [sys.executable, "-c", "from hybrid.cli.commands import main; main()"]
+    command = [*program, "study", str(folder / "heave.yaml"), "-o", str(target), "--workers", "2", "--batch", "1", "-q"]
+    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
+    rng = np.random.default_rng(seed)
+    begin = clock.monotonic()
+    while process.poll() is None and clock.monotonic() - begin < 200.0:
+        if target.exists() and (StudyFile(target).status != OPEN).any():
+            break
+        clock.sleep(0.02)
+    clock.sleep(float(rng.uniform(0.0, 0.5)))
+    if process.poll() is None:
+        if what == "study":
+            process.send_signal(signal.SIGKILL)
+        else:
+            below = workers_of(process.pid)
+            if below:
+                os.kill(int(rng.choice(below)), signal.SIGKILL)
+    process.communicate(timeout=300)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("what", "seed"), [("study", 0), ("study", 1), ("worker", 2), ("worker", 3)])
+def test_killed_and_called_again(folder: Path, found: object, tmp_path: Path, what: str, seed: int) -> None:
+    """Whatever was killed, the same call completes the study: every case once, every number the same."""
+    target = tmp_path / "killed.zarr"
+    killed_study(folder, target, what, seed)
+    after = hybrid.study(folder / "heave.yaml", target, workers=2)
+    for name in ("status", "force_max", "force_mean", "tension_history", "shape_profile", "steps"):
+        assert np.array_equal(after[name].values, found[name].values, equal_nan=True), name
+    assert sorted(after["case"].values.tolist()) == list(range(9))
