@@ -11,10 +11,13 @@ from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
+from ruamel.yaml import YAML
 
 import hybrid
 from hybrid.cli.commands import main
 from hybrid.scene.read import parse_either
+from hybrid.scene.study import study_from
+from hybrid.studies.cases import cases_of
 
 ROOT = Path(__file__).parents[1]
 README = ROOT / "README.md"
@@ -113,7 +116,10 @@ def test_ci_reads_its_commands_from_the_readme() -> None:
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
 def test_scenes_on_pages_load(page: Path) -> None:
     for text in blocks(page, "yaml"):
-        hybrid.plan(parse_either(text, str(page))[0])
+        if "\nscene:" in text:
+            cases_of(study_from(YAML(typ="safe").load(text), ROOT / "examples" / "studies"))
+        else:
+            hybrid.plan(parse_either(text, str(page))[0])
 
 
 @pytest.mark.parametrize("page", PAGES, ids=lambda p: p.name)
