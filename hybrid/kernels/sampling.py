@@ -49,6 +49,7 @@ from hybrid.kernels.rotations import (
     mat_mat,
     mat_vec,
     scale,
+    spin_about,
     sub,
     vec_mat,
 )
@@ -201,6 +202,55 @@ def sample_ends(imposed, x, dt, row):
 
 
 @inner
+def twist_at_end(k, R, e, a):
+    """Twist (rad) of the element between the frame R of end k and the cell with the chord e and first director a."""
+    if k == 0:
+        return log_rotation(relative_rotation(R, cell_frame(e, a)))[2]
+    return log_rotation(relative_rotation(cell_frame(e, a), R))[2]
+
+
+@inner
+def spin_cells(line, k, angle, e, a1, row):
+    """Turn the directors of the rod at end k: at the end by an angle, less and less along the rod, at last by nothing.
+
+    e, a1: where chords and directors begin in the row.
+    """
+    n = line.h.shape[0]
+    c, step, length = k * (n - 1), 1 - 2 * k, 0.0
+    while 0 <= c < n and line.spin[c]:
+        length += line.h[c]
+        c += step
+    c, here = k * (n - 1), length
+    while 0 <= c < n and line.spin[c]:
+        d, _, _ = chord((row[e + 3 * c], row[e + 3 * c + 1], row[e + 3 * c + 2]))
+        a = (row[a1 + 3 * c], row[a1 + 3 * c + 1], row[a1 + 3 * c + 2])
+        put3(row, a1, c, spin_about(a, d, angle * here / length))
+        here -= line.h[c]
+        c += step
+
+
+@inner
+def sample_end_twist(line, old, new, imposed, x, row):
+    """Turn the rods at ends that hold the twist so that the twist of their last elements changes evenly in the step.
+
+    That of frames which are interpolated one by one is off by next to nothing, times GJ over half a cell.
+    """
+    n = old.T.shape[0]
+    at = HEAD + 9 * (n + 1)
+    for k in range(2):
+        if not line.element[k * n] or not line.kb[k * n, 2] > 0.0:
+            continue
+        c, o, a1 = k * (n - 1), SAMPLE_FRAME + 9 * k, at + 4 * n
+        R = (row[o], row[o + 1], row[o + 2], row[o + 3], row[o + 4], row[o + 5], row[o + 6], row[o + 7], row[o + 8])
+        e = (row[at + 3 * c], row[at + 3 * c + 1], row[at + 3 * c + 2])
+        a = (row[a1 + 3 * c], row[a1 + 3 * c + 1], row[a1 + 3 * c + 2])
+        before = twist_at_end(k, end_frame(imposed, 1, k), get3(old.e, c), get3(old.a1, c))
+        after = twist_at_end(k, end_frame(imposed, 0, k), get3(new.e, c), get3(new.a1, c))
+        more = (1.0 - x) * before + x * after - twist_at_end(k, R, e, a)
+        spin_cells(line, k, -more if k else more, at, a1, row)
+
+
+@inner
 def sample_head(sea, books, x, dt, k, t, row):
     """Time, growth of the sea, ends, report and work."""
     row[0] = t
@@ -252,6 +302,8 @@ def sample_step(line, sea, old, new, books):
         sample_head(sea, books, x, dt, k, t, row)
         sample_nodes(old, new, x, dt, row)
         sample_cells(line, old, new, x, dt, k, books.tension, row)
+        if x < 1.0 and not line.bits & PLANAR:
+            sample_end_twist(line, old, new, books.imposed, x, row)
         at = HEAD + 9 * new.r.shape[0] + 8 * new.T.shape[0]
         if count[VARIES]:
             sample_line(line, row)

@@ -164,3 +164,5 @@ def test_outputs_within_a_step_follow_a_clamp_that_turns(motion: dict[str, Any])
     fine, coarse = (hybrid.run(scene | {"time": {"duration": 8, "step": step}}) for step in (0.01, 0.2))
     off = np.abs(coarse.moment_end - fine.moment_end).max(axis=1)
     assert off[1::2].max() < 3e-3 * np.abs(fine.moment_end).max()
+    off = np.abs(coarse.torque - fine.torque).max(axis=1)
+    assert off[1::2].max() < 0.02 * np.abs(fine.torque).max()  # a tenth of it was off
