@@ -50,11 +50,16 @@ def _lack(true: float, ck: float, T: float, e: Floats) -> float:
 
 def _mismatch(line: Line, state: State, flow: Flow, reel: Reel, c: int) -> float:
     """By how much, m/s, the rate of the chord of cell c misses that of its length."""
-    e, n = state.e[c], line.h.size
+    e = state.e[c]
     along = float(e @ (state.v[c + 1] - state.v[c])) / _size(e)
-    grows = (flow.rate if c == n - 1 else 0.0) - float(lack_at(reel, flow.t)[1][c])
+    grows = (flow.rate if c == growing(line, reel) else 0.0) - float(lack_at(reel, flow.t)[1][c])
     ck, T = float(line.ck[c]), float(state.T[c])
     return along - grows * (1.0 + ck * T) - float(line.h[c]) * ck * _tension_rate(state, flow, c)
+
+
+def growing(line: Line, reel: Reel) -> int:
+    """The cell that grows; the nodes behind it ride with the fairlead."""
+    return line.h.size - reel.layer.size
 
 
 def _tension_rate(state: State, flow: Flow, c: int) -> float:
@@ -75,20 +80,32 @@ def _carried(a: Floats, e: Floats, to: Floats) -> Floats:
     return np.asarray(out / size) if size > 0.0 else out
 
 
-def material_at_fairlead(line: Line, state: State, flow: Flow) -> tuple[Floats, Floats, Floats]:
-    """Velocity, algorithmic and true acceleration of the material at the fairlead (kernels.payout.at_fairlead)."""
-    ha, hb = line.h[-2:]
-    sa, sb = state.e[-2] / ha, state.e[-1] / hb
-    beyond = hb / (ha + hb)
-    slope, bend = sb + beyond * (sb - sa), 2.0 / (ha + hb) * (sb - sa)
-    v = state.v[-1] - flow.rate * slope
-    va, vb = (state.v[-2] - state.v[-3]) / ha, (v - state.v[-2]) / hb
-    turns = vb + beyond * (vb - va)
+def _slope_at(line: Line, state: State, i: int) -> tuple[Floats, Floats]:
+    """r' and r'' at node i (kernels.payout.slope_at)."""
+    j = min(i, line.h.size - 1)
+    ha, hb = line.h[j - 1], line.h[j]
+    sa, sb = state.e[j - 1] / ha, state.e[j] / hb
+    part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
+    return sa + part * (sb - sa), 2.0 / (ha + hb) * (sb - sa)
+
+
+def material_at(line: Line, state: State, reel: Reel, flow: Flow) -> tuple[Floats, Floats, Floats]:
+    """Velocity, algorithmic and true acceleration of the material at the first node that rides (kernels.payout)."""
+    g = growing(line, reel)
+    i, j = g + 1, min(g + 1, line.h.size - 1)
+    ha, hb = line.h[j - 1], line.h[j]
+    slope, bend = _slope_at(line, state, i)
+
+    def velocity(node: int) -> Floats:
+        return np.asarray(state.v[node] - (flow.rate * _slope_at(line, state, node)[0] if node > g else 0.0))
+
+    va, vb = (velocity(j) - velocity(j - 1)) / ha, (velocity(j + 1) - velocity(j)) / hb
+    turns = va + (ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)) * (vb - va)
 
     def excess(rate: float, acceleration: float) -> Floats:
         return np.asarray(2.0 * rate * turns + rate * rate * bend + acceleration * slope)
 
-    return v, state.a[-1] - excess(*flow.later), state.vd[-1] - excess(flow.rate, flow.acceleration)
+    return velocity(i), state.a[i] - excess(*flow.later), state.vd[i] - excess(flow.rate, flow.acceleration)
 
 
 def _weights(x: Floats, at: float) -> Floats:
@@ -102,36 +119,37 @@ def _weights(x: Floats, at: float) -> Floats:
 
 
 def enter(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: Flow, place: float) -> State:
-    """The state with one more node at `place`, m, before the fairlead; what new cells lack goes into `new`."""
-    n = line.h.size
-    out = blank_state(n + 1, len(line.torsion))
+    """The state with one more node at `place`, m, in the cell that grows; what new cells lack goes into `new`."""
+    g = growing(line, reel)
+    i = g + 1  # the new node; the one that was there is the next
+    out = blank_state(line.h.size + 1, len(line.torsion))
     out.turn[:] = state.turn
     for name in ("r", "v", "a", "vd", "slip", "bed"):
         x, y = getattr(state, name), getattr(out, name)
-        y[:n], y[-1] = x[:n], x[n]
+        y[:i], y[i + 1 :] = x[:i], x[i:]
     for name in ("e", "T", "a1", "w", "wa", "wd"):
-        getattr(out, name)[:n] = getattr(state, name)
-        getattr(out, name)[n] = getattr(state, name)[n - 1]
-    first = max(n - 3, 0)
-    w = _weights(np.append(line.s[first:n], line.s[n]), place)
-    from_last = np.concatenate([-np.cumsum(state.e[first : n - 1][::-1], axis=0)[::-1], np.zeros((1, 3)), state.e[-1:]])
-    v, a, vd = material_at_fairlead(line, state, flow)
-    out.e[n - 1] = w @ from_last
-    out.e[n] = state.e[n - 1] - out.e[n - 1]
-    out.r[n] = state.r[n - 1] + out.e[n - 1]
+        x, y = getattr(state, name), getattr(out, name)
+        y[:i], y[i:] = x[:i], x[g:]
+    first = max(i - 3, 0)
+    w = _weights(line.s[[*range(first, i), i]], place)
+    from_last = np.concatenate([-np.cumsum(state.e[first:g][::-1], axis=0)[::-1], np.zeros((1, 3)), state.e[g:i]])
+    v, a, vd = material_at(line, state, reel, flow)
+    out.e[g] = w @ from_last
+    out.e[i] = state.e[g] - out.e[g]
+    out.r[i] = state.r[g] + out.e[g]
     for name, value in (("v", v), ("a", a), ("vd", vd)):
-        getattr(out, name)[n] = w @ np.vstack([getattr(state, name)[first:n], value])
-    part = (place - line.s[n - 1]) / (line.s[n] - line.s[n - 1])
-    out.slip[n] = (1.0 - part) * state.slip[n - 1] + part * state.slip[n]
-    h = float(line.s[n] - line.s[n - 1])
-    slope = (state.T[n - 1] - state.T[n - 2]) / (0.5 * (line.h[n - 2] + h))
-    trues = (place - line.s[n - 1], line.s[n] - place)
-    mismatch, rises = _mismatch(line, state, flow, reel, n - 1), _tension_rate(state, flow, n - 1)
-    _keep_lacks(reel, new, n - 1)
-    for c, true, at in ((n - 1, trues[0], 0.5 * trues[0] - 0.5 * h), (n, trues[1], 0.5 * h - 0.5 * trues[1])):
-        out.T[c] = state.T[n - 1] + slope * at
-        out.a1[c] = _carried(state.a1[n - 1], state.e[n - 1], out.e[c])
-        ck, T, grows = float(target.ck[c]), float(out.T[c]), flow.rate if c == n else 0.0
+        getattr(out, name)[i] = w @ np.vstack([getattr(state, name)[first:i], value])
+    part = (place - line.s[g]) / (line.s[i] - line.s[g])
+    out.slip[i] = (1.0 - part) * state.slip[g] + part * state.slip[i]
+    h = float(line.s[i] - line.s[g])
+    slope = (state.T[g] - state.T[g - 1]) / (0.5 * (line.h[g - 1] + h))
+    trues = (place - line.s[g], line.s[i] - place)
+    mismatch, rises = _mismatch(line, state, flow, reel, g), _tension_rate(state, flow, g)
+    _keep_lacks(reel, new, g)
+    for c, true, at in ((g, trues[0], 0.5 * trues[0] - 0.5 * h), (i, trues[1], 0.5 * h - 0.5 * trues[1])):
+        out.T[c] = state.T[g] + slope * at
+        out.a1[c] = _carried(state.a1[g], state.e[g], out.e[c])
+        ck, T, grows = float(target.ck[c]), float(out.T[c]), flow.rate if c == i else 0.0
         rate = _rate(ck, T, true, rises, out.e[c], out.v[c + 1] - out.v[c], grows, mismatch * true / h)
         _lacks(new, c, float(_lack(true, ck, T, out.e[c])), rate, flow)
     return out
@@ -139,24 +157,26 @@ def enter(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: F
 
 def leave(line: Line, target: Line, state: State, reel: Reel, new: Reel, flow: Flow) -> State:
     """The state without the last material node; what the cell that two become lacks goes into `new`."""
-    n = line.h.size
-    out = blank_state(n - 1, len(line.torsion))
+    g = growing(line, reel)
+    c = g - 1
+    out = blank_state(line.h.size - 1, len(line.torsion))
     out.turn[:] = state.turn
     for name in ("r", "v", "a", "vd", "slip", "bed"):
         x, y = getattr(state, name), getattr(out, name)
-        y[: n - 1], y[-1] = x[: n - 1], x[n]
+        y[:g], y[g:] = x[:g], x[g + 1 :]
     for name in ("e", "T", "a1", "w", "wa", "wd"):
-        getattr(out, name)[:] = getattr(state, name)[: n - 1]
-    c, (ha, hb) = n - 2, line.h[-2:]
-    out.e[c] = state.e[n - 2] + state.e[n - 1]
+        x, y = getattr(state, name), getattr(out, name)
+        y[:g], y[g:] = x[:g], x[g + 1 :]
+    ha, hb = line.h[c], line.h[g]
+    out.e[c] = state.e[c] + state.e[g]
     for name in ("T", "w", "wa", "wd"):
         x = getattr(state, name)
-        getattr(out, name)[c] = (ha * x[n - 2] + hb * x[n - 1]) / (ha + hb)
-    out.a1[c] = _carried(state.a1[n - 2], state.e[n - 2], out.e[c])
-    mismatch = _mismatch(line, state, flow, reel, n - 2) + _mismatch(line, state, flow, reel, n - 1)
-    rises = (ha * _tension_rate(state, flow, n - 2) + hb * _tension_rate(state, flow, n - 1)) / (ha + hb)
-    true, ck, T = float(line.s[n] - line.s[n - 2]), float(target.ck[c]), float(out.T[c])
-    _keep_lacks(reel, new, n - 2)
+        getattr(out, name)[c] = (ha * x[c] + hb * x[g]) / (ha + hb)
+    out.a1[c] = _carried(state.a1[c], state.e[c], out.e[c])
+    mismatch = _mismatch(line, state, flow, reel, c) + _mismatch(line, state, flow, reel, g)
+    rises = (ha * _tension_rate(state, flow, c) + hb * _tension_rate(state, flow, g)) / (ha + hb)
+    true, ck, T = float(line.s[g + 1] - line.s[c]), float(target.ck[c]), float(out.T[c])
+    _keep_lacks(reel, new, c)
     rate = _rate(ck, T, true, rises, out.e[c], out.v[c + 1] - out.v[c], flow.rate, mismatch)
     _lacks(new, c, _lack(true, ck, T, out.e[c]), rate, flow)
     return out

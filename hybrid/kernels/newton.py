@@ -29,7 +29,7 @@ from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
 ADDRESS, ASKED, NEAR = range(3)
 PREPARE, LIMIT, TOUCH, FINISH, REST = range(5)
 call_contact = caller(0.0)
-call_winch = caller(0)
+call_reel = caller(0)
 
 OK, NOT_CONVERGED, NOT_FINITE, SINGULAR, SLACK, TURNED_TOO_FAR = 0, 1, 2, 3, 4, 5  # errors.Outcome, as kernels see it
 CUT_SHORT = -1  # a step that is taken though Newton has not converged in the iterations it may take (Task.cut)
@@ -141,7 +141,7 @@ def start_step(plane, space, task, line, sea, old, new, work, contact, contact_t
 
 @inner
 def solve(
-    plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table, winch, winch_table
+    plane, space, task, line, sea, ends, old, new, was, now, work, strains, contact, contact_table, reel, reel_table
 ):  # fmt: skip
     """Do a task at the configuration `new`, of a step that starts at old.r.
 
@@ -152,7 +152,7 @@ def solve(
     CORRECTION      one march and the solution of its equations, into work.x
 
     contact: of a step of a line in space that may meet itself (kernels.self_contact); its address is 0 for others.
-    winch: address of kernels.payout.wind, which corrects the length of the line; 0: no winch holds a tension.
+    reel: address of kernels.payout.iterate, for a line that is paid out; 0: iterations need nothing of it.
 
     Returns outcome, iterations, last predicted correction, and the cell or node where it was worst.  A step whose
     prediction or answer turns a chord by more than LARGEST_STEP_TURN is refused: it has missed the motion, and Newton
@@ -173,6 +173,8 @@ def solve(
         it += 1
         bad, good = -1, True
         pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
+        if reel != 0:
+            call_reel(reel, reel_table)
         if space is not None:
             bad = march(line, sea, ends, old.r, new, cv, ca, work)
         if plane is not None:
@@ -185,8 +187,8 @@ def solve(
         if task.what == ASSEMBLY:
             outcome = OK
             break
-        if winch != 0:
-            call_winch(winch, winch_table)
+        if reel != 0:
+            call_reel(reel, reel_table)
         if space is not None:
             good = substitute(work.X, work.x)
             pass_torque(space, line, ends, new, work, CORRECT, cv)

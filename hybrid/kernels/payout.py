@@ -1,7 +1,8 @@
 """A line that is paid out or taken in at its end: what changes with its length in every step (docs/theory.md, 19).
 
-The last node is the fairlead, through which material passes; all others are material.  Only the last cell changes its
-length, and with it the mass, the loads and the stiffness that it brings to its two nodes.
+The last node is the fairlead, through which material passes.  Nodes of a layer before it ride with it; all others are
+material.  Only the cell before the layer, which is the last one where there is none, changes its length, and with it
+the mass, the loads and the stiffness that it brings to its two nodes.
 
     symbol  meaning                                                    unit
     L       unstretched length that is out                             m
@@ -23,35 +24,23 @@ from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
+from hybrid.kernels.paid_length import (
+    find_length,
+    growing,
+    prepare,
+    take_riding_off,
+)
 from hybrid.kernels.reel import (
     ACCELERATION,
-    ADDED_N,
-    ADDED_T,
-    BEND_1,
-    BUOY,
-    DAMP,
-    DIAMETER,
-    DISPLACED,
-    DRAG_N,
-    DRAG_T,
     DUE,
     END,
     FADING,
     FLUX,
     FLUX_BEFORE,
-    KAPPA_1,
     LENGTH,
     LONGEST,
-    MASS,
-    PER_LENGTH,
-    PLACE,
-    POLAR,
     RATE,
-    ROTARY,
     SHORTEST,
-    STRETCH,
-    TAU,
-    WEIGHT,
     read,
 )
 from hybrid.kernels.report import FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
@@ -62,10 +51,7 @@ from hybrid.kernels.winch import (
     CV,
     HELD,
     INERTIA,
-    LENGTH_NOW,
-    RATE_NOW,
     TENSION,
-    TRUE_NOW,
     accept,
     at_its_end,
     last_change,
@@ -75,123 +61,66 @@ from hybrid.kernels.winch import (
     tension_held,
 )
 
-# --- how long the line is -------------------------------------------------------------------------
-
-
-@inner
-def length_at(law, t):
-    """L, c and the rate of c at t, just before it where the latter jumps."""
-    k = 0
-    while k + 1 < law.shape[0] and law[k + 1, 0] < t:
-        k += 1
-    x = max(t - law[k, 0], 0.0)
-    value, rate, twice = 0.0, 0.0, 0.0
-    for j in range(1, 8):
-        twice = twice * x + 2.0 * rate
-        rate = rate * x + value
-        value = value * x + law[k, j]
-    return value, rate, twice
-
-
-@inner
-def amount_between(pieces, begin, end, out):
-    """What the material between two arc lengths has of all that it has per length."""
-    for j in range(PER_LENGTH):
-        out[j] = 0.0
-    for k in range(pieces.shape[0]):
-        a = max(pieces[k, 0], begin) if k > 0 else begin
-        z = min(pieces[k + 1, 0], end) if k + 1 < pieces.shape[0] else end
-        if z > a:
-            for j in range(PER_LENGTH):
-                out[j] += (z - a) * pieces[k, 1 + j]
-
-
-@inner
-def fill_last_cell(line, reel):
-    """Mass, loads and stiffness of the last cell and of its two nodes, for the length that is out."""
-    n, rest, q = line.h.shape[0], reel.rest, reel.amount
-    length, place = reel.numbers[LENGTH], reel.numbers[PLACE]
-    h, c = length - place, n - 1
-    amount_between(reel.pieces, place, length, q)
-    line.s[n], reel.true[c] = length, h
-    for i, share in ((n - 1, 1.0), (n, 0.0)):
-        line.mass[i] = 0.5 * (q[MASS] + share * rest[MASS]) + line.point_mass[i]
-        line.force[i, 2] = -0.5 * (q[WEIGHT] + share * rest[WEIGHT])
-        line.damp[i] = 0.5 * (q[DAMP] + share * rest[DAMP])
-        line.hn[i] = 0.5 * (h + share * rest[PER_LENGTH])
-    line.ck[c], line.tau[c], line.diameter[c] = q[STRETCH] / h, q[TAU] / h, q[DIAMETER] / h
-    line.drag_n[c], line.drag_t[c] = 0.5 * q[DRAG_N], 0.5 * q[DRAG_T]
-    line.added_n[c], line.added_t[c] = 0.5 * q[ADDED_N], 0.5 * q[ADDED_T]
-    line.buoy[c], line.displaced[c] = 0.5 * q[BUOY], 0.5 * q[DISPLACED]
-    line.rotary[c], line.polar[c] = q[ROTARY], q[POLAR]
-    if line.element[n - 1]:
-        for k in range(3):
-            line.kb[n - 1, k] = 2.0 / (q[BEND_1 + k] + rest[BEND_1 + k])
-            line.k0[n - 1, k] = 0.5 * (q[KAPPA_1 + k] + rest[KAPPA_1 + k])
-
-
-@inner
-def set_lengths(line, reel, t):
-    """Lengths of cells at t: those that are new are on their way to their true ones, by a quintic that ends at rest."""
-    for c in range(line.h.shape[0]):
-        line.h[c] = reel.true[c]
-        x = (t - reel.since[c]) / reel.span[c]
-        if x < 1.0:
-            x = max(x, 0.0)
-            value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
-            fading = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
-            line.h[c] -= reel.lack[c] * value + reel.span[c] * reel.rate[c] * fading
-
-
-@inner
-def find_length(reel, t):
-    """How long the line is at t, of what is prescribed, or of a winch before a step."""
-    numbers, winch = reel.numbers, reel.winch
-    if winch[TENSION] > 0.0:
-        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW]
-    else:
-        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
-
-
-@inner
-def prepare(line, reel, t):
-    """The line with the length of now at t."""
-    numbers = reel.numbers
-    fill_last_cell(line, reel)
-    line.h[line.h.shape[0] - 1] = reel.true[line.h.shape[0] - 1]
-    if numbers[FADING] > -np.inf:
-        set_lengths(line, reel, t)
-
-
 # --- the force of the fairlead --------------------------------------------------------------------
 
 
 @inner
-def at_fairlead(line, state, rate, acceleration):
-    """Velocity of the material at the fairlead, K, and r' there."""
-    n = line.h.shape[0]
-    ha, hb = line.h[n - 2], line.h[n - 1]
-    beyond = hb / (ha + hb)
-    sa, sb = scale(1.0 / ha, get3(state.e, n - 2)), scale(1.0 / hb, get3(state.e, n - 1))
-    slope, bend = add(sb, scale(beyond, sub(sb, sa))), scale(2.0 / (ha + hb), sub(sb, sa))
-    v = sub(get3(state.v, n), scale(rate, slope))
-    va = scale(1.0 / ha, sub(get3(state.v, n - 1), get3(state.v, n - 2)))
-    vb = scale(1.0 / hb, sub(v, get3(state.v, n - 1)))
-    turns = add(vb, scale(beyond, sub(vb, va)))
-    K = add(scale(2.0 * rate, turns), add(scale(rate * rate, bend), scale(acceleration, slope)))
-    return v, K, slope
+def slope_at(line, state, i):
+    """r' and r'' at node i: of the parabola through it and its neighbours, or through the last three."""
+    j = min(i, line.h.shape[0] - 1)
+    ha, hb = line.h[j - 1], line.h[j]
+    sa, sb = scale(1.0 / ha, get3(state.e, j - 1)), scale(1.0 / hb, get3(state.e, j))
+    part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
+    return add(sa, scale(part, sub(sb, sa))), scale(2.0 / (ha + hb), sub(sb, sa))
 
 
 @inner
-def of_material(line, sea, ends, state, reel):
-    """What the force of the fairlead, N, is more because its half cell moves as the material does, and r' there."""
-    n, numbers = line.h.shape[0], reel.numbers
-    v, K, slope = at_fairlead(line, state, numbers[RATE], numbers[ACCELERATION])
-    before, after, z = chord(get3(state.e, n - 1)), Chord(Z3, 0.0, 0.0), ends.position[1, 2]
-    vn, an = get3(state.v, n), get3(state.vd, n)
-    with_material, _, _, _ = inertia_and_water(line, sea, n, z, v, sub(an, K), before, after, 0.0, 0.0, reel.report)
-    with_fairlead, _, _, _ = inertia_and_water(line, sea, n, z, vn, an, before, after, 0.0, 0.0, reel.report)
-    return sub(with_material, with_fairlead), slope
+def velocity_at(line, state, i, rate, g):
+    """Velocity of the material at node i: that of a node behind the cell that grows is another one."""
+    v = get3(state.v, i)
+    if i <= g:
+        return v
+    slope, _ = slope_at(line, state, i)
+    return sub(v, scale(rate, slope))
+
+
+@inner
+def of_material(line, sea, ends, state, reel, i):
+    """What the force on node i, N, is more because it does not move as the material does, and r' there."""
+    n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)
+    rate, acceleration, j = numbers[RATE], numbers[ACCELERATION], min(i, n - 1)
+    slope, bend = slope_at(line, state, i)
+    ha, hb = line.h[j - 1], line.h[j]
+    first, middle = velocity_at(line, state, j - 1, rate, g), velocity_at(line, state, j, rate, g)
+    last = velocity_at(line, state, j + 1, rate, g)
+    va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
+    part, v = (ha / (ha + hb), middle) if i == j else (1.0 + hb / (ha + hb), last)
+    turns = add(va, scale(part, sub(vb, va)))
+    K = add(scale(2.0 * rate, turns), add(scale(rate * rate, bend), scale(acceleration, slope)))
+    before, after, z = chord(get3(state.e, i - 1)), Chord(Z3, 0.0, 0.0), ends.position[1, 2]
+    if i < n:
+        d, l, il = chord(get3(state.e, i))
+        after = Chord(d, l, il)
+        for c in range(i, n):
+            z -= state.e[c, 2]
+    vi, ai = get3(state.v, i), get3(state.vd, i)
+    with_material, _, _, _ = inertia_and_water(line, sea, i, z, v, sub(ai, K), before, after, 0.0, 0.0, reel.report)
+    with_node, _, _, _ = inertia_and_water(line, sea, i, z, vi, ai, before, after, 0.0, 0.0, reel.report)
+    return sub(with_material, with_node), slope
+
+
+@inner
+def put_riding_on(line, sea, ends, state, reel):
+    """The forces on the line with those by which nodes that ride have more."""
+    first = growing(line, reel) + 1
+    for k in range(reel.layer.shape[0] - 1):
+        more, _ = of_material(line, sea, ends, state, reel, first + k)
+        for j in range(3):
+            reel.riding[k, j] = more[j]
+    for k in range(reel.layer.shape[0] - 1):
+        for j in range(3):
+            line.force[first + k, j] += reel.riding[k, j]
+    reel.stage[0] = 1.0
 
 
 @inner
@@ -214,12 +143,15 @@ def correct_force(line, sea, ends, state, velocity, reel, report):
     pull of the line there, N.
     """
     numbers = reel.numbers
-    more, slope = of_material(line, sea, ends, state, reel)
+    more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
     force = force_of_fairlead(report, more)
     report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = force
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
     report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
     numbers[FLUX] = dot(more, get3(velocity, 1))
+    for i in range(growing(line, reel) + 1, line.h.shape[0]):
+        more, _ = of_material(line, sea, ends, state, reel, i)
+        numbers[FLUX] += dot(more, get3(state.v, i))
     return pull_at(force, slope)
 
 
@@ -227,9 +159,8 @@ def correct_force(line, sea, ends, state, velocity, reel, report):
 
 
 @inner
-def strain_before(line, state, k):
-    """Strain of the last element, from what has no stress, squared and weighed with one stiffness k."""
-    i = line.h.shape[0] - 1
+def strain_before(line, state, i, k):
+    """Strain of the element at node i, from what has no stress, squared and weighed with the stiffness k."""
     da, _, _ = chord(get3(state.e, i - 1))
     db, _, _ = chord(get3(state.e, i))
     turn = log_rotation(relative_rotation(frame(get3(state.a1, i - 1), da), frame(get3(state.a1, i), db)))
@@ -243,10 +174,10 @@ def remember(line, reel):
     n, before = line.h.shape[0], reel.before
     for c in range(n):
         before[c, 0] = line.h[c]
-    for k in range(3):
-        before[n, k] = line.kb[n - 1, k]
-    for i in range(2):
-        before[n + 1 + i, 0], before[n + 1 + i, 1] = line.mass[n - 1 + i], line.force[n - 1 + i, 2]
+    for i in range(growing(line, reel), n + 1):
+        before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
+        for k in range(3):
+            before[i, 3 + k] = line.kb[i, k]
     reel.numbers[FLUX_BEFORE] = reel.numbers[FLUX]
 
 
@@ -266,14 +197,14 @@ def book(line, old, new, reel, dt):
         more = line.h[c] - before[c, 0]
         if more != 0.0:
             booked -= 0.5 * more * (stretch_work(line, old, c) + stretch_work(line, new, c))
-    for j in range(2):
-        i = n - 1 + j
+    for i in range(growing(line, reel), n + 1):
         va, vb = get3(old.v, i), get3(new.v, i)
-        booked += 0.25 * (line.mass[i] - before[n + 1 + j, 0]) * (dot(va, va) + dot(vb, vb))
-        booked -= 0.5 * (line.force[i, 2] - before[n + 1 + j, 1]) * (old.r[i, 2] + new.r[i, 2])
-    if line.element[n - 1]:
-        more_stiff = sub(get3(line.kb, n - 1), get3(before, n))
-        booked += 0.25 * (strain_before(line, old, more_stiff) + strain_before(line, new, more_stiff))
+        booked += 0.25 * (line.mass[i] - before[i, 1]) * (dot(va, va) + dot(vb, vb))
+        booked -= 0.5 * (line.force[i, 2] - before[i, 2]) * (old.r[i, 2] + new.r[i, 2])
+        if i < n and line.element[i]:
+            more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
+            if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
+                booked += 0.25 * (strain_before(line, old, i, more) + strain_before(line, new, i, more))
     return booked
 
 
@@ -304,6 +235,7 @@ def pay_out(table):
         return 0
     if phase == b.JUDGE:
         tried = job.old if count[b.PARITY] else job.new
+        take_riding_off(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
         note_pull(reel, clock[b.TRY_END], pull)
         return 0
@@ -315,7 +247,7 @@ def pay_out(table):
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
     job.work[0, END] += book(line, before, state, reel, clock[b.LAST_DT])
     remember(line, reel)
-    last = reel.true[line.h.shape[0] - 1]
+    last = reel.true[growing(line, reel)]
     if clock[b.NOW] >= numbers[FADING]:
         numbers[FADING] = -np.inf
     numbers[DUE] = 1.0 if last > numbers[LONGEST] or last < numbers[SHORTEST] else 0.0
@@ -323,15 +255,23 @@ def pay_out(table):
 
 
 @kernel
-def wind(table):
-    """An iteration of Newton's method has eliminated its equations: the winch corrects the length, and them with it."""
+def iterate(table):
+    """What an iteration of Newton's method does before it assembles its equations, and after it has eliminated them.
+
+    Nodes that ride with the fairlead have the inertia, the drag and the added mass of the material that they pass; a
+    winch that holds a tension corrects the length, and the equations with it.
+    """
     job = read(table)
     line, reel, clock = job.line, job.reel, job.clock
     numbers, winch, t = reel.numbers, reel.winch, clock[b.TRY_END]
-    if t <= winch[BEGIN]:
+    if reel.stage[0] == 0.0:
+        put_riding_on(line, job.sea, job.ends, job.old if job.counts[b.PARITY] else job.new, reel)
+        return 0
+    take_riding_off(line, reel)
+    if t <= winch[BEGIN] or not winch[TENSION] > 0.0:
         return 0
     state, at = job.old if job.counts[b.PARITY] else job.new, last_change(line)
-    more, slope = of_material(line, job.sea, job.ends, state, reel)
+    more, slope = of_material(line, job.sea, job.ends, state, reel, line.h.shape[0])
     pull = pull_at(force_of_fairlead(job.report, more), slope) + job.X[at]
     lost, steep = losses(winch, numbers[RATE])
     answer = softness(line, state, job.X)

@@ -51,21 +51,26 @@ class Reel(NamedTuple):
     rate: Floats  # (N,) m/s, its rate then
     since: Floats  # (N,) s, when that was
     span: Floats  # (N,) s, over which they get it
-    before: Floats  # (N+3, 3) before the last step: lengths; stiffness of the last element; mass, weight of the last two nodes
+    before: Floats  # (N+1, 6) before the last step, of cells or nodes: length; mass, weight, stiffness of the element
     report: Floats  # (REPORT_SIZE,) this and the next: work arrays
-    amount: Floats  # (PER_LENGTH,)
+    amount: Floats  # (2, 1 + PER_LENGTH)
+    layer: Floats  # (m+1,) m, how far before the fairlead the nodes that ride with it are; that is the last, 0
+    riding: Floats  # (m+1, 3) N, by which the forces on them are more because they do not move as the material does
+    stage: Floats  # (1,) 1 while these are among the forces on the line
     winch: Floats  # (WINCH,) of a winch that holds a tension (kernels.winch)
 
 
 def blank_reel(
-    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None
-) -> Reel:
+    cells: int, law: Floats | None = None, pieces: Floats | None = None, winch: Floats | None = None,
+    layer: Floats | None = None,
+) -> Reel:  # fmt: skip
     """A reel of a line of so many cells."""
     z = np.zeros
     return Reel(
         z(NUMBERS), z((1, 8)) if law is None else law, z((1, 1 + PER_LENGTH)) if pieces is None else pieces,
-        z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 3, 3)),
-        z(REPORT_SIZE), z(PER_LENGTH), z(WINCH) if winch is None else winch,
+        z(1 + PER_LENGTH), z(cells), z(cells), z(cells), np.full(cells, -np.inf), np.ones(cells), z((cells + 1, 6)),
+        z(REPORT_SIZE), z((2, 1 + PER_LENGTH)), z(1) if layer is None else layer,
+        z((1 if layer is None else layer.size, 3)), z(1), z(WINCH) if winch is None else winch,
     )  # fmt: skip
 
 

@@ -126,7 +126,7 @@ class Job(NamedTuple):
     itself: int = 0  # address of kernels.self_distance.watch_itself; UNBENT: until the line is bent; 0: never
     solver: int = 0  # of a run: address of the kernel of the line's kind, which solves its steps
     reel: int = 0  # address of kernels.payout.pay_out; 0: the length of the line stays
-    winch: int = 0  # of a run: address of kernels.payout.wind; 0: no winch holds a tension
+    iterated: int = 0  # of a run: address of kernels.payout.iterate; 0: iterations need nothing of it
     follower: int = 0  # and of what is called with `following` after every step; 0: nothing
 
 
@@ -250,9 +250,9 @@ def solve_job(plane, space, job):
     Returns as kernels.newton.solve.
     """
     task, clock, old, new, was, now = job.task, job.books.clock, job.old, job.new, job.was, job.now
-    winch = 0
+    iterated = 0
     if task.what == RUN:
-        winch = job.winch
+        iterated = job.iterated
         if job.books.counts[PARITY]:
             old, new, was, now = job.new, job.old, job.now, job.was
         dt = clock[TRY_END] - clock[NOW]
@@ -263,7 +263,7 @@ def solve_job(plane, space, job):
         task = Task(STEP, dt, clock[STEP_BEFORE], clock[RHO], 0.0, 0.0, False, limits, cut)
     return solve(
         plane, space, task, job.line, job.sea, job.ends, old, new, was, now, job.work, job.books.strains, job.contact,
-        job.contact_table, winch, job.reel_table,
+        job.contact_table, iterated, job.reel_table,
     )  # fmt: skip
 
 

@@ -80,7 +80,7 @@ class Model:
     def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:
         """What `build` makes a model of the same mesh from."""
         if self.payout is not None:
-            return self.payout.nodes[: self.payout.count(self.payout.first) + 1], self.payout.zones
+            return self.payout.begun, self.payout.zones
         if self.layout is None:
             return self.line.s, self.zones
         return self.layout.finest
@@ -98,7 +98,7 @@ class Model:
     def always(self) -> np.ndarray:
         """Numbers of nodes that there always are: those of base cells, or that cannot be taken in."""
         if self.payout is not None:
-            return np.flatnonzero(self.payout.nodes <= self.payout.shortest)
+            return np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
         return np.arange(self.line.s.size) if self.layout is None else self.layout.first
 
     @property

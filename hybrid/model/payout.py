@@ -23,6 +23,8 @@ from hybrid.scene.schema import Scene, Section
 ENTERS, LEAVES = 0.85, 0.35
 # The fewest cells that may be left.
 FEWEST_CELLS = 4
+# Nodes that ride with the fairlead behind a clamp, where the line bends most, and of other rods.
+RIDE_BEHIND_CLAMP, RIDE = 8, 4
 WHERE = "ends.end.payout"
 
 
@@ -59,14 +61,17 @@ class PayoutPlan:
     pieces: Floats  # (P, 1 + PER_LENGTH) as of kernels.payout.Reel
     from_outside: bool  # whether the length is set from Python
     winch: Floats  # (WINCH,) as of kernels.winch, before its brake opens; of zeros where none holds a tension
+    layer: Floats  # (m+1,) m, how far before the fairlead the nodes are that ride with it; 0 is the last
+    begun: Floats  # (N+1,) m, nodes at t = 0
 
     def count(self, length: float) -> int:
         """Material nodes of a line of that length, m, that has been paid out monotonically: the last cell is between
 
         its limits.
         """
-        n = int(np.searchsorted(self.nodes, length))
-        return n if length - self.nodes[n - 1] > LEAVES * self.cell(n - 1) else n - 1
+        begins = length - self.layer[0]  # of the layer
+        n = int(np.searchsorted(self.nodes, begins))
+        return n if begins - self.nodes[n - 1] > LEAVES * self.cell(n - 1) else n - 1
 
     def cell(self, node: int) -> float:
         """Length, m, of the cell after a material node."""
@@ -92,7 +97,7 @@ class PayoutPlan:
 
     def line(self, count: int, length: float, like: Line) -> Line:
         """The line of `count` material nodes and a length, m; like: another one, with the same forces."""
-        s = np.append(self.nodes[:count], length)
+        s = np.concatenate([self.nodes[:count], length - self.layer])
         middle = 0.5 * (s[:-1] + s[1:])
         ends = [zone.s_b for zone in self.zones]
         rod = np.array([x.kind == "rod" for x in self.zones])
@@ -130,30 +135,42 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     changes = [x for x in np.cumsum([x.length for x in scene.cable.sections]).tolist() if x < length * (1 - 1e-9)]
     fixed = max([joint, *points, *changes])
     near = int(np.searchsorted(line.s, fixed * (1 + 1e-12)))
-    if near + FEWEST_CELLS >= line.s.size:
-        expected = (
-            f"{FEWEST_CELLS} cells between the last joint, load or change of section, s = {fixed:g} m, and the end"
-        )
+    ride = riding_nodes(scene, line)
+    fewest = FEWEST_CELLS + ride
+    if near + fewest >= line.s.size:
+        expected = f"{fewest} cells between the last joint, load or change of section, s = {fixed:g} m, and the end"
         _refuse("", "payout", expected, "more cells, or a longer cable")
-    shortest = float(line.s[near + FEWEST_CELLS - 1])
+    layer = line.s[-1] - line.s[line.s.size - 1 - ride :]
+    shortest = float(line.s[near + FEWEST_CELLS - 1] + layer[0])
     if low < shortest:
         given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
-        left = f"{FEWEST_CELLS} cells must be left behind the last joint, load or change of section"
+        left = f"{fewest} cells must be left behind the last joint, load or change of section"
         expected = f"at least {shortest:.6g} m: {left}"
         _refuse("", given, expected, fix)
-    h = float(line.h[-1])
-    nodes: list[float] = line.s.tolist()
+    h = float(line.h[-1 - ride])
+    nodes: list[float] = line.s[: line.s.size - ride].tolist()
     for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
         if nodes[-1] * (1 + 1e-9) < end:
             nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
-    while nodes[-3] < longest:
+    while nodes[-3 - ride] < longest:
         nodes.append(nodes[-1] + h)
     cable = material(whole_scene(scene))
     if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-1]:
         _refuse("", "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
     outside, s, winch = payout.from_outside, np.array(nodes), winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
-    return PayoutPlan(law, s, length, longest, shortest, zones, cable, _pieces(cable), outside, winch)
+    return PayoutPlan(
+        law, s, length, longest, shortest, zones, cable, _pieces(cable), outside, winch, layer, line.s.copy()
+    )
+
+
+def riding_nodes(scene: Scene, line: Line) -> int:
+    """Nodes that ride with the fairlead: behind a clamp, and where rods do not stretch."""
+    if line.element[-1]:
+        return RIDE_BEHIND_CLAMP
+    payout = payout_of(scene)
+    stretches = bool(line.ck[-1])
+    return 0 if stretches or not line.spin[-1] or (payout is not None and payout.winch is not None) else RIDE
 
 
 def winch_of(payout: Payout, length: float) -> Floats:

@@ -56,6 +56,7 @@ class Release(Table):
         return self
 
 
+_PAYOUT = "line is paid out here, or taken in, by a winch; at `end` alone; absent: its length stays"
 _RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
 
 
@@ -152,10 +153,7 @@ class Pinned(EndTable):
     )
     position: Vector = Field(description="position of the end, inertial frame [m]")
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
-    payout: Payout | None = Field(
-        default=None,
-        description="line is paid out here, or taken in, by a winch; at `end` alone; absent: its length stays",
-    )
+    payout: Payout | None = Field(default=None, description=_PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @model_validator(mode="after")
@@ -177,6 +175,7 @@ class Clamped(EndTable):
     turns: Number = Field(default=0.0, description=_TURNS)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
+    payout: Payout | None = Field(default=None, description=_PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
 
     @property
@@ -302,5 +301,5 @@ class Ends(Table):
         motions += [x.prescribed_motion.vessel.rao for x in self.both
                     if x.prescribed_motion is not None and x.prescribed_motion.vessel is not None]  # fmt: skip
         loads = [given.load.file for end in self.both for given in end.loads]
-        winches = [end.payout.file for end in self.both if isinstance(end, Pinned) and end.payout is not None]
+        winches = [end.payout.file for end in self.both if isinstance(end, Pinned | Clamped) and end.payout is not None]
         return sorted({path for path in (*motions, *loads, *winches) if path is not None})

@@ -18,14 +18,14 @@ from hybrid.scene.analysis import (
 )
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import Cable, Contact, Section
-from hybrid.scene.ends import Ends, Pinned
+from hybrid.scene.ends import Clamped, Ends, Pinned
 
 AT: tuple[str, ...] = ("ends", "end", "payout")
 LEAVE_OUT = "leave it out, or ends.end.payout"
 
 
 def _payout(end: Any) -> bool:
-    return isinstance(end, Pinned) and end.payout is not None
+    return isinstance(end, Pinned | Clamped) and end.payout is not None
 
 
 def payout_at_the_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
@@ -34,8 +34,11 @@ def payout_at_the_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
         fix = "exchange start and end, with the order of the sections: s counts from the end that is not at the winch"
         yield Finding(("ends", "start", "payout"), "nothing, because line is paid out at ends.end", fix)
     end = ends.end
-    if not isinstance(end, Pinned) or end.payout is None:
+    if not isinstance(end, Pinned | Clamped) or end.payout is None:
         return
+    if isinstance(end, Clamped) and end.payout.winch is not None:
+        fix = "write kind: pinned, or give the rate"
+        yield Finding((*AT, "winch"), "nothing, because a winch holds a tension at a pinned end alone", fix)
     if end.release_at is not None:
         yield Finding(("ends", "end", "release_at"), "nothing, because line is paid out there", LEAVE_OUT)
     places: list[tuple[Place, Section]] = [(("cable", "sections", i), x) for i, x in enumerate(cable.sections)]

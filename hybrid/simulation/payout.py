@@ -14,7 +14,7 @@ from hybrid.kernels import reel as p
 from hybrid.kernels import winch as w
 from hybrid.kernels.binding import Table
 from hybrid.kernels.energies import observe
-from hybrid.kernels.payout import lengthen, pay_out, stand_still, wind
+from hybrid.kernels.payout import iterate, lengthen, pay_out, stand_still
 from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state import Batch, Ends, Floats, Line, State
@@ -47,13 +47,13 @@ class PayingOut:
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
         plan = self.plan
-        reel = blank_reel(count, self.law, plan.pieces, self.winch)
+        reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer)
         place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
         numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
         numbers[p.LONGEST], numbers[p.SHORTEST] = plan.limits(count)
         reel.rest[:-1], reel.rest[-1] = amount_between(plan.pieces, before, place), place - before
-        reel.true[:-1] = np.diff(plan.nodes[:count])
+        reel.true[: count - 1], reel.true[count:] = np.diff(plan.nodes[:count]), -np.diff(plan.layer)
         return reel
 
     def on(self, model: Model, length: float) -> Model:
@@ -71,7 +71,13 @@ class PayingOut:
             report=stepper.work.report, reel=self.reel, X=stepper.work.X,
         )  # fmt: skip
         numbers = self.table.numbers
-        run.pay_out(self.table, pay_out.address(numbers), wind.address(numbers) if self.holds_tension else 0)
+        asks = self.holds_tension or self.rides
+        run.pay_out(self.table, pay_out.address(numbers), iterate.address(numbers) if asks else 0)
+
+    @property
+    def rides(self) -> int:
+        """Nodes that ride with the fairlead."""
+        return self.plan.layer.size - 1
 
     @property
     def holds_tension(self) -> bool:
@@ -85,8 +91,8 @@ class PayingOut:
     @property
     def lengthening(self) -> Floats:
         """(N,) m/s2, second rates of the lengths of cells."""
-        out = np.zeros(self.count)
-        out[-1] = self.reel.numbers[p.ACCELERATION]
+        out = np.zeros(self.count + self.rides)
+        out[self.count - 1] = self.reel.numbers[p.ACCELERATION]
         return out
 
     @property
@@ -104,7 +110,7 @@ class PayingOut:
         """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in."""
         state, old, plan = run.state, self.reel, self.plan
         numbers = old.numbers
-        enters = old.true[-1] > numbers[p.LONGEST]
+        enters = old.true[self.count - 1] > numbers[p.LONGEST]
         flow = self._flow(run)
         self.count += 1 if enters else -1
         length = float(numbers[p.LENGTH])
@@ -115,7 +121,7 @@ class PayingOut:
         else:
             out = leave(model.line, changed.line, state, old, reel, flow)
         reel.numbers[p.FADING] = (reel.since + reel.span).max()
-        reel.true[-1] = length - plan.nodes[self.count - 1]
+        reel.true[self.count - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
         changed.line.h[:] = reel.true - lack_at(reel, flow.t)[0]
         self.reel = reel
         ends = model.ends.at(run.t)
@@ -162,7 +168,11 @@ class PayingOut:
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
             raise ValueError("a length that no winch gives")
-        if not np.searchsorted(self.plan.nodes, self.plan.shortest) < count < self.plan.nodes.size - 1:
+        if (
+            not np.searchsorted(self.plan.nodes, self.plan.shortest - self.plan.layer[0])
+            < count
+            < self.plan.nodes.size - 1
+        ):
             raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")
         self.count, self.law = count, law
         self.reel = self._blank(count)

@@ -141,9 +141,9 @@ class CompiledRun:
             self._zones_address = follow_zones.address(zones.numbers)
         self.table.bind(zones=self._zones_address if compiled else 0, zone_table=zones.numbers)
 
-    def pay_out(self, table: Table, address: int, winch: int) -> None:
-        """The length of the line changes from now on; addresses of kernels.payout.pay_out, and of `wind` or 0."""
-        self.table.bind(reel=address, winch=winch, reel_table=table.numbers)
+    def pay_out(self, table: Table, address: int, iterated: int) -> None:
+        """The length of the line changes from now on; addresses of kernels.payout.pay_out, and of `iterate` or 0."""
+        self.table.bind(reel=address, iterated=iterated, reel_table=table.numbers)
 
     def watch_itself(self, table: np.ndarray, address: int) -> None:
         """From now on steps look how near the line comes to itself (kernels.self_distance)."""

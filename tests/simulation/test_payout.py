@@ -10,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import hybrid
+import hybrid.model.payout
 from hybrid.cli.plan_tables import plan_lines
 from hybrid.errors import SceneError
 from hybrid.model.payout import law_of, length_at
@@ -65,6 +66,30 @@ def test_a_hanging_line_weighs_what_is_out_less_its_inertia(dimension: int | Non
     assert not out.any() or np.abs(result["position"][out]).max() < 1e-12
 
 
+@pytest.mark.parametrize("dimension", [None, 3])
+@pytest.mark.parametrize("sign", [1.0, -1.0])
+def test_behind_a_clamp_it_weighs_the_same(dimension: int | None, sign: float) -> None:
+    """Nodes that ride with the clamp have the inertia of the material that they pass."""
+    more = {"dimension": dimension} if dimension else {}
+    scene = clamped(hanging({"rates": [[0, 0], [20, sign * 1.0]]}, 18.0, model="rod", **more), [0.0, 0.0, 1.0])
+    scene["cable"]["sections"][0] |= {"bending_stiffness": 20.0, "torsional_stiffness": 20.0}
+    result = hybrid.run(scene)
+    length = 40.0 + sign * 0.025 * result.t[1:] ** 2
+    assert np.abs(result["reaction_end"][1:, 2] / (2.0 * length * (G - sign * 0.05)) - 1.0).max() < 1e-9
+
+
+def test_the_layer_that_rides_does_not_matter(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A bob on a rod that a clamp pays out, before the first node enters: nodes that ride and nodes that do not."""
+    pulls = []
+    for nodes in (4, 12):
+        monkeypatch.setattr(hybrid.model.payout, "RIDE_BEHIND_CLAMP", nodes)
+        scene = clamped(sagging("rod", 2e6, 2e4, 0.8, 0.05, 4.5))
+        scene["mesh"] = {"cells": 80}
+        scene["ends"]["end"]["payout"] = {"rate": 0.3, "ramp": 3.0}
+        pulls.append(np.linalg.norm(hybrid.run(scene)["reaction_end"], axis=1))
+    assert np.abs(pulls[1] / pulls[0] - 1.0).max() < 1e-3
+
+
 def test_a_steady_rate_changes_nothing_but_the_weight() -> None:
     result = hybrid.run(hanging({"rate": 0.5, "begin": 1.0, "ramp": 4.0, "until": 20.0}, 30.0))
     steady = (result.t > 7.0) & (result.t < 20.0)
@@ -118,11 +143,15 @@ def test_heavier_line_on_the_reel() -> None:
     assert np.abs(result["reaction_end"][1:, 2] / (mass * (G - 0.05))[1:] - 1.0).max() < 1e-9
 
 
-def test_out_and_back_is_where_it_was() -> None:
+@pytest.mark.parametrize("clamp", [False, True])
+def test_out_and_back_is_where_it_was(clamp: bool) -> None:
     section = {"length": 100.0, "mass": 5.0, "axial_stiffness": 2e6, "damping": {"mass": 3.0}}
     scene = sagging(duration=200.0, step=0.1)
     scene["cable"] = {"sections": [section]}
     del scene["ends"]["end"]["motion"]
+    if clamp:
+        section["bending_stiffness"], scene["model"] = 2e4, "rod"
+        clamped(scene)
     scene["ends"]["end"]["payout"] = {"lengths": [[0, 100], [40, 108], [80, 113], [120, 96], [160, 100]]}
     result = hybrid.run(scene)
     assert np.ptp(result["payout/length"]) > 15.0
@@ -161,26 +190,54 @@ def forces(scene: dict[str, Any], skip: int | None = None, last: int | None = No
 
 
 @pytest.mark.parametrize(
-    ("model", "EA", "EI"), [("catenary", None, None), ("catenary", 2e6, None), ("rod", 2e6, 2e4), ("rod", None, 500.0)]
+    ("model", "EA", "EI"),
+    [("catenary", None, None), ("catenary", 2e6, None), ("rod", 2e6, 2e4), ("rod", None, 500.0), ("rod", None, 2e4)],
 )
 @pytest.mark.parametrize("rate", [0.8, -0.8])
 def test_a_cell_that_enters_or_leaves_does_not_kick(
     model: str, EA: float | None, EI: float | None, rate: float
 ) -> None:
     """The force at the winch, within five steps, against a run in which that one cell does not: 0.1 % of the mean."""
-    scene = sagging(model, EA, EI, rate, duration=12.0)
+    check_kicks(sagging(model, EA, EI, rate, duration=12.0), 1e-3)
+
+
+@pytest.mark.parametrize(("EA", "EI", "cells"), [(2e6, 2e4, 40), (None, 2e4, 40), (None, 500.0, 80)])
+@pytest.mark.parametrize("rate", [0.8, -0.8])
+def test_behind_a_clamp_it_does_not_kick_either(EA: float | None, EI: float, cells: int, rate: float) -> None:
+    check_kicks(clamped(sagging("rod", EA, EI, rate, duration=12.0, mesh={"cells": cells})), 6e-4)
+
+
+def test_in_space_behind_a_clamp_that_turns_it_does_not_kick() -> None:
+    scene = clamped(sagging("rod", 2e6, 2e4, duration=12.0), [1.0, 0.2, 0.5])
+    scene["cable"]["sections"][0]["torsional_stiffness"] = 1.5e4
+    scene["ends"]["end"]["motion"] = {"roll": {"amplitude": 10.0, "period": 7.0}, "ramp": 7.0}
+    check_kicks(scene, 1e-3)
+
+
+def clamped(scene: dict[str, Any], tangent: list[float] | None = None) -> dict[str, Any]:
+    """The same, with a clamp at the winch."""
+    scene["ends"]["end"] |= {"kind": "clamped", "tangent": tangent or [1.0, 0.0, 0.5]}
+    return scene
+
+
+def check_kicks(scene: dict[str, Any], most: float) -> None:
+    """The largest change of the force in five steps by a cell that enters or leaves is `most` of the mean at most."""
     found, changes = forces(scene)
     assert len(changes) >= 3
     for k, at in enumerate(changes[:3]):
         other, _ = forces(scene, skip=k, last=at + 6)
-        assert np.abs(other - found[: at + 6])[at:].max() < 1e-3 * found.mean()
+        assert np.abs(other - found[: at + 6])[at:].max() < most * found.mean()
 
 
-@pytest.mark.parametrize(("model", "EA", "EI"), [("catenary", None, None), ("rod", 2e6, 2e4)])
-def test_energy_is_balanced_to_second_order(model: str, EA: float | None, EI: float | None) -> None:
+@pytest.mark.parametrize(
+    ("model", "EA", "EI", "clamp"),
+    [("catenary", None, None, False), ("rod", 2e6, 2e4, False), ("rod", None, 2e4, False), ("rod", 2e6, 2e4, True)],
+)
+def test_energy_is_balanced_to_second_order(model: str, EA: float | None, EI: float | None, clamp: bool) -> None:
     left, put_in = [], 0.0
     for step in (0.1, 0.05):
-        result = hybrid.run(sagging(model, EA, EI, step=step))
+        scene = sagging(model, EA, EI, step=step)
+        result = hybrid.run(clamped(scene) if clamp else scene)
         left.append(np.abs(result["work/scheme"]).max())
         put_in = np.abs(result["work/end"]).max()
     assert left[1] < 1e-4 * put_in
@@ -190,9 +247,13 @@ def test_energy_is_balanced_to_second_order(model: str, EA: float | None, EI: fl
 # --- resume and Python ------------------------------------------------------------------------------
 
 
-@pytest.mark.parametrize(("model", "EA", "EI"), [("catenary", None, None), ("rod", 2e6, 2e4)])
-def test_resumed_bit_for_bit(tmp_path: Path, model: str, EA: float | None, EI: float | None) -> None:
+@pytest.mark.parametrize(
+    ("model", "EA", "EI", "clamp"),
+    [("catenary", None, None, False), ("rod", 2e6, 2e4, False), ("rod", None, 2e4, False), ("rod", 2e6, 2e4, True)],
+)
+def test_resumed_bit_for_bit(tmp_path: Path, model: str, EA: float | None, EI: float | None, clamp: bool) -> None:
     scene = sagging(model, EA, EI)
+    scene = clamped(scene) if clamp else scene
     scene["ends"]["end"]["payout"]["longest"] = 120.0
     whole = hybrid.run(scene, output=tmp_path / "whole.h5")
     shorter = {**scene, "time": {"duration": 11.0, "step": 0.05}}

@@ -171,6 +171,7 @@ def test_save_and_restore_take_the_winch_back() -> None:
     [
         ({"winch": {"tension": 600.0, "inertia": 100.0}}, "payout.longest"),
         ({"winch": {"tension": 600.0}, "longest": 60}, "winch.inertia"),
+        ({"winch": {"tension": 600.0, "inertia": 1.0}, "longest": 60}, "clamped"),
         ({"winch": {"tension": -1.0, "inertia": 100.0}, "longest": 60}, "winch.tension"),
         ({"winch": {"tension": 600.0, "inertia": 1.0, "max_rate": 0.0}, "longest": 60}, "winch.max_rate"),
         ({"winch": {"tension": 600.0, "inertia": 1.0, "speed": 1.0}, "longest": 60}, "winch.speed"),
@@ -180,6 +181,9 @@ def test_save_and_restore_take_the_winch_back() -> None:
 def test_a_winch_that_cannot_be_is_refused(payout: dict[str, Any], where: str) -> None:
     scene = vertical()
     scene["ends"]["end"]["payout"] = payout
+    if where == "clamped":
+        scene["ends"]["end"] |= {"kind": "clamped", "tangent": [0, 0, 1]}
+        where = "payout.winch"
     with pytest.raises(SceneError) as found:
         hybrid.run(scene)
     assert where in str(found.value)

@@ -1,0 +1,161 @@
+"""How long a line that is paid out is, and what its length makes of the cells that it changes (docs/theory.md, 19).
+
+symbol  meaning                                                    unit
+L       unstretched length that is out                             m
+c       its rate, positive where line is paid out                  m/s
+p       arc length of the last material node                       m
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.kernels.compile import inner
+from hybrid.kernels.reel import (
+    ACCELERATION,
+    ADDED_N,
+    ADDED_T,
+    BEND_1,
+    BUOY,
+    DAMP,
+    DIAMETER,
+    DISPLACED,
+    DRAG_N,
+    DRAG_T,
+    FADING,
+    KAPPA_1,
+    LENGTH,
+    MASS,
+    PER_LENGTH,
+    PLACE,
+    POLAR,
+    RATE,
+    ROTARY,
+    STRETCH,
+    TAU,
+    WEIGHT,
+)
+from hybrid.kernels.winch import (
+    LENGTH_NOW,
+    RATE_NOW,
+    TENSION,
+    TRUE_NOW,
+)
+
+
+@inner
+def length_at(law, t):
+    """L, c and the rate of c at t, just before it where the latter jumps."""
+    k = 0
+    while k + 1 < law.shape[0] and law[k + 1, 0] < t:
+        k += 1
+    x = max(t - law[k, 0], 0.0)
+    value, rate, twice = 0.0, 0.0, 0.0
+    for j in range(1, 8):
+        twice = twice * x + 2.0 * rate
+        rate = rate * x + value
+        value = value * x + law[k, j]
+    return value, rate, twice
+
+
+@inner
+def amount_between(pieces, begin, end, out):
+    """What the material between two arc lengths has of all that it has per length."""
+    for j in range(PER_LENGTH):
+        out[j] = 0.0
+    for k in range(pieces.shape[0]):
+        a = max(pieces[k, 0], begin) if k > 0 else begin
+        z = min(pieces[k + 1, 0], end) if k + 1 < pieces.shape[0] else end
+        if z > a:
+            for j in range(PER_LENGTH):
+                out[j] += (z - a) * pieces[k, 1 + j]
+
+
+@inner
+def growing(line, reel):
+    """The cell that grows; the nodes behind it ride with the fairlead."""
+    return line.h.shape[0] - reel.layer.shape[0]
+
+
+@inner
+def fill_node(line, i, first, q, share):
+    """Mass, loads and stiffness of node i between a cell that has `first` and one that has q; share: 1, or 0 of no cell."""
+    line.mass[i] = 0.5 * (first[MASS] + share * q[MASS]) + line.point_mass[i]
+    line.force[i, 2] = -0.5 * (first[WEIGHT] + share * q[WEIGHT])
+    line.damp[i] = 0.5 * (first[DAMP] + share * q[DAMP])
+    line.hn[i] = 0.5 * (first[PER_LENGTH] + share * q[PER_LENGTH])
+    if line.element[i]:
+        for k in range(3):
+            soft = first[BEND_1 + k] + share * q[BEND_1 + k]
+            line.kb[i, k] = 2.0 / soft if line.kb[i, k] > 0.0 else 0.0
+            line.k0[i, k] = 0.5 * (first[KAPPA_1 + k] + share * q[KAPPA_1 + k])
+
+
+@inner
+def fill_cells(line, reel):
+    """Mass, loads and stiffness of the cell that grows, of those behind it and of their nodes, for the length that is out."""
+    n, layer, before, q = line.h.shape[0], reel.layer, reel.amount[0], reel.amount[1]
+    length, begin, g = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0]
+    for j in range(1 + PER_LENGTH):
+        before[j] = reel.rest[j]
+    for c in range(g, n):
+        end = length - layer[c - g]
+        h = end - begin
+        amount_between(reel.pieces, begin, end, q)
+        q[PER_LENGTH], line.s[c + 1], reel.true[c] = h, end, h
+        fill_node(line, c, before, q, 1.0)
+        line.ck[c], line.tau[c], line.diameter[c] = q[STRETCH] / h, q[TAU] / h, q[DIAMETER] / h
+        line.drag_n[c], line.drag_t[c] = 0.5 * q[DRAG_N], 0.5 * q[DRAG_T]
+        line.added_n[c], line.added_t[c] = 0.5 * q[ADDED_N], 0.5 * q[ADDED_T]
+        line.buoy[c], line.displaced[c] = 0.5 * q[BUOY], 0.5 * q[DISPLACED]
+        line.rotary[c], line.polar[c] = q[ROTARY], q[POLAR]
+        for j in range(1 + PER_LENGTH):
+            before[j] = q[j]
+        begin = end
+    fill_node(line, n, before, q, 0.0)
+
+
+@inner
+def set_lengths(line, reel, t):
+    """Lengths of cells at t: those that are new are on their way to their true ones, by a quintic that ends at rest."""
+    for c in range(line.h.shape[0]):
+        line.h[c] = reel.true[c]
+        x = (t - reel.since[c]) / reel.span[c]
+        if x < 1.0:
+            x = max(x, 0.0)
+            value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
+            fading = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
+            line.h[c] -= reel.lack[c] * value + reel.span[c] * reel.rate[c] * fading
+
+
+@inner
+def find_length(reel, t):
+    """How long the line is at t, of what is prescribed, or of a winch before a step."""
+    numbers, winch = reel.numbers, reel.winch
+    if winch[TENSION] > 0.0:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = winch[LENGTH_NOW], winch[RATE_NOW], winch[TRUE_NOW]
+    else:
+        numbers[LENGTH], numbers[RATE], numbers[ACCELERATION] = length_at(reel.law, t)
+
+
+@inner
+def take_riding_off(line, reel):
+    """The forces on the line without those by which nodes that ride have more."""
+    if reel.stage[0] > 0.0:
+        first = growing(line, reel) + 1
+        for k in range(reel.layer.shape[0] - 1):
+            for j in range(3):
+                line.force[first + k, j] -= reel.riding[k, j]
+        reel.stage[0] = 0.0
+
+
+@inner
+def prepare(line, reel, t):
+    """The line with the length of now at t."""
+    numbers = reel.numbers
+    take_riding_off(line, reel)
+    fill_cells(line, reel)
+    for c in range(growing(line, reel), line.h.shape[0]):
+        line.h[c] = reel.true[c]
+    if numbers[FADING] > -np.inf:
+        set_lengths(line, reel, t)
