@@ -66,6 +66,7 @@ def files_of(system: System) -> dict[str, str]:
     """Digests of the files that motions and loads are read from, by path."""
     scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in system.lines]
     found = {path for scene in scenes for path in scene.ends.files()}
+    found |= set(system.environment.files())
     for body in system.bodies.values():
         if isinstance(body, FixedBody) and body.motion is not None:
             vessel = body.motion.vessel

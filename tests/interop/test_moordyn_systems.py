@@ -177,6 +177,39 @@ def test_a_free_body_has_its_mass_inertia_and_buoyancy(tmp_path: Path) -> None:
     assert [n.line for n in made.notes if "CdA" in n.why] == [10]
 
 
+SEAFLOOR = "3 2\n-900 0 900\n-800 800\n" + "".join(
+    f"{x} {y} {-220.0 - x / 900.0 + y / 400.0!r}\n" for y in (-800.0, 800.0) for x in (-900.0, 0.0, 900.0)
+)
+SEA = "bed.txt SeafloorFile\n200      WtrDpth"
+
+
+def test_a_seafloor_file_is_a_bed_of_depths(tmp_path: Path) -> None:
+    (tmp_path / "bed.txt").write_text(SEAFLOOR)
+    (tmp_path / "deck.txt").write_text(text_of("three_lines").replace("200      WtrDpth", SEA))
+    deck = import_moordyn(tmp_path / "deck.txt")
+    (made,) = deck.scenes.values()
+    bed = made.scene.environment.seabed
+    assert bed is not None and bed.depths is not None
+    assert bed.height(-400.0, 300.0) == pytest.approx(-220.0 + 4.0 / 9.0 + 0.75, abs=1e-9)
+    assert [n.kind for n in (*deck.notes, *made.notes) if "straight lines" in n.why] == ["taken as"]
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "words"),
+    [
+        ("3 2", "3 3", "rising"), ("-900 0", "900 0", "rising"), ("-900.0 -800.0", "-901.0 -800.0", "an x of line 2"),
+        ("0.0 800.0 ", "0.0 -800.0 ", "for each of the 3 x 2"), ("-221.0", "deep", "three numbers"),
+    ],
+)  # fmt: skip
+def test_a_seafloor_file_that_cannot_be_read_is_refused(tmp_path: Path, old: str, new: str, words: str) -> None:
+    assert old in SEAFLOOR
+    (tmp_path / "bed.txt").write_text(SEAFLOOR.replace(old, new, 1))
+    (tmp_path / "deck.txt").write_text(text_of("three_lines").replace("200      WtrDpth", SEA))
+    with pytest.raises(hybrid.SceneError) as refused:
+        import_moordyn(tmp_path / "deck.txt")
+    assert words in str(refused.value)
+
+
 @pytest.mark.parametrize("angles", [(30.0, 40.0, 50.0), (-8.0, 3.0, 170.0), (0.0, 90.0, 20.0)])
 def test_angles_of_a_deck_are_rotations_of_a_scene_and_back(angles: tuple[float, float, float]) -> None:
     for v in ((1.0, 2.0, 3.0), (-1.0, 0.0, 0.5)):

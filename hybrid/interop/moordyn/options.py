@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from hybrid.interop.moordyn.notes import LEFT_OUT, NOT_NEEDED, TAKEN, Note, note
 from hybrid.interop.moordyn.rows import Row, Source, number
+from hybrid.interop.moordyn.seafloor import Seafloor, read_seafloor
 from hybrid.scene.suggestions import nearest
 
 # What MoorDyn takes where a deck gives nothing: measured with MoorDyn 2.7 (bench/test_moordyn_measured.py).
@@ -45,12 +46,8 @@ _ELSEWHERE: dict[str, tuple[str, str]] = {
     "wavekin": ("waves of MoorDyn come from files or from the calling program", "give environment.fluid.waves"),
     "currents": ("currents of MoorDyn come from files", "give environment.fluid.current, a list of {z, velocity}"),
     "waterkin": ("waves and currents of MoorDyn-F come from a file", "give environment.fluid.waves and .current"),
-    "seafloorfile": (
-        "the bed of a scene is a plane, not a grid of depths",
-        "give environment.seabed.z and .slope as they are where the line lies",
-    ),
 }
-_NAMES = (*_FIELD, *_UNUSED, *_ELSEWHERE)
+_NAMES = (*_FIELD, *_UNUSED, *_ELSEWHERE, "seafloorfile")
 
 
 @dataclass
@@ -66,6 +63,7 @@ class Options:
     friction: float = 0.0
     friction_across: float = 0.0
     friction_along: float = 0.0
+    seafloor: Seafloor | None = None
 
 
 def read_options(source: Source, notes: list[Note]) -> Options:
@@ -83,6 +81,14 @@ def read_options(source: Source, notes: list[Note]) -> Options:
             _read(source, row, _FIELD[name], value, found, notes)
         elif name in _UNUSED:
             notes.append(note(NOT_NEEDED, row, *_UNUSED[name]))
+        elif name == "seafloorfile":
+            found.seafloor = read_seafloor(source, row, value)
+            if found.seafloor is not None:
+                why = "MoorDyn has straight lines between the depths, hybrid a smooth bed through them"
+                notes.append(note(TAKEN, row, why, "a finer grid makes both alike"))
+            elif not source.complaints:
+                fix = "put the file there, or give environment.seabed.depths"
+                notes.append(note(LEFT_OUT, row, "the depths are in a file that is not beside the deck", fix))
         elif name in _ELSEWHERE:
             if number(value) != 0.0 and value:
                 notes.append(note(LEFT_OUT, row, *_ELSEWHERE[name]))
@@ -95,8 +101,8 @@ def read_options(source: Source, notes: list[Note]) -> Options:
 
 def _read(source: Source, row: Row, field: str, value: str, found: Options, notes: list[Note]) -> None:
     if field == "depth" and number(value) is None and any(c.isalpha() for c in value) and value.lower() != "nan":
-        why = "the depth is read from a file; the bed of a scene is a plane"
-        notes.append(note(LEFT_OUT, row, why, "give environment.seabed.z and .slope as they are where the line lies"))
+        why = "the depth is read from a file of MoorDyn-F"
+        notes.append(note(LEFT_OUT, row, why, "give environment.seabed.depths, as a CSV file with columns x,y,depth"))
         return
     if field in found.rows:
         first = found.rows[field].line

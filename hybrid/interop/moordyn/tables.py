@@ -54,14 +54,18 @@ class Tables:
             row = options.rows["bed_stiffness"]
             self.notes.append(note(TAKEN, row, "a bed without stiffness does nothing; the scene has none"))
             return ""
-        z = self._bottom()
-        bed: dict[str, Any] = {"z": z, "stiffness": options.bed_stiffness * width}
+        uneven = options.seafloor
+        bed: dict[str, Any] = {"z": self._bottom() if uneven is None else 0.0}
+        if uneven is not None:
+            bed["depths"] = {"x": uneven.x, "y": uneven.y, "depth": uneven.depth}
+        bed["stiffness"] = options.bed_stiffness * width
         if options.bed_damping:
             bed["damping"] = options.bed_damping * width
         along, across = (x or options.friction for x in (options.friction_along, options.friction_across))
         if along or across:
             bed["friction"] = {"axial": along, "lateral": across}
-        places = [options.rows[key].line for key in ("depth", "bed_stiffness", "bed_damping") if key in options.rows]
+        places = [uneven.row.line] if uneven is not None else []
+        places += [options.rows[key].line for key in ("depth", "bed_stiffness", "bed_damping") if key in options.rows]
         return f"  seabed: {flow(bed)}{lines_of(places)}"
 
     def _width(self) -> float:
