@@ -64,6 +64,7 @@ def test_cells_that_follow(name: str) -> None:
     """Position and pull are errors over the length and the mean; the field of curvature is over its largest."""
     scene, length, fine, uniform, base = CASES[name]
     hybrid.run(scene("rod", 100))
+    hybrid.run(scene({"kind": "adaptive", "curvature_error": 0.05}, base))  # compiles
     truth = hybrid.run(scene("rod", fine))
 
     def show(title: str, of: hybrid.Scene) -> None:
@@ -85,4 +86,5 @@ def test_cells_that_follow(name: str) -> None:
     following = {"kind": "adaptive", "force_rod": [[0, length]]}
     for error in (0.05, 0.03):
         show(f"rods that follow, {error}", scene(following | {"curvature_error": error}, base))
-    show("kinds and cells, 0.05", scene({"kind": "adaptive", "curvature_error": 0.05}, base))
+    for error in (0.05, 0.03):
+        show(f"kinds and cells, {error}", scene({"kind": "adaptive", "curvature_error": error}, base))
