@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+import hybrid
 from hybrid.store.hockling import formation_tension, kink_torque, pop_out, strand_distance
 
 
@@ -82,3 +83,25 @@ def test_nothing_to_say() -> None:
     np.testing.assert_allclose(
         formation_tension(np.array([2.0, -2.0, 1.0]), np.array([1.0, 1.0, 0.0])), [1.0, 1.0, 0.0]
     )
+
+
+def test_the_plan_names_the_torque_from_which_a_hanging_line_can_throw_a_loop() -> None:
+    """2 sqrt(EI H) of an inextensible catenary in its lowest cell; H from its equation alone."""
+    length, span, weight, EI = 60.0, 50.0, 2.0 * 9.81, 10.0
+    a, b = 0.1, 1e3  # m, H/w between them: the arc 2 c sinh(span/(2 c)) has the length of the line
+    for _ in range(200):
+        c = 0.5 * (a + b)
+        a, b = (c, b) if 2.0 * c * np.sinh(min(span / (2.0 * c), 300.0)) > length else (a, c)
+    section = {"length": length, "mass": 2.0, "diameter": 0.02, "bending_stiffness": EI, "torsional_stiffness": 8.0}
+    clamp = {"kind": "clamped", "tangent": [1.0, 0.0, -1.0], "position": [0.0] * 3, "normal": [0.0, 1.0, 0.0]}
+    end = {"kind": "clamped", "tangent": [1.0, 0.0, 1.0], "position": [span, 0.0, 0.0], "normal": [0.0, 1.0, 0.0]}
+    scene = {
+        "cable": {"sections": [section]}, "ends": {"start": clamp, "end": end}, "initial": "equilibrium",
+        "model": "rod", "mesh": {"cells": 200}, "time": {"duration": 1.0, "step": 0.02},
+    }  # fmt: skip
+    critical = hybrid.plan(hybrid.validate_scene(scene)).critical_torque
+    assert critical is not None
+    assert critical.torque == pytest.approx(2.0 * np.sqrt(EI * c * weight), rel=1e-3)
+    assert critical.s == pytest.approx(0.5 * length, abs=length / 200)
+    scene["cable"]["attachments"] = [{"kind": "swivel", "at": 10.0}]  # there is no torque
+    assert hybrid.plan(hybrid.validate_scene(scene)).critical_torque is None
