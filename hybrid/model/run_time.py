@@ -21,9 +21,9 @@ MORE = {
     FRICTION: (0.01e-6, 0.005e-6),
 }  # fmt: skip
 # s per node, step and wave: sines and exponentials.
-COST_WAVE = 30e-9
+COST_WAVE = 10e-9
 # s of a run, a step, a step of zones that move, an output.
-COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 60e-6, 0.1e-3
+COST_RUN, COST_STEP, COST_MANAGER, COST_OUTPUT = 0.02, 12e-6, 40e-6, 0.1e-3
 USUAL_ITERATIONS = 2.1
 # Part of a line of moving zones that is rod, on average over scenes, which differ from none to all.
 ROD_SHARE = 0.38
