@@ -43,7 +43,12 @@ def _moved(console: Console, asked: System, target: Path, plot: bool, compute: C
         result = compute(progress=tell)
     wall = clock.perf_counter() - begin
     steps = len(result.lines[next(iter(result.lines))]["steps/t"])
-    text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time; error not estimated"
+    text = f"{asked.require_time().duration:.6g} s in {steps} steps, {span(wall)} of wall time"
+    if "error_total_position" in result.attributes:
+        position, force = (float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force"))
+        text += f"; estimated error {position:.2g} m, {force:.2g} N at the ends"
+    else:
+        text += "; error not estimated"
     _ended(console, result, target, plot, text, steps=steps, wall=wall)
 
 

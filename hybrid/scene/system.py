@@ -15,7 +15,7 @@ from pydantic import Field, ValidationError, model_validator
 from hybrid.errors import SceneError
 from hybrid.scene.analysis import CatenaryModel, Equilibrium, Mesh, Model, RodModel, Time, ZonesModel
 from hybrid.scene.attachments import Attachment
-from hybrid.scene.base import Finding, Place, Positive, Table, Text, Whole, refuse
+from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
 from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody
 from hybrid.scene.cable import Cable, Environment, Section
 from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
@@ -84,6 +84,10 @@ class SystemOutput(Table):
     )
     points: Annotated[Whole, Field(ge=2)] = Field(
         default=101, description="points along each line, evenly over its length, its ends included [-]"
+    )
+    errors: Truth | None = Field(
+        default=None,
+        description="estimate how wrong a motion is, by mesh and time step, by two coarser runs; absent: not",
     )
 
 

@@ -205,6 +205,13 @@ def _move_lines(
     duration = system.require_time().duration
     with _interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
         run_system(system, target, scene_text(system), reporter, stopped, source)
+        if system.output.errors:
+            from hybrid.simulation.system_errors import write_system_errors
+
+            def compare(other: System, memory: io.BytesIO) -> None:
+                run_system(other, memory, scene_text(other), reporter, stopped, name=ESTIMATION)
+
+            write_system_errors(system, target, compare)
 
 
 def _compute(

@@ -370,11 +370,11 @@ class SystemRun:
 
 def run_system(
     system: System, target: Path | io.BytesIO, text: str, reporter: ProgressReporter, interrupted: Callable[[], bool],
-    source: Path | None = None,
+    source: Path | None = None, name: str = RESULT,
 ) -> None:  # fmt: skip
-    """Compute the motion of a system into a file or into memory; source: the result to go on with."""
+    """Compute the motion of a system into a file or into memory; source: what to go on with; name: of the pass."""
     run = SystemRun(system, target, text, moves=True, kept=True, source=source)
-    reporter.begin(RESULT, first_resolution(run.scenes[0]))
+    reporter.begin(name, first_resolution(run.scenes[0]))
     run.record_motion(reporter, interrupted)
 
 

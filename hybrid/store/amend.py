@@ -16,6 +16,7 @@ from hybrid.store.checkpoint import BEFORE
 from hybrid.store.format import EVENTS, Field, annotate, attach_scales, checked, plain_text
 from hybrid.store.hdf5_file import beside, in_memory, redrafted, unwritable
 from hybrid.store.integrity import copy_unsigned, sign
+from hybrid.store.lines import GROUP
 from hybrid.store.table import NUMBERS, Table, write_rows
 
 # Name of a quantity, number of its first output, and values; attributes, and events (kind, text).
@@ -46,6 +47,28 @@ def amend(
     change_complete(target, add)
 
 
+def amend_lines(
+    target: Path | io.BytesIO,
+    fields: Mapping[str, Sequence[Field]],
+    values: Mapping[str, Mapping[str, np.ndarray]],
+    attributes: Mapping[str, Mapping[str, str | float | int]],
+    of_all: Mapping[str, str | float | int],
+    events: Sequence[tuple[str, str]],
+) -> None:
+    """Add to a complete result of several lines what is known of each only afterwards.
+
+    fields, values, attributes: by the name of the line, as of `amend`; of_all: attributes of the system; events: of it.
+    """
+
+    def add(file: h5py.File) -> None:
+        for name, each in fields.items():
+            blocks = [(field.name, 0, values[name][field.name]) for field in each]
+            _add(file[f"{GROUP}/{name}"], each, blocks, lambda _, name=name: (attributes[name], ()))  # type: ignore[misc]
+        _add(file, (), (), lambda _: (of_all, events))
+
+    change_complete(target, add)
+
+
 def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], None]) -> None:
     """Change a complete result, in a copy that takes its place; ResultError where it cannot be written."""
     if isinstance(target, io.BytesIO):
@@ -72,7 +95,7 @@ def change_complete(target: Path | io.BytesIO, change: Callable[[h5py.File], Non
 
 
 def _add(
-    file: h5py.File, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
+    file: h5py.Group, fields: Sequence[Field], blocks: Iterable[Block], others: Callable[[Happened], Others]
 ) -> None:
     count, named, scales = len(file["t"]), {field.name: field for field in fields}, dict[str, h5d.DatasetID]()
     with_groups = h5p.create(h5p.LINK_CREATE)

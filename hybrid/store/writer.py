@@ -152,7 +152,7 @@ class Recorder:
                 if parts:
                     file.require_group(GROUP).attrs["order"] = list(parts)
                 for name in parts or {}:
-                    copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows))
+                    copied(groups[name], file.create_group(f"{GROUP}/{name}"), of_part(name, at.rows), {"errors"})
                 for each in (file, *(file[f"{GROUP}/{name}"] for name in parts or {})):
                     set_status(each, "running", "")
                     for name in [x for x in each.attrs if x.startswith(AFTERWARDS)]:

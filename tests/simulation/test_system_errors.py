@@ -1,0 +1,87 @@
+"""Error figures of several lines: held against runs that are four times as fine."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import ComputationError
+from hybrid.simulation import system_errors
+
+LEG = {"length": 140, "mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "drag": {"normal": 1.2}}
+HOSE = {"length": 100, "mass": 6, "diameter": 0.08, "axial_stiffness": 5e6, "bending_stiffness": 3000}
+
+
+def mooring(cells: int = 20, step: float = 0.1, **output: Any) -> dict[str, Any]:
+    """Two legs to a float and a hose from there to a vessel that heaves; the hose has a clump on it."""
+    heave = {"heave": {"amplitude": 0.5, "period": 8}, "ramp": 8}
+    clump = [{"kind": "clump", "at": 37.0, "mass": 20.0}]
+    return {
+        "environment": {"fluid": {"density": 1025, "current": [0.4, 0.1, 0]}},
+        "points": {
+            "west": {"position": [-110, 0, -100]}, "east": {"position": [110, 10, -100]},
+            "float": {"kind": "free", "initial_guess": [0, 0, -20], "mass": 900, "volume": 2, "drag_area": 3},
+            "vessel": {"position": [70, 0, 2], "motion": heave},
+        },
+        "lines": {
+            "west": {"start": "west", "end": "float", "sections": [LEG], "mesh": {"cells": cells}},
+            "east": {"start": "float", "end": "east", "sections": [LEG], "mesh": {"cells": cells}},
+            "hose": {"start": "float", "end": "vessel", "mesh": {"cells": 2 * cells}, "sections": [HOSE],
+                     "attachments": clump},
+        },
+        "time": {"duration": 8.0, "step": step}, "output": {"every": 0.4, "points": 11} | output,
+    }  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def result(tmp_path_factory: pytest.TempPathFactory) -> hybrid.Result:
+    path = tmp_path_factory.mktemp("errors") / "run.h5"
+    hybrid.run(mooring(errors=True), path).close()
+    return hybrid.open(path)
+
+
+def test_figures_are_near_the_truth(result: hybrid.Result) -> None:
+    truth = hybrid.run(mooring(80, 0.025))
+    for name, line in result.lines.items():
+        fine = truth.lines[name]
+        assert np.allclose(line.times, fine.times)
+        wrong = np.linalg.norm(line.position - fine.position, axis=2).max()
+        assert 0.5 < line["errors/total/position"].max() / wrong < 6.0, name
+        for end in ("start", "end"):
+            off = np.linalg.norm(line[f"reaction_{end}"] - fine[f"reaction_{end}"], axis=1).max()
+            assert 0.5 < line[f"errors/total/end_force_{end}"].max() / off < 6.0, (name, end)
+        assert line.attributes["error_total_position"] == line["errors/total/position"].max()
+    largest = max(x.attributes["error_total_end_force"] for x in result.lines.values())
+    assert result.attributes["error_total_end_force"] == largest
+    assert result.lines["hose"].dims("errors/mesh/bending_moment") == ("t", "s")
+
+
+def test_coarser_cells_keep_what_is_fixed() -> None:
+    system = hybrid.System.model_validate(mooring())
+    other = system_errors.coarser(system)
+    nodes = other.lines["hose"].mesh.nodes
+    assert 37.0 in np.round(nodes, 9) and len(nodes) <= 23 and (nodes[0], nodes[-1]) == (0.0, 100.0)
+    assert len(other.lines["west"].mesh.nodes) == 11
+
+
+def test_a_longer_run_has_figures_of_all_of_it(result: hybrid.Result, tmp_path: Path) -> None:
+    assert result.file is not None
+    more = hybrid.resume(result.file, tmp_path / "more.h5", until=12.0)
+    line = more.lines["hose"]
+    assert line["errors/total/tension"].shape == line.tension.shape == (31, 12)
+    first = result.lines["hose"]["errors/total/tension"]
+    assert np.allclose(line["errors/total/tension"][:20], first[:20], rtol=0.3, atol=0.2 * first.max())
+
+
+def test_where_a_coarser_run_fails_an_event_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
+    def fails(system: hybrid.System) -> hybrid.System:
+        raise ComputationError(hybrid.errors.Outcome.SLACK, 1.0, 0.0)
+
+    monkeypatch.setattr(system_errors, "longer_steps", fails)
+    found = hybrid.run(mooring(errors=True) | {"time": {"duration": 1.0, "step": 0.1}})
+    assert [e.kind for e in found.events].count("no error figure") == 1
+    assert found.status == "complete" and "error_total_position" not in found.attributes
