@@ -69,14 +69,23 @@ def plot(
 
 @app.command()
 def report(
-    result: Annotated[Path, typer.Argument(metavar="RUN.h5", help="The result to report.", show_default=False)],
+    result: Annotated[
+        Path, typer.Argument(metavar="RUN.h5", help="The result to report, or STUDY.zarr.", show_default=False)
+    ],
     output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
     line: LineName = None,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Write one HTML file that explains a result: what to know first, moving pictures, events, energy, the scene."""
+    """Write one HTML file that explains a result: what to know first, moving pictures, events; or one of a study."""
+    if result.is_dir():
+        with session(as_json, quiet) as console:
+            from hybrid.view.study_report import write_study_report
+
+            page = write_study_report(result, output or result.with_suffix(".html"), overwrite=overwrite)
+            console.done(f"{page.stat().st_size / 1e6:.1f} MB", page, size=page.stat().st_size)
+        return
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
         from hybrid.view.summary import facts_of
 

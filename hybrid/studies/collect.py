@@ -31,10 +31,11 @@ OF_SUMMARY = {
     "period": ("crossing_period", "s"), "significant": ("significant_range", None),
 }  # fmt: skip
 WORDS = {
-    "max": "largest", "min": "smallest", "mean": "mean", "deviation": "standard deviation", "skewness": "skewness",
-    "period": "period between up-crossings of the mean", "significant": "significant range",
-    "extreme": "most probable largest in", "fractile": "90 % fractile of the largest in", "damage": "fatigue damage",
-    "history": "history", "profile": "largest at each place",
+    "max": "largest", "min": "smallest", "mean": "mean of", "deviation": "standard deviation of",
+    "skewness": "skewness of", "period": "period between up-crossings of the mean of",
+    "significant": "significant range of", "extreme": "most probable largest",
+    "fractile": "90 % fractile of the largest", "damage": "fatigue damage", "history": "history",
+    "profile": "largest at each place",
 }  # fmt: skip
 
 

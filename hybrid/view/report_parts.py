@@ -28,26 +28,29 @@ _SETTINGS = {
 
 def filled_page(parts: dict[str, str], store: Store) -> str:
     """The page of these parts, with its numbers, scripts and styles."""
-    more = {"data": _packed(store.block), "plotly": _packed(_plotly().encode())}
-    return _filled("report.html", parts | more | {"css": _file("report.css"), "js": _file("report.js")})
+    more = {"data": packed(store.block), "plotly": packed(plotly_script().encode())}
+    return filled("report.html", parts | more | {"css": page_file("report.css"), "js": page_file("report.js")})
 
 
-def _file(name: str) -> str:
+def page_file(name: str) -> str:
+    """A file of the folder page."""
     return (files("hybrid.view") / "page" / name).read_text(encoding="utf-8")
 
 
-def _filled(name: str, parts: dict[str, str]) -> str:
+def filled(name: str, parts: dict[str, str]) -> str:
     """A template with its parts, put in in one pass: nothing that is put in is looked at again."""
-    return re.sub(r"\{\{(\w+)\}\}", lambda m: parts[m[1]], _file(name))
+    return re.sub(r"\{\{(\w+)\}\}", lambda m: parts[m[1]], page_file(name))
 
 
-def _plotly() -> str:
+def plotly_script() -> str:
+    """plotly.js."""
     from plotly.offline import get_plotlyjs
 
     return get_plotlyjs()
 
 
-def _packed(data: bytes) -> str:
+def packed(data: bytes) -> str:
+    """Bytes with gzip, as text of base 64."""
     return b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
@@ -127,11 +130,11 @@ def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str) -> 
     parts = {
         "colours": "".join(buttons),
         "poster": poster.replace("<svg ", '<svg class="poster" ', 1),
-        "time": _filled("time.html", {"speeds": "".join(options)}) if moves else "",
+        "time": filled("time.html", {"speeds": "".join(options)}) if moves else "",
         "static": "" if moves else "; a static result",
         "notice": f'<p class="quiet" id="thinned">{escape(notice)}</p>' if notice else "",
     }
-    return _filled("cable.html", parts)
+    return filled("cable.html", parts)
 
 
 def figure_html(k: int, panel: Panel) -> str:
