@@ -205,10 +205,11 @@ class Recorder:
         """Write results that were begun in memory into groups of this file."""
         self._parts = dict(parts)
         for name, part in parts.items():
-            part._file.close()
+            before = part._file
             part._owner, part._memory, part._file = self, None, self._file[f"{GROUP}/{name}"]
             for table in part._all:
                 table.move(part._file)
+            before.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines squared
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
