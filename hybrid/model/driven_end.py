@@ -54,6 +54,11 @@ class DrivenEnd:
         rate = change + (1.0 - x) * (1.0 - 3.0 * x) * a + x * (2.0 - 3.0 * x) * b
         return value, rate / dt, turned, spin
 
+    def stand(self, position: Floats) -> None:
+        """Rest at a place (3,) m, in the frame of the path's begin."""
+        self.path[FROM:FRAME] = self.path[TURN:PATH] = 0.0
+        self.path[AT:SPEED] = self.path[THERE:SPEED_THERE] = position
+
     def turn_from(self, frame: Floats) -> None:
         """Stand in another frame (3, 3)."""
         self.path[FRAME:TURN], self.path[TURN:PATH] = np.ravel(frame), 0.0

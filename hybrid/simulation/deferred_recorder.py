@@ -33,6 +33,10 @@ class DeferredRecorder:
         self._waiting.append(("save_batch", (times, values, zones), {}))
         self.last = float(times[-1])
 
+    def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
+        """An output at t (s), as of `Recorder.save`."""
+        self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
+
     def log_rows(self, rows: np.ndarray) -> None:
         """Steps, as of `Recorder.log_rows`."""
         self._waiting.append(("log_rows", (rows,), {}))
@@ -45,7 +49,22 @@ class DeferredRecorder:
         """Values as of `Recorder.replace`, of which the last count."""
         self._recorder.replace(values)
 
+    @property
+    def due(self) -> bool:
+        """As of `Recorder.due`."""
+        return self._recorder.due
+
+    def flush(self) -> None:
+        """Hand on all that waits, and write it."""
+        self.commit()
+        self._recorder.flush()
+
     # --- what a Simulation asks of it -----------------------------------------------------------
+
+    @property
+    def full(self) -> bool:
+        """Whether too much waits."""
+        return len(self._waiting) > MOST_WAITING
 
     def mark(self) -> int:
         """A place to come back to."""
@@ -70,12 +89,13 @@ class DeferredRecorder:
 
     def commit_old(self) -> None:
         """Hand on what waits where nothing was marked, or too much waits."""
-        if not self._marked or len(self._waiting) > MOST_WAITING:
+        if not self._marked or self.full:
             self.commit()
             if self._unseen and self._recorder.due:
                 self._recorder.flush()
                 self._unseen = False
 
     def close(self, status: str, message: str) -> None:
-        """Close the file."""
+        """Hand on all that waits, and close the file."""
+        self.commit()
         self._recorder.close(status, message)

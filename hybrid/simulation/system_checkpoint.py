@@ -47,6 +47,11 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         raise ValueError("dry: names of bodies were expected")
     if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
         raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
+    set_state(run, found)
+
+
+def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
+    """Be as when `checkpoint` was called, of a run with the same things broken, without a look at its form."""
     run.t, run.steps, run.last_step, run.loaded = found["t"], found["steps"], found["last"], found["loaded"]
     run.leg, run.dry, run.cpu = (found["leg"][0], found["leg"][1]), set(found["dry"]), found["cpu"]
     run.state.bodies[:], run.solver.body_work[:] = found["bodies"], found["body_work"]

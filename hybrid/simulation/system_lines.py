@@ -20,6 +20,7 @@ from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
+from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.diagnostics import REMEMBERED, Diagnostics, stretch_text
 from hybrid.simulation.envelope import Envelope, marks_of
 from hybrid.simulation.events import EventLog
@@ -57,7 +58,7 @@ class LineResult:
         )  # fmt: skip
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
-        self.recorder: Recorder = result_recorder(
+        self.recorder: Recorder | DeferredRecorder = result_recorder(
             scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
         self.books = self._own_books(state)
@@ -136,6 +137,14 @@ class LineResult:
         if stop is not None:
             detail = stretch_text(self.model, state) if stretched else ""
             raise LineFailed(self.number, stop[0], t, float(self.model.line.s[stop[1]]), detail)
+
+    def waiting(self) -> tuple[list[Batch], list[tuple[float, ...]], float | None]:
+        """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""
+        return [*self._waiting], [*self._log], self.observer.first_energy
+
+    def wait_again(self, kept: tuple[list[Batch], list[tuple[float, ...]], float | None]) -> None:
+        """Let that wait which `waiting` has returned, and nothing else."""
+        self._waiting, self._log, self.observer.first_energy = [*kept[0]], [*kept[1]], kept[2]
 
     # --- the file -----------------------------------------------------------------------------------
 

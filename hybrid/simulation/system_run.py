@@ -21,6 +21,7 @@ from hybrid.model.resolution import first_resolution
 from hybrid.model.system import build_system
 from hybrid.scene.points import Fairlead
 from hybrid.scene.system import System
+from hybrid.simulation.deferred_recorder import DeferredRecorder
 from hybrid.simulation.progress import RESULT, ProgressReporter
 from hybrid.simulation.restore import refused
 from hybrid.simulation.system_checkpoint import check_files, content, files_of, other_program, restore
@@ -80,7 +81,7 @@ class SystemRun:
         self._between = False  # whether the state is that between two steps
         self._begin = clock.process_time()
         if source is None:
-            self.recorder = self._new_recorder(text)
+            self.recorder: Recorder | DeferredRecorder = self._new_recorder(text)
         else:
             self.recorder = self._go_on(source, text)
 
@@ -88,7 +89,7 @@ class SystemRun:
 
     @property
     def _parts(self) -> dict[str, Recorder]:
-        return {line.name: line.recorder for line in self.lines}
+        return {line.name: line.recorder for line in self.lines if isinstance(line.recorder, Recorder)}
 
     def _new_recorder(self, text: str) -> Recorder:
         """The result of the points and bodies, with those of the lines in it."""
@@ -140,14 +141,14 @@ class SystemRun:
         for line in self.lines:
             line.write_down()
             line.write_envelope(self.t)
-        self._gather_events()
-        if new:
+        self.gather_events()
+        if new and isinstance(self.recorder, Recorder):
             self.cpu, self._checked = clock.process_time() - self._begin, self.steps
             self.recorder.checkpoint(lambda: content(self))
         if not last:
             self.recorder.flush()
 
-    def _gather_events(self) -> None:
+    def gather_events(self) -> None:
         """Record the events of the lines, in the result of the system with their names."""
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.take_events():
@@ -177,7 +178,7 @@ class SystemRun:
 
     def _close(self, status: str, message: str) -> None:
         """Close all, with the events of the lines in the result of the points too."""
-        self._gather_events()
+        self.gather_events()
         for line in self.lines:
             for t, s_a, s_b, kind, text in line.close(self.t, status, message):
                 self.recorder.event(t, s_a, s_b, kind, f"line {line.name}: {text}")
@@ -240,7 +241,7 @@ class SystemRun:
             line.note_equilibrium(x, state, 0.0)
             line.diagnostics.scheme(time.rho_inf)
         self._output(self.solver)
-        self._gather_events()
+        self.gather_events()
         self._other, self._between = self.state.copy(), True
         self.keep()
 

@@ -22,6 +22,8 @@ from hybrid.scene.schema import missing_time
 from hybrid.scene.system import System
 from hybrid.simulation.stepped import CableState, one_thread, vector
 from hybrid.simulation.system_run import SystemRun
+from hybrid.simulation.system_saving import SavedSystem, bring_back, commit, defer, kept, recorders
+from hybrid.simulation.system_start import named
 from hybrid.solve.system_statics import LineFailed
 from hybrid.store.hdf5_file import check_target
 from hybrid.store.lock import locked
@@ -74,6 +76,8 @@ class SystemSimulation:
         self._stops = self._run.stops()
         self._driven: dict[str, list[DrivenEnd]] = {}
         self._next: dict[str, tuple[Floats, Floats]] = {}
+        self._owner, self._final = object(), 0  # how often what had been recorded was made final
+        self._here: SavedSystem | None = None  # what was saved of the state as it is now
 
     @property
     def t(self) -> float:
@@ -108,8 +112,9 @@ class SystemSimulation:
     def advance(self, until: float) -> float:
         """Steps to a time `until` (s), where one ends; returns it.
 
-        ValueError: a time that has passed, or beyond the duration.  ComputationError: a step failed; the simulation is
-        over then, and its result is written.
+        ValueError: a time that has passed, or beyond the duration.  ComputationError: a step failed.  Once `save` has
+        been called, the simulation is then back at the time from which it was to advance, with all points at rest that
+        are not set again, and can go on in a shorter step; else it is over, and its result is written.
         """
         self._check_open()
         time, now = self.scene.require_time(), self.t
@@ -120,6 +125,7 @@ class SystemSimulation:
                 f"until = {until!r:.60}: expected a time (s) after {now:.9g}, up to time.duration, {time.duration:g}"
             )
         until = min(float(until), time.duration)
+        before = self._before() if self._final else None
         for name, ends in self._driven.items():
             position, velocity = self._next.pop(name, (ends[0].at(now)[0], STILL))
             for end in ends:
@@ -131,8 +137,88 @@ class SystemSimulation:
                 self._stops.pop(0)
             self._run.go_to(until)
         except LineFailed as failed:
-            raise self._fail(failed) from None
+            raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
         return self.t
+
+    # --- back and forth ---------------------------------------------------------------------------
+
+    @one_thread
+    def save(self) -> Any:
+        """The state as it is, in memory, to come back to: for the iterations of an implicit coupling.
+
+        What has been computed until now is final; what follows is when the next `save` is made.  ComputationError:
+        what has been computed until now is not sound; the simulation is over, and its result is written.
+        """
+        self._check_open()
+        defer(self._run)
+        self._commit()
+        self._here = self._kept()
+        return self._here
+
+    @one_thread
+    def restore(self, saved: Any) -> None:
+        """Back to what `save` returned, as often as wanted; what was computed since leaves no output and no event.
+
+        ValueError: another SystemSimulation has returned it, or what came after it is final: a later `save` was made,
+        or more than 1000 outputs or events came since.
+        """
+        self._check_open()
+        if not isinstance(saved, SavedSystem) or saved.owner is not self._owner:
+            raise ValueError("restore: expected what save() of this SystemSimulation has returned")
+        if saved.number < self._final:
+            raise ValueError("a later save() has made final what came after this one, or too much came after it")
+        self._bring_back(saved)
+
+    def _commit(self) -> None:
+        try:
+            commit(self._run)
+        except LineFailed as failed:
+            raise self._fail(failed) from None
+        self._final, self._here = self._final + 1, None
+
+    def _kept(self) -> SavedSystem:
+        paths = {name: [end.path.copy() for end in ends] for name, ends in self._driven.items()}
+        return SavedSystem(
+            self._owner, self._final, stops=tuple(self._stops), paths=paths, next=dict(self._next), **kept(self._run)
+        )
+
+    def _before(self) -> SavedSystem:
+        """What a step that fails goes back to."""
+        if any(recorder.full for recorder in recorders(self._run)):
+            self._commit()
+        before, self._here = self._here or self._kept(), None
+        return before
+
+    def _bring_back(self, saved: SavedSystem) -> None:
+        for name, ends in self._driven.items():
+            if name not in saved.paths:  # it has been set since, for the first time
+                for driven, (line, end) in zip(ends, self.scene.lines_at(name), strict=True):
+                    driven.stand(saved.place(line, end))
+        self._driven = {name: self._driven[name] for name in saved.paths}
+        self._follow(saved.paths)
+        bring_back(self._run, saved)
+        self._follow(saved.paths)  # with the frames of then
+        for model in self._run.model.models:
+            model.ends.at(self.t)
+        self._stops, self._next, self._here = [*saved.stops], dict(saved.next), saved
+
+    def _follow(self, paths: Mapping[str, list[Floats]]) -> None:
+        """Let points that are set from outside be on these paths."""
+        for name, rows in paths.items():
+            for end, path in zip(self._driven[name], rows, strict=True):
+                end.path[:] = path
+
+    def _undo(self, failed: LineFailed, before: SavedSystem) -> ComputationError:
+        """Be back where the step began that has failed."""
+        error = named(failed, self._run.model)
+        self._bring_back(before)
+        self._next.clear()
+        return ComputationError(
+            error.outcome, error.t, error.s, f"{error.detail}; the simulation is back at t = {self.t:.6g} s",
+            first="set the points again and advance in a shorter step",
+        )  # fmt: skip
+
+    # --- what it is now ---------------------------------------------------------------------------
 
     def _fail(self, failed: LineFailed) -> ComputationError:
         self._closed = True

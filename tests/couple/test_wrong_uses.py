@@ -54,6 +54,7 @@ def system() -> hybrid.SystemSimulation:
 def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
     for x in NO_TIMES:
         yield lambda x=x: s.advance(x)
+        yield lambda x=x: s.restore(x)
     for x in NO_NAMES:
         yield lambda x=x: s.set_point(x, PLACE)
         yield lambda x=x: s.point(x)

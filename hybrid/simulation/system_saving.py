@@ -1,0 +1,99 @@
+"""Several lines in motion kept in memory, to come back to: for steps that are computed several times over."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+from hybrid.model.system import SystemModel
+from hybrid.simulation.deferred_recorder import DeferredRecorder
+from hybrid.simulation.system_checkpoint import checkpoint, set_state
+from hybrid.simulation.system_run import SystemRun
+
+
+class SavedSystem(NamedTuple):
+    """What `SystemSimulation.save` returns."""
+
+    owner: object  # what tells one simulation from another
+    number: int  # of the state that was final then
+    run: Mapping[str, Any]  # arrays and plain values, as of a checkpoint
+    model: SystemModel  # with what had broken by then
+    waiting: tuple[Any, ...]  # rows of each line that are not recorded yet
+    marks: tuple[int, ...]  # of the recorders
+    stops: tuple[float, ...]  # s, that are still to come
+    paths: Mapping[str, list[Floats]]  # of points that are set from outside, for each end there
+    next: Mapping[str, tuple[Floats, Floats]]  # where points are to be at the end of the next step
+
+    def place(self, line: str, end: str) -> Floats:
+        """Position (3,) m of a held end."""
+        return np.asarray(self.run["lines"][line]["ends"]["position"][int(end == "end")])
+
+
+def defer(run: SystemRun) -> None:
+    """From now on, what is recorded can be taken back."""
+    if isinstance(run.recorder, DeferredRecorder):
+        return
+    run.recorder = DeferredRecorder(run.recorder)
+    for line in run.lines:
+        assert not isinstance(line.recorder, DeferredRecorder)
+        line.recorder = DeferredRecorder(line.recorder)
+
+
+def recorders(run: SystemRun) -> list[DeferredRecorder]:
+    """Those of the system and of its lines, once they are deferred."""
+    return [x for x in (run.recorder, *(line.recorder for line in run.lines)) if isinstance(x, DeferredRecorder)]
+
+
+def commit(run: SystemRun) -> None:
+    """What has been recorded until now is final; it is written where that is due.
+
+    LineFailed where an output says that going on would make no sense.
+    """
+    due = run.recorder.due
+    if due:
+        for line in run.lines:
+            line.write_down()
+            line.write_envelope(run.t)
+    run.gather_events()
+    for recorder in recorders(run):
+        recorder.commit()
+    if due:
+        run.recorder.flush()
+
+
+def kept(run: SystemRun) -> dict[str, Any]:
+    """What a run depends on, in copies: fields of `SavedSystem`."""
+    run.gather_events()
+    return {
+        "run": copied(checkpoint(run)), "model": run.model, "waiting": tuple(line.waiting() for line in run.lines),
+        "marks": tuple(recorder.mark() for recorder in recorders(run)),
+    }  # fmt: skip
+
+
+def bring_back(run: SystemRun, saved: SavedSystem) -> None:
+    """Be as when `kept` was called; ends that are set from outside must be on their paths of then."""
+    run.gather_events()
+    for recorder, mark in zip(recorders(run), saved.marks, strict=True):
+        recorder.back_to(mark)
+    if run.model is not saved.model:  # something has broken since
+        run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
+        run.make_solver()
+    set_state(run, saved.run)
+    for line, rows in zip(run.lines, saved.waiting, strict=True):
+        line.wait_again(rows)
+        line.model.sea.at(run.t)
+    run.model.load_bodies(run.t, run.solver.bodies, run.loaded)
+
+
+def copied(x: Any) -> Any:
+    """Named arrays and plain values, as they are once they have been in a file."""
+    if isinstance(x, Mapping):
+        return {name: copied(value) for name, value in x.items()}
+    if isinstance(x, list | tuple):
+        return [copied(value) for value in x]
+    if isinstance(x, np.generic):
+        return x.item()
+    return x.copy() if isinstance(x, np.ndarray) else x

@@ -1,0 +1,239 @@
+"""SystemSimulation goes back: what is taken back leaves nothing, a failed step is undone, a strong coupling converges."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from test_system_resume import HOSE, LEG, mooring, spar
+
+import hybrid
+import hybrid.simulation.deferred_recorder
+from hybrid.errors import Outcome
+
+STEP = 0.05
+VESSEL = np.array([70.0, 0.0, 2.0])
+
+
+def scene(**tables: Any) -> dict[str, Any]:
+    """Two legs with friction and a float in waves, whose force stops at 0.31 s, and a rod to a point that is set."""
+    data = mooring(**tables)
+    data["points"]["vessel"] = {"position": VESSEL.tolist()}
+    data["points"]["float"]["force"] = {"value": [200, 0, 0], "until": 0.31}
+    for line in data["lines"].values():
+        line["mesh"] = {"cells": 12}
+    return data | {"time": {"duration": 1.0, "step": STEP}, "output": {"every": 0.1}}
+
+
+def heave(t: float, scale: float = 1.0) -> tuple[Any, Any]:
+    """Place and velocity of the vessel."""
+    w = 2.0
+    return VESSEL + np.array([0, 0, 0.2 * scale * (1.0 - np.cos(w * t))]), np.array(
+        [0, 0, 0.2 * scale * w * np.sin(w * t)]
+    )
+
+
+def step(lines: hybrid.SystemSimulation, scale: float = 1.0) -> None:
+    until = STEP * (round(lines.t / STEP) + 1)
+    lines.set_point("vessel", *heave(until, scale))
+    lines.advance(until)
+
+
+def assert_same(a: hybrid.Result, b: hybrid.Result) -> None:
+    """All outputs, steps, extremes and events of two results, but for the processor time of steps."""
+    for x, y in [(a, b), *((a.lines[name], b.lines[name]) for name in a.lines)]:
+        assert x.names == y.names and x.status == y.status
+        for name in [n for n in x.names if n != "steps/cpu"]:
+            assert np.array_equal(x[name], y[name], equal_nan=x[name].dtype.kind == "f"), name
+        assert sorted((e.t, e.kind, e.text) for e in x.events) == sorted((e.t, e.kind, e.text) for e in y.events)
+
+
+def plain(data: dict[str, Any], steps: int = 20) -> hybrid.Result:
+    with hybrid.SystemSimulation(data) as lines:
+        for _ in range(steps):
+            step(lines)
+        return lines.result()
+
+
+@pytest.mark.parametrize("breaks", [False, True])
+def test_what_is_taken_back_leaves_nothing(breaks: bool, tmp_path: Path) -> None:
+    """Every third step is taken thrice, elsewhere at first and further: bit for bit the run without that.
+
+    The save at t = 0 comes before the point is set for the first time; a load stops and a line breaks in steps that
+    are taken back.
+    """
+    data = scene()
+    if breaks:
+        data["lines"]["hose"]["break_at"] = {"time": 0.5}
+    expected = plain(data)
+    with hybrid.SystemSimulation(data, tmp_path / "back.h5") as lines:
+        for k in range(20):
+            if k % 3 == 0:
+                saved = lines.save()
+                before = lines.point("float")
+                for scale in (3.0, -2.0):
+                    for _ in range(min(4, 20 - k)):
+                        step(lines, scale)
+                    lines.restore(saved)
+                    assert lines.t == pytest.approx(STEP * k)
+                    for x, y in zip(lines.point("float"), before, strict=True):
+                        assert np.array_equal(x, y)
+            step(lines)
+        result = lines.result()
+    assert (sum(e.kind == "end released" for e in expected.events) == 1) == breaks
+    assert_same(result, expected)
+
+
+def test_bodies_are_taken_back_too() -> None:
+    """A spar between three lines, whose force stops at 0.45 s: advanced, taken back, advanced again."""
+    data = spar() | {"time": {"duration": 1.5, "step": 0.1}}
+    data["bodies"]["spar"]["force"] = {"value": [3e6, 0, 0], "until": 0.45}
+    results = []
+    for tries in (1, 3):
+        with hybrid.SystemSimulation(data) as lines:
+            lines.advance(0.3)
+            saved = lines.save()
+            for k in range(tries):
+                if k:
+                    lines.restore(saved)
+                for until in (0.4, 0.7, 1.5):
+                    lines.advance(until)
+            results.append(lines.result())
+    assert_same(*results)
+
+
+def test_too_much_after_a_save_makes_it_final(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hybrid.simulation.deferred_recorder, "MOST_WAITING", 3)
+    with hybrid.SystemSimulation(scene()) as lines:
+        saved = lines.save()
+        for _ in range(12):
+            step(lines)
+        with pytest.raises(ValueError, match="too much"):
+            lines.restore(saved)
+        for _ in range(8):
+            step(lines)
+        result = lines.result()
+    assert_same(result, plain(scene()))
+
+
+def test_what_was_set_before_a_save_is_set_after_restore() -> None:
+    with hybrid.SystemSimulation(scene()) as lines:
+        lines.set_point("vessel", *heave(STEP))
+        saved, places = lines.save(), []
+        for _ in range(2):
+            lines.advance(STEP)
+            places.append(lines.line("hose").position)
+            lines.restore(saved)
+        assert np.array_equal(*places)
+        assert places[0][-1] == pytest.approx(heave(STEP)[0], abs=1e-12)
+
+
+def test_a_point_that_is_set_first_after_a_save_stands_again_after_restore() -> None:
+    with hybrid.SystemSimulation(scene()) as lines:
+        saved = lines.save()
+        for _ in range(3):
+            step(lines, 5.0)
+        lines.restore(saved)
+        assert lines.point("vessel").position.tolist() == VESSEL.tolist()
+        lines.advance(STEP)
+        lines.advance(2 * STEP)
+        assert lines.point("vessel").position.tolist() == VESSEL.tolist()
+
+
+def test_what_cannot_be_restored_is_refused() -> None:
+    with hybrid.SystemSimulation(scene()) as lines, hybrid.SystemSimulation(scene()) as other:
+        first, foreign = lines.save(), other.save()
+        step(lines)
+        for wrong in (foreign, None, "x", {}, object()):
+            with pytest.raises(ValueError, match="of this SystemSimulation"):
+                lines.restore(wrong)
+        lines.save()
+        with pytest.raises(ValueError, match="later save"):
+            lines.restore(first)
+        assert lines.t == pytest.approx(STEP)
+        lines.close()
+        for use in (lines.save, lambda: lines.restore(first)):
+            with pytest.raises(ValueError, match="over"):
+                use()
+
+
+OUTCOMES = {"strain": Outcome.OVERSTRETCHED, "slack": Outcome.SLACK}
+FAILING = {"strain": [HOSE | {"max_strain": 0.05}], "slack": [LEG | {"length": 100}]}
+
+
+@pytest.mark.parametrize("hose", FAILING)
+def test_a_failed_step_is_undone_and_a_smaller_one_goes_on(hose: str) -> None:
+    """The hose is torn, or pushed together, within two steps; without that, the run afterwards is the same to the bit.
+
+    Too much strain is found at the next output only, slackness in the solution of the step.
+    """
+    data = scene()
+    data["lines"]["hose"]["sections"] = FAILING[hose]
+    far = VESSEL + np.array([300.0 if hose == "strain" else -80.0, 0, 0])
+    expected = plain(data, 10)
+    with hybrid.SystemSimulation(data) as lines:
+        lines.save()
+        for k in range(10):
+            if k in (0, 5):
+                lines.set_point("vessel", far)
+                with pytest.raises(hybrid.ComputationError, match="back at t") as caught:
+                    lines.advance(lines.t + 2 * STEP)
+                assert "set the points again" in str(caught.value)
+                assert caught.value.outcome == OUTCOMES[hose]
+                assert lines.t == pytest.approx(STEP * k)
+                saved, place = lines.save(), lines.point("vessel").position
+                lines.advance(lines.t + 0.5 * STEP)  # the point is not set again: it stays
+                assert lines.point("vessel").position == pytest.approx(place, abs=1e-12)
+                lines.restore(saved)
+            step(lines)
+        result = lines.result()
+    assert_same(result, expected)
+
+
+def test_without_a_save_a_failed_step_ends_the_simulation() -> None:
+    data = scene()
+    data["lines"]["hose"]["sections"] = [HOSE | {"max_strain": 0.05}]
+    with hybrid.SystemSimulation(data) as lines:
+        lines.set_point("vessel", VESSEL + np.array([300.0, 0, 0]))
+        with pytest.raises(hybrid.ComputationError):
+            lines.advance(2 * STEP)
+        with pytest.raises(ValueError, match="over"):
+            lines.save()
+
+
+def test_a_body_that_is_coupled_strongly_converges() -> None:
+    """A mass on a spring holds the hose; its trapezoidal rule and the lines agree on every step by repetition.
+
+    The force that moves it is then that of the lines at its new place: the balance at the end of each step holds to
+    1e-9 of the force, which a staggered coupling does not reach.
+    """
+    m, stiffness = 2.0e4, 2.0e4  # kg, N/m
+    tries = []
+    with hybrid.SystemSimulation(scene()) as lines:
+        rest = lines.point("vessel").force
+        x, v, a = np.zeros(3), np.array([0.0, 0.0, 0.2]), np.zeros(3)
+        for _ in range(10):
+            saved, guess, delayed = lines.save(), a, lines.point("vessel").force
+            for k in range(30):
+                speed = v + 0.5 * STEP * (a + guess)
+                place = x + 0.5 * STEP * (v + speed)
+                if k:
+                    lines.restore(saved)
+                lines.set_point("vessel", VESSEL + place, speed)
+                lines.advance(STEP * (round(lines.t / STEP) + 1))
+                force = lines.point("vessel").force
+                found = (force - rest - stiffness * place) / m
+                change, guess = np.abs(found - guess).max(), found
+                if m * change < 1e-9 * np.abs(force).max():
+                    break
+            else:
+                pytest.fail(f"no agreement: {m * change:.3g} N are left")
+            assert np.abs(force - delayed).max() > 1e-4 * np.abs(force).max()
+            x, v, a = place, speed, found
+            tries.append(k + 1)
+        result = lines.result()
+    print(f"{np.mean(tries):.1f} tries of a step")
+    assert min(tries) >= 2 and max(tries) < 15
+    assert len(result.lines["hose"]["steps/t"]) == 11  # one more where a load stops
