@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from hybrid.store.reader import open_result as open
     from hybrid.store.study_file import open_study
     from hybrid.studies.levels import trade_levels
+    from hybrid.studies.sensitivity import sensitivity
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade
@@ -68,6 +69,7 @@ _HOME = {
     "resume": ("hybrid.simulation.api", "resume"),
     "run": ("hybrid.simulation.api", "run"),
     "scene_text": ("hybrid.scene.read", "scene_text"),
+    "sensitivity": ("hybrid.studies.sensitivity", "sensitivity"),
     "static": ("hybrid.simulation.api", "static"),
     "stiffness": ("hybrid.simulation.system_stiffness", "stiffness"),
     "study": ("hybrid.studies.study", "study"),
@@ -107,6 +109,7 @@ __all__ = [
     "resume",
     "run",
     "scene_text",
+    "sensitivity",
     "static",
     "stiffness",
     "study",

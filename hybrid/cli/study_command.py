@@ -21,7 +21,7 @@ REASONS_SHOWN = 5
 @app.command()
 def study(
     source: Annotated[
-        Path, typer.Argument(metavar="STUDY.yaml", help="The study file; with --case its results.", show_default=False)
+        Path, typer.Argument(metavar="STUDY.yaml", help="The study file, or its results.", show_default=False)
     ],
     output: Annotated[
         Path | None, typer.Option("--output", "-o", metavar="FOLDER", help="Results (Zarr); else STUDY.zarr there.")
@@ -35,6 +35,9 @@ def study(
     case: Annotated[
         int | None, typer.Option(metavar="N", min=0, help="Run one case of STUDY.zarr again, with its whole result.")
     ] = None,
+    sensitivity: Annotated[
+        str | None, typer.Option(metavar="RESULT", help="What each variable of STUDY.zarr does to a result.")
+    ] = None,
     overwrite: Annotated[bool, flag("--overwrite", help="Begin anew where there is a study.")] = False,
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
@@ -46,8 +49,17 @@ def study(
             console.events(result.events)
             console.done(f"case {case}", target, status=result.status)
             return
+        if sensitivity is not None:
+            rows = hybrid.sensitivity(source, sensitivity)
+            for row in rows:
+                console.json("influence", **row._asdict())
+            console.show(lambda: _influences(rows))
+            console.json("done", file=str(source))
+            return
         if source.is_dir():
-            raise UsageError(f"{source} is a folder; a study file is expected, or --case N for one case of it")
+            raise UsageError(
+                f"{source} is a folder; a study file is expected, or --case N, --sensitivity RESULT for what it holds"
+            )
         console.source = ""
         folder = output or source.with_suffix(".zarr")
         console.left = f"{folder} keeps what is done; the same command goes on"
@@ -101,6 +113,25 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
             "case": int(done["case"].values[worst]),
         })  # fmt: skip
     return sorted(rows, key=lambda row: row["name"])
+
+
+HEADS = {
+    "sobol": ("first order", "total", "± (95 %)"), "morris": ("mean effect", "deviation", "± (95 %)"),
+    "rank": ("rank correlation", "", "by chance"),
+}  # fmt: skip
+
+
+def _influences(rows: list[Any]) -> Any:
+    from rich.table import Table
+
+    table = Table(box=None, pad_edge=False, header_style="bold")
+    table.add_column("", no_wrap=True)
+    for title in HEADS[rows[0].method] if rows else ("nothing varies",):
+        table.add_column(title, justify="right", no_wrap=True)
+    for row in rows:
+        figures = (f"{x:.3g}" if x == x else "" for x in (row.first, row.total, row.interval))
+        table.add_row(row.variable, *figures)
+    return table
 
 
 def _kind(reason: str) -> str:

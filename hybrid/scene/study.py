@@ -101,15 +101,21 @@ class Range(Table):
 class Sample(Table):
     """A sample of variables between bounds."""
 
-    method: Literal["sobol", "latin_hypercube"] = Field(description="how the sample fills the space of its variables")
-    count: Annotated[Whole, Field(ge=1, le=MOST_CASES)] = Field(description="number of cases; of sobol a power of two")
+    method: Literal["sobol", "latin_hypercube", "saltelli", "morris"] = Field(
+        description="how the sample fills the space of its variables; saltelli and morris are designs for sensitivity: "
+        "indices of Sobol, and elementary effects"
+    )
+    count: Annotated[Whole, Field(ge=1, le=MOST_CASES)] = Field(
+        description="number of cases; of sobol and saltelli a power of two; saltelli has (variables + 2) times as many "
+        "cases, morris (variables + 1) times"
+    )
     seed: Annotated[Whole, Field(ge=0)] = Field(default=0, description="seed of its random numbers")
 
     @model_validator(mode="after")
     def _power_of_two(self) -> Self:
-        if self.method == "sobol" and self.count & (self.count - 1):
+        if self.method in ("sobol", "saltelli") and self.count & (self.count - 1):
             near = 1 << (self.count.bit_length() - 1)
-            refuse([Finding(("count",), "a power of two, for sobol", f"{near} or {2 * near}")])
+            refuse([Finding(("count",), f"a power of two, for {self.method}", f"{near} or {2 * near}")])
         return self
 
 

@@ -21,6 +21,7 @@ from hybrid.scene.read import parse_either, text_of, validate_scene
 from hybrid.scene.schema import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
 from hybrid.store.selection import optional_package
+from hybrid.studies.sensitivity import DESIGNS, design
 
 Row = dict[str, Any]
 
@@ -29,7 +30,7 @@ Row = dict[str, Any]
 class Cases:
     """The scene as data, the keys that each variable sets, and one row of values for each case.
 
-    derived: values (n,) of columns computed from them, by name; units: of variables, by name.
+    bounds: of what is sampled; derived: values (n,) of columns computed from them; units: of variables; all by name.
     """
 
     base: dict[str, Any]
@@ -38,6 +39,7 @@ class Cases:
     derived: dict[str, np.ndarray]
     units: dict[str, str]
     static: bool
+    bounds: dict[str, tuple[float, float]]
 
     def scene(self, case: int) -> Scene:
         """The scene of a case; SceneError if it is refused."""
@@ -77,7 +79,8 @@ def cases_of(study: Study) -> Cases:
         raise SceneError([Complaint("only_if", str(study.only_if), "a condition that some case fulfils", "relax it")])
     _check_keys(text, study.scene, keys, rows[0])
     base = scene.model_dump(mode="json", exclude_none=True)
-    return Cases(base, keys, rows, _derived(study, rows), units, study.static)
+    bounds = {short[name]: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
+    return Cases(base, keys, rows, _derived(study, rows), units, study.static, bounds)  # type: ignore[arg-type]
 
 
 def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:
@@ -125,10 +128,18 @@ def _sample(study: Study, bounds: Mapping[str, tuple[Any, Any]]) -> list[Row]:
     from scipy.stats import qmc
 
     assert study.sample is not None
+    if study.sample.method in DESIGNS:
+        points = design(study.sample.method, list(bounds), study.sample.count, study.sample.seed)
+        return [dict(zip(bounds, row, strict=True)) for row in scaled(points, bounds)]
     kind = qmc.Sobol if study.sample.method == "sobol" else qmc.LatinHypercube
     points = kind(len(bounds), rng=np.random.default_rng(study.sample.seed)).random(study.sample.count)
+    return [dict(zip(bounds, row, strict=True)) for row in scaled(points, bounds)]
+
+
+def scaled(points: np.ndarray, bounds: Mapping[str, tuple[Any, Any]]) -> list[list[float]]:
+    """Points (n, m) between 0 and 1, between the bounds of m variables."""
     low, high = np.array([x[0] for x in bounds.values()]), np.array([x[1] for x in bounds.values()])
-    return [dict(zip(bounds, row.tolist(), strict=True)) for row in low + (high - low) * points]
+    return [[float(x) for x in row] for row in low + (high - low) * points]
 
 
 def _read_table(study: Study) -> list[Row]:

@@ -182,6 +182,7 @@ def _created(
     attributes = {
         "identity": identity, "title": asked.title or Path(asked.scene).stem, "study": json.dumps(stored),
         "variables": json.dumps(list(columns)), "scene_file": Path(asked.scene).name,
+        "sample": json.dumps(asked.sample.model_dump() if asked.sample else None), "bounds": json.dumps(cases.bounds),
     }  # fmt: skip
     return StudyFile.create(target, columns, len(rows), batch, attributes)
 

@@ -13,7 +13,7 @@ from hybrid.statistics.fatigue import YEAR, life_in_years
 from hybrid.studies.cases import cases_of
 
 STUDIES = Path(__file__).parents[2] / "examples" / "studies"
-CASES = {"heave": 14, "launch_window": 42, "touchdown_fatigue": 6, "storm_seeds": 20}
+CASES = {"heave": 14, "launch_window": 42, "touchdown_fatigue": 6, "storm_seeds": 20, "fatigue_sensitivity": 192}
 
 
 @pytest.mark.parametrize("name", CASES)
