@@ -168,9 +168,10 @@ class Recorder:
         return self
 
     def _write_to(self, file: h5py.File, path: Path | None, tables: Mapping[str, Sequence[Field]]) -> None:
-        self._file: Any = file  # a group of the file of `_owner`, where this is a part of that
+        self._file: Any = file  # a group of the file of `_whole`, where this is a part of that
         self.path, self._tables = path, tables
-        self._owner, self._parts = self, dict[str, Recorder]()
+        self._whole: Recorder | None = None  # never itself: a reference cycle would keep outputs in memory
+        self._parts: dict[str, Recorder] = {}
         self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
         self._outputs, self._steps, self._zone_rows, self._events = self._all
         self._slots = [file[name] for name in SLOTS if name in file]
@@ -206,7 +207,7 @@ class Recorder:
         self._parts = dict(parts)
         for name, part in parts.items():
             before = part._file
-            part._owner, part._memory, part._file = self, None, self._file[f"{GROUP}/{name}"]
+            part._whole, part._memory, part._file = self, None, self._file[f"{GROUP}/{name}"]
             for table in part._all:
                 table.move(part._file)
             before.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines squared
@@ -275,8 +276,9 @@ class Recorder:
             raise ResultError(f"'{name}' of the step log is not finite: {rows[i].tolist()}")
         self._steps.add(list(rows.T.copy()))
         if self._steps.waiting >= BLOCK:  # alone: outputs are written together with their checkpoint
-            with self._owner._writing():
-                self._owner._write([self._steps])
+            whole = self if self._whole is None else self._whole
+            with whole._writing():
+                whole._write([self._steps])
 
     def event(
         self,
@@ -371,15 +373,16 @@ class Recorder:
 
     def close(self, status: str = "complete", message: str = "") -> None:
         """Write the status and close the file; a second call does nothing."""
-        if self.closed or self._owner._broken:
+        if self.closed or self._broken or (self._whole is not None and self._whole._broken):
             return
         if status not in _STATUS:
             raise ValueError(f"status {status!r} is none of {', '.join(_STATUS)}")
         self.closed = True
         self._count_left_out()
-        if self._owner is not self:
-            with self._owner._writing():
+        if self._whole is not None:
+            with self._whole._writing():
                 set_status(self._file, status, message)
+            self._whole = None  # a cycle no more: it has this among its parts
             return
         self.flush()
         with self._writing():
