@@ -211,10 +211,10 @@ def ran_as(model: str, name: str) -> hybrid.Result:
 PLANS: dict[str, tuple[list[tuple[float, float]], list[tuple[float, float]], float, int]] = {
     "s_tether": ([(14, 47), (55, 60)], [(11, 48), (55, 60)], 0.69, 6),
     "rov_tether": ([(65, 80)], [(65, 80)], 0.10, 0),
-    "touchdown": ([], [(82.5, 125)], 0.144, 14),
+    "touchdown": ([], [(85, 120)], 0.119, 11),
     "laying": ([(0, 186.667)], [(0, 213.333)], 0.26, 11),
     "slack_on_seabed": ([(0, 17.5)], [(0, 30)], 0.91, 11),
-    "irregular_sea": ([], [(31.667, 41.667)], 0.108, 76),
+    "irregular_sea": ([], [(16.667, 41.667)], 0.141, 70),
 }
 
 

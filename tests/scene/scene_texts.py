@@ -125,7 +125,6 @@ cable:
   attachments:
     - {kind: float, at: 75.0, buoyancy: 60.0, mass: 4.0, drag_area: 0.02, added_mass: 3.0, height: 0.2}
     - {kind: clump, at: 100.0, mass: 30.0, volume: 0.004, drag_area: 0.05, added_mass: 2.0, height: 0.3}
-    - {kind: swivel, at: 120.0, mass: 5.0, volume: 0.001, drag_area: 0.02, added_mass: 1.0, height: 0.1}
     - {kind: modules, range: [20.0, 40.0], volume: 0.02, mass: 8.0, drag_area: 0.3, added_mass: 12.0}
 ends:
   start:

@@ -51,6 +51,16 @@ ends:
 initial: {kind: equilibrium}
 model: {kind: rod}
 """
+SWIVELS = """\
+environment: {fluid: {density: 1025.0}}
+cable:
+  sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]
+  attachments:
+    - {kind: swivel, at: 6.0, mass: 5.0, volume: 0.001, drag_area: 0.02, added_mass: 1.0, height: 0.1}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: rod}
+"""
 LOADED = """\
 cable: {sections: [{length: 10.0, mass: 1.0}]}
 ends:
@@ -101,6 +111,7 @@ TEXTS = (
         "corrected": CORRECTED,
         "touching": TOUCHING,
         "twisted": TWISTED,
+        "swivels": SWIVELS,
     }
     | SEAS
 )
@@ -254,7 +265,13 @@ def test_a_negative_number(case: tuple[str, tuple[str | int, ...]]) -> None:
     name, path = case
     keys = [part for part in path if isinstance(part, str)]
     ballast = path[1:] == ("attachments", 1, "buoyancy")
-    if keys[-1] in SIGNED or "depths" in keys or keys == ["initial", "friction"] or keys[:2] == ["initial", "points"] or ballast:
+    if (
+        keys[-1] in SIGNED
+        or "depths" in keys
+        or keys == ["initial", "friction"]
+        or keys[:2] == ["initial", "points"]
+        or ballast
+    ):
         found = complaints(_put(TEXTS[name], dict(_places(TEXTS[name]))[path], "-7.25"))
         assert all(c.line is not None for c in found)
     elif keys == ["mesh", "nodes"] or keys[0] == "accuracy":

@@ -439,7 +439,7 @@ def test_another_program_agrees(code: str) -> None:
     truth = {name: np.array(result[name]) for name in runs.COMPARED}
     found = tradeoff.with_errors(row(), answer.values, truth, 12.0)
     assert found.position_part is not None and found.position_part < 0.01
-    usual = [np.median(tradeoff._difference(answer.values[x], truth[x])) for x in tradeoff.END_FORCES]
+    usual = [np.median(tradeoff.force_difference(answer.values[x], truth[x])) for x in tradeoff.END_FORCES]
     assert max(usual) < 0.01 * tradeoff._largest_end_force(truth)
     assert answer.cpu > 0.0 and answer.steps > 10
 
