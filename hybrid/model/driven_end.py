@@ -20,9 +20,7 @@ class DrivenEnd:
     def __init__(self, path: Floats, position: Floats, frame: Floats, held: bool, turns: bool) -> None:
         """path: (PATH,) filled here; position: (3,) m; frame: (3, 3); held, turns: what is set of it."""
         self.path, self.held, self.turns = path, held, turns
-        path[:] = 0.0
-        path[AT:SPEED] = path[THERE:SPEED_THERE] = position
-        path[FRAME:TURN] = np.ravel(frame)
+        self.stand(position, frame)
 
     def set(self, begin: float, end: float, position: Floats, velocity: Floats, turn: Floats) -> None:
         """From where it is at `begin` (s) to a place at `end`; turn: rotation vector in the axes of its frame, rad."""
@@ -54,10 +52,12 @@ class DrivenEnd:
         rate = change + (1.0 - x) * (1.0 - 3.0 * x) * a + x * (2.0 - 3.0 * x) * b
         return value, rate / dt, turned, spin
 
-    def stand(self, position: Floats) -> None:
-        """Rest at a place (3,) m, in the frame of the path's begin."""
-        self.path[FROM:FRAME] = self.path[TURN:PATH] = 0.0
+    def stand(self, position: Floats, frame: Floats) -> None:
+        """Rest at a place (3,) m in a frame (9,) or (3, 3)."""
+        columns = np.array(frame, float).ravel()  # perhaps those of the path
+        self.path[:] = 0.0
         self.path[AT:SPEED] = self.path[THERE:SPEED_THERE] = position
+        self.path[FRAME:TURN] = columns
 
     def turn_from(self, frame: Floats) -> None:
         """Stand in another frame (3, 3)."""

@@ -70,6 +70,7 @@ class Saved(NamedTuple):
     state: Any  # arrays of the compiled run, or a packed checkpoint where zones move
     watch: Mapping[str, Any]
     paths: Mapping[int, Floats]
+    places: tuple[Floats, Floats]  # positions (2, 3) m and frames (2, 9) of the ends
     loads: Any
     model: Model
     owner: object  # what tells one Simulation from another

@@ -196,11 +196,11 @@ class Simulation(SteppedEnds):
         run, watch = self._loop.run, self._loop.remembered()
         state = run.run.keep() if self._plain else pack(self._loop.checkpoint())
         paths = {k: end.path.copy() for k, end in self._driven.items()}
-        loads = run.model.ends.keep_loads()
+        loads, ends = run.model.ends.keep_loads(), run.model.ends.values
         self._saves += 1
         return Saved(
-            self._recorder.mark(), self.t, state, watch, paths, loads, run.model, self._owner, self._saves,
-            self.cut_short,
+            self._recorder.mark(), self.t, state, watch, paths, (ends.position.copy(), ends.frame.copy()), loads,
+            run.model, self._owner, self._saves, self.cut_short,
         )  # fmt: skip
 
     @one_thread
@@ -228,8 +228,11 @@ class Simulation(SteppedEnds):
             run.run.bring_back(saved.state)
             ends = saved.model.ends.motions
             self._driven = {k: end for k, end in ends.items() if isinstance(end, DrivenEnd)}
-            for k, path in saved.paths.items():
-                self._driven[k].path[:] = path
+            for k, end in self._driven.items():
+                if k in saved.paths:
+                    end.path[:] = saved.paths[k]
+                else:  # it has been set since, for the first time
+                    end.stand(saved.places[0][k], saved.places[1][k])
             run.model.ends.bring_back_loads(saved.loads, saved.t)
             run.run.move(run.model.ends.moves())
         self._loop.remember(saved.watch)

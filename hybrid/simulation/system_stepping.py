@@ -15,7 +15,7 @@ import numpy as np
 from hybrid.errors import ComputationError, SceneError
 from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.state import Floats
-from hybrid.model.driven_end import DrivenEnd
+from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
 from hybrid.scene.points import FreePoint
 from hybrid.scene.read import as_scene_or_system, scene_text
 from hybrid.scene.schema import missing_time
@@ -193,7 +193,7 @@ class SystemSimulation:
         for name, ends in self._driven.items():
             if name not in saved.paths:  # it has been set since, for the first time
                 for driven, (line, end) in zip(ends, self.scene.lines_at(name), strict=True):
-                    driven.stand(saved.place(line, end))
+                    driven.stand(saved.place(line, end), driven.path[FRAME:TURN])
         self._driven = {name: self._driven[name] for name in saved.paths}
         self._follow(saved.paths)
         bring_back(self._run, saved)

@@ -332,6 +332,26 @@ def test_only_the_last_save_is_restored(model: str) -> None:
         assert simulation.t == pytest.approx(0.15)
 
 
+@pytest.mark.parametrize("model", ["catenary", "{kind: adaptive, tolerance: 2.0e-5}"])
+def test_an_end_that_is_set_first_after_a_save_stands_again_after_restore(model: str) -> None:
+    """Whether it is set again or not: the same bits as if it had not been set before."""
+    places = []
+    for back in (False, True):
+        with hybrid.Simulation(touchdown(f"model={model}", PINNED)) as simulation:
+            saved = simulation.save()
+            for again in (False, True):
+                if back:
+                    driven(simulation, 3)
+                    simulation.restore(saved)
+                if again:
+                    simulation.set_end("end", [205.0, 0.0, 0.01])
+                simulation.step()
+                places.append(simulation.state.position)
+                simulation.restore(saved)
+    assert places[0][-1].tolist() == [205.0, 0.0, 0.0]
+    assert np.array_equal(places[0], places[2]) and np.array_equal(places[1], places[3])
+
+
 def test_after_a_failed_step_it_asks_for_a_restore() -> None:
     with hybrid.Simulation(touchdown("model=catenary", PINNED)) as simulation:
         saved = simulation.save()
