@@ -1,8 +1,8 @@
 """The seabed under a point: a plane, or a surface through depths on a grid.
 
-A bed of depths is the bicubic Hermite surface through the heights at the grid's points, with the slopes there that
-parabolas through neighbouring points have: height and slope are continuous, and a plane comes out as a plane.  Beyond
-the grid it goes on straight.
+A bed of depths is the bicubic Hermite surface through the heights at the grid's points.  The slopes there are limited
+(scene.depths): height and slope are continuous, a plane comes out as a plane, and between four points no height is
+above or below all of theirs.  Beyond the grid the bed goes on straight.
 
     symbol   meaning                                                     shape   unit
     z        height of the bed at x, y; zx, zy its slopes, zxy the rate  -       m, -, -, 1/m

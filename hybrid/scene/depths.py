@@ -5,13 +5,15 @@ from __future__ import annotations
 import os
 from functools import lru_cache
 from itertools import pairwise
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from pydantic import Field, model_validator
 
 from hybrid.scene.base import Finding, Number, Table, Text, refuse
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import numpy as np
     from numpy.typing import NDArray
 
@@ -20,7 +22,8 @@ MOST_POINTS = 4_000_000
 
 
 class Depths(Table):
-    """Depths of the bed at the points of a grid, smooth between them; beyond the grid the bed goes on straight."""
+    """Depths of the bed at the points of a grid, between them a smooth surface that never leaves the range of the four
+    depths around; beyond the grid the bed goes on straight."""
 
     x: tuple[Number, ...] = Field(default=(), description="x of the grid's lines, rising [m]")
     y: tuple[Number, ...] = Field(default=(), description="y of the grid's lines, rising [m]")
@@ -116,20 +119,63 @@ class Surface(NamedTuple):
         return depth, zx + over_y * twist, zy + over_x * twist
 
 
-def _slopes(values: NDArray[np.float64], at: NDArray[np.float64], axis: int) -> NDArray[np.float64]:
+def _slopes(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Slopes along the first axis at the points `at`, limited so that the cubics between are monotone (PCHIP)."""
     import numpy as np
 
-    if len(at) > 2:
-        return np.asarray(np.gradient(values, at, axis=axis, edge_order=2))
-    return np.asarray(np.gradient(values, at, axis=axis))
+    h = np.diff(at).reshape(-1, *[1] * (values.ndim - 1))
+    chord = np.diff(values, axis=0) / h
+    if len(chord) == 1:
+        return np.repeat(chord, 2, axis=0)
+    out = np.zeros_like(values)
+    before, after = chord[:-1], chord[1:]
+    w_before, w_after = h[:-1] + 2.0 * h[1:], 2.0 * h[:-1] + h[1:]
+    same = np.sign(before) * np.sign(after) > 0.0
+    # harmonic mean; a ratio of chords instead of their inverses, which can overflow
+    low, high = np.minimum(abs(before), abs(after)), np.maximum(abs(before), abs(after))
+    at_low = np.where(abs(before) <= abs(after), w_before, w_after)
+    ratio = np.divide(low, high, out=np.zeros_like(low), where=same)
+    total = w_before + w_after
+    mean = low * total / (at_low + (total - at_low) * ratio)
+    out[1:-1] = np.where(same, np.sign(before) * mean, 0.0)
+    for end, k, beside in ((0, 0, 1), (-1, -1, -2)):
+        near, far = chord[k], chord[beside]
+        slope = near + (near - far) * (h[k] / (h[k] + h[beside]))
+        slope = np.where(np.sign(slope) == np.sign(near), slope, 0.0)
+        turns = (np.sign(near) != np.sign(far)) & (abs(slope) > 3.0 * abs(near))
+        out[end] = np.where(turns, 3.0 * near, slope)
+    return out
 
 
 def _surface(x: NDArray[np.float64], y: NDArray[np.float64], depth: NDArray[np.float64]) -> Surface:
-    """With the slopes of parabolas through neighbouring points."""
+    """With slopes that keep the depths of every cell of the grid between those of its four corners.
+
+    A bicubic is between the smallest and the largest of its 16 Bezier points.  Those on the edges are between the
+    corners with monotone cubics there; slopes at a point, then its mixed derivative, are reduced until the inner ones
+    are, in the four cells around it.
+    """
     import numpy as np
 
-    dx = _slopes(depth, x, 0)
-    dy, both = _slopes(depth, y, 1), _slopes(dx, y, 1)
+    dx, dy = _slopes(depth, x), _slopes(depth.T, y).T
+    both = 0.5 * (_slopes(dx.T, y).T + _slopes(dy, x))
+    cells = np.stack([depth[:-1, :-1], depth[1:, :-1], depth[:-1, 1:], depth[1:, 1:]])
+    low, high = cells.min(axis=0), cells.max(axis=0)
+    h, g = np.diff(x)[:, None] / 3.0, np.diff(y)[None, :] / 3.0
+
+    def limit(parts: Callable[[Any, Any, tuple[slice, slice]], tuple[Any, Any]]) -> NDArray[np.float64]:
+        """The largest part (n, m), up to 1, of a change that keeps the inner points; (base, change) by `parts`."""
+        part = np.ones_like(depth)
+        for i, a in ((slice(None, -1), h), (slice(1, None), -h)):
+            for j, b in ((slice(None, -1), g), (slice(1, None), -g)):
+                base, change = parts(a, b, (i, j))
+                room = np.where(change > 0.0, high - base, base - low).clip(0.0)
+                within = np.divide(room, abs(change), out=np.ones_like(room), where=abs(change) > room)
+                part[i, j] = np.minimum(part[i, j], within)
+        return part
+
+    part = limit(lambda a, b, at: (depth[at], a * dx[at] + b * dy[at]))
+    dx, dy = part * dx, part * dy
+    both = both * limit(lambda a, b, at: (depth[at] + a * dx[at] + b * dy[at], a * b * both[at]))
     return Surface(x, y, np.ascontiguousarray(np.stack([depth, dx, dy, both], axis=-1)))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from scipy.interpolate import PchipInterpolator
 
 import hybrid
 from hybrid.errors import SceneError
@@ -90,6 +91,68 @@ def test_heights_and_slopes_are_continuous_and_one_is_the_derivative_of_the_othe
         np.testing.assert_allclose(s1, s2, atol=1e-6)
     at_points, _ = height(np.array([[a, b, 0.0] for a in x for b in y]))
     np.testing.assert_allclose(-at_points.reshape(8, 6), depths.depth, rtol=1e-14)
+
+
+def random_steps(rng: np.random.Generator, n: int) -> list[float]:
+    """Rising coordinates (n,), m, of a grid whose steps differ by up to a thousand times."""
+    steps: list[float] = np.cumsum(10.0 ** rng.uniform(-1.0, 2.0, n)).tolist()
+    return steps
+
+
+def leaves_range(depths: Depths, parts: int = 7) -> float:
+    """By how many m the surface leaves the range of the four corner depths of a cell, at the most."""
+    surface, depth = depths.surface, np.array(depths.depth)
+    most = 0.0
+    for i, j in np.ndindex(len(depths.x) - 1, len(depths.y) - 1):
+        corners = depth[i : i + 2, j : j + 2]
+        for a in np.linspace(depths.x[i], depths.x[i + 1], parts):
+            for b in np.linspace(depths.y[j], depths.y[j + 1], parts):
+                z = surface.at(a, b)[0]
+                most = max(most, z - corners.max(), corners.min() - z)
+    return most
+
+
+@pytest.mark.parametrize(
+    ("x", "row"),
+    [
+        ([-50, 99, 100, 300], [100, 100, 90, 90]),
+        ([-50, 90, 110, 300], [100, 100, 90, 90]),
+        ([-50, 40, 60, 300], [100, 100, 95, 95]),
+        ([-50, 60, 80, 81, 300], [100, 100, 105, 104, 101]),
+    ],
+)
+def test_a_shelf_on_an_uneven_grid_is_monotone(x: list[float], row: list[float]) -> None:
+    depths = Depths(x=x, y=[-50, 50], depth=[[z, z] for z in row])
+    assert leaves_range(depths, 51) <= 1e-12 * max(row)
+    across = Depths(x=[-50, 50], y=x, depth=[row, row])
+    assert leaves_range(across, 51) <= 1e-12 * max(row)
+    places = np.linspace(x[0], x[-1], 300)
+    along = [depths.surface.at(a, 3.0) for a in places]
+    np.testing.assert_allclose(along, [np.take(across.surface.at(3.0, a), [0, 2, 1]) for a in places], atol=1e-12)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_no_depth_leaves_the_range_of_its_four_corners_on_random_grids(seed: int) -> None:
+    """By Bezier points, without a tolerance but rounding; and a plane on the same grid keeps its slopes."""
+    rng = np.random.default_rng(seed)
+    x, y = random_steps(rng, 7), random_steps(rng, 6)
+    depth = rng.choice([60.0, 90.0, 100.0], (7, 6)) if seed % 2 else rng.uniform(50, 100, (7, 6)).cumsum(axis=0)
+    depths = Depths(x=x, y=y, depth=depth.tolist())
+    assert leaves_range(depths) <= 1e-12 * depth.max()
+    plane = Depths(x=x, y=y, depth=[[100.0 - 0.06 * a + 0.03 * b for b in y] for a in x]).surface
+    np.testing.assert_allclose(plane.values[..., 1], -0.06, rtol=1e-9)
+    np.testing.assert_allclose(plane.values[..., 2], 0.03, rtol=1e-9)
+    np.testing.assert_allclose(plane.values[..., 3], 0.0, atol=1e-9)
+
+
+def test_slopes_are_those_of_monotone_cubics() -> None:
+    """Along x of depths that do not change with y, against scipy's PCHIP."""
+    rng = np.random.default_rng(8)
+    x, row = random_steps(rng, 20), rng.uniform(80, 100, 20)
+    depths = Depths(x=x, y=[0, 1, 5], depth=[[z] * 3 for z in row.tolist()])
+    places = np.linspace(x[0], x[-1], 500)
+    found = [depths.surface.at(a, 2.2)[0] for a in places]
+    np.testing.assert_allclose(found, PchipInterpolator(x, row)(places), rtol=1e-12)
 
 
 def test_a_line_over_a_hill_is_pushed_aside_and_balances() -> None:
