@@ -9,6 +9,7 @@ import numpy as np
 import typer
 
 from hybrid.cli.app import Json, LineName, Quiet, app, numbers, opened_line, session, window, words
+from hybrid.errors import ResultError
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -38,6 +39,9 @@ def stats(
 ) -> None:  # fmt: skip
     """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
+        if opened.lines:
+            first = next(iter(opened.lines))
+            raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      --line {first}")
         rows = rows_of(opened, names, at, times, hours * HOUR)
         for row in rows:
             console.json("statistics", **row)
@@ -56,7 +60,6 @@ def rows_of(
     result: Result, names: list[str] | None, at: list[float] | None, times: Any, duration: float
 ) -> list[dict[str, Any]]:
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none."""
-    from hybrid.errors import ResultError
     from hybrid.statistics.extremes import of_record
     from hybrid.statistics.moments import summary
     from hybrid.store.histories import history_of, lies_along, usual_names

@@ -42,6 +42,10 @@ def study(
     quiet: Quiet = False, as_json: Json = False,
 ) -> None:  # fmt: skip
     """Compute a scene with other values of its keys, many times; a second call does what is missing."""
+    if source.is_dir() and case is None and sensitivity is None:
+        raise UsageError(
+            f"{source} is a folder; a study file is expected, or --case N, --sensitivity RESULT for what it holds"
+        )
     with session(as_json, quiet) as console:
         if case is not None:
             target = console.will_write(output or Path(f"{source.stem}.case{case}.h5"))
@@ -56,10 +60,6 @@ def study(
             console.show(lambda: _influences(rows))
             console.json("done", file=str(source))
             return
-        if source.is_dir():
-            raise UsageError(
-                f"{source} is a folder; a study file is expected, or --case N, --sensitivity RESULT for what it holds"
-            )
         console.source = ""
         folder = output or source.with_suffix(".zarr")
         console.left = f"{folder} keeps what is done; the same command goes on"
@@ -91,6 +91,9 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
     for text, numbers in sorted(reasons.items(), key=lambda x: -len(x[1]))[:REASONS_SHOWN]:
         console.json("failed", reason=text, cases=numbers)
         console.note(f"note: {len(numbers)} failed, such as case {numbers[0]}: {text}")
+    empty = [row["name"] for row in rows if row["case"] is None]
+    if empty:
+        console.note(f"note: {', '.join(empty)}: in no case (too few peaks or up-crossings in the record)")
     if netcdf is not None:
         found.to_netcdf(netcdf, engine="h5netcdf")
     text = f"{counts['done']} cases done, {counts['failed']} failed, in {span(wall)} of wall time"
@@ -104,7 +107,11 @@ def ranges_of(done: Any) -> list[dict[str, Any]]:
     rows = []
     for name in done.data_vars:
         values = done[name].values
-        if done[name].dims != ("case",) or values.dtype.kind != "f" or name == "cpu" or not np.isfinite(values).any():
+        if done[name].dims != ("case",) or values.dtype.kind != "f" or name == "cpu":
+            continue
+        if not np.isfinite(values).any():
+            blank = {key: None for key in ("least", "median", "largest", "case")}
+            rows.append({"name": str(name), "unit": done[name].attrs.get("units", "")} | blank)
             continue
         worst = int(np.nanargmax(values))
         rows.append({
@@ -148,6 +155,6 @@ def _table(rows: list[dict[str, Any]]) -> Any:
         table.add_column(title, justify="right", no_wrap=True)
     for row in rows:
         name = f"{row['name']} ({row['unit']})" if row["unit"] else row["name"]
-        figures = (f"{row[key]:.5g}" for key in ("least", "median", "largest"))
-        table.add_row(name, *figures, str(row["case"]))
+        figures = ("" if row[key] is None else f"{row[key]:.5g}" for key in ("least", "median", "largest"))
+        table.add_row(name, *figures, "" if row["case"] is None else str(row["case"]))
     return table

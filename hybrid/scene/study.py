@@ -152,6 +152,8 @@ class Kept(Table):
     def _of_damage(self) -> Self:
         if ("damage" in self.take) != (self.curve is not None):
             refuse([Finding(("curve",), "a curve of fatigue with take: [damage], and nothing without", "D sea")])
+        if self.curve is not None and self.quantity != "tension":
+            refuse([Finding(("quantity",), "tension, of which damage is (with bending, where a section is given)")])
         if self.curve is None and (self.strength or self.section):
             refuse([Finding(("strength" if self.strength else "section",), "nothing, without take: [damage]")])
         return self

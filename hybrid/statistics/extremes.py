@@ -98,6 +98,7 @@ def of_record(
     threshold: in the unit of x; None: the fractile USUAL_THRESHOLD of the peaks, but so that LEAST_PEAKS are left.
     ResultError with fewer peaks than that.
     """
+    _check(duration, probability)
     times, _ = checked(t, x)
     peaks = peaks_of(t, x)
     if threshold is None and peaks.size >= LEAST_PEAKS:
@@ -139,6 +140,8 @@ def of_maxima(
 
     ResultError with less than LEAST_RECORDS, or values that are all alike.
     """
+    _check(duration, probability)
+    _check(record, probability)
     values = np.asarray(maxima, float).ravel()
     if values.size < LEAST_RECORDS or not np.all(np.isfinite(values)):
         raise ResultError(
@@ -157,6 +160,14 @@ def of_maxima(
         float(mode + scale * (shift + rare)), _interval(modes + scales * (shift + rare)), probability, duration,
         int(values.size), duration / record, f"Gumbel, mode {float(mode):.6g}, scale {float(scale):.4g}",
     )  # fmt: skip
+
+
+def _check(duration: float, probability: float) -> None:
+    """ResultError for times and probabilities that are none."""
+    if not 0.0 < duration < math.inf:
+        raise ResultError(f"duration = {duration:g} s is no time\n    expected: a number above 0")
+    if not 0.0 < probability < 1.0:
+        raise ResultError(f"probability = {probability:g} is none\n    expected: a number between 0 and 1")
 
 
 def _interval(values: Floats) -> tuple[float, float]:

@@ -24,12 +24,14 @@ LEAST_SAMPLES = 16
 class Spectrum(NamedTuple):
     """One-sided density S (n, ...) in unit squared seconds (per Hz) at frequencies f (n,) Hz.
 
-    spacing: Hz, of the frequencies that a segment resolves.
+    spacing: Hz, of the frequencies that a segment resolves.  captured: part (...) of the variance of the record that
+    the spectrum has; well below 1 where segments are short for the periods in it, and longer ones are needed.
     """
 
     f: Floats
     S: Floats
     spacing: float
+    captured: Floats | float = 1.0
 
     def moment(self, n: int) -> Floats:
         """The integral of f^n S (...), unit squared times Hz^n; that of n = -1 leaves f = 0 out."""
@@ -75,4 +77,7 @@ def welch(t: ArrayLike, x: ArrayLike, segment: float | None = None) -> Spectrum:
             f"    expected: {LEAST_SAMPLES} to {count} samples, {LEAST_SAMPLES * dt:.4g} to {count * dt:.4g} s"
         )
     f, S = of_scipy(values, 1.0 / dt, "hann", samples, detrend="constant", axis=0)
-    return Spectrum(f, S, 1.0 / (samples * dt))
+    variance = values.var(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        captured = np.where(variance > 0.0, np.trapezoid(S, f, axis=0) / variance, 1.0)
+    return Spectrum(f, S, 1.0 / (samples * dt), captured)

@@ -53,6 +53,8 @@ def usual_names(result: Result) -> list[str]:
 def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
     """A history of a result.  times: from and to (s); at: arc lengths (m), None: all output points.
 
+    A place where the quantity jumps comes twice, with the value before and after it.
+
     ResultError for what is no history of numbers, a window with no value in it, or a place outside.
     """
     stored = f"steps/{name}" if f"steps/{name}" in result and name not in result else ALIASES.get(name, name)
@@ -64,19 +66,39 @@ def history_of(result: Result, name: str, times: Window | None = None, at: Any =
         raise ResultError(f"'{name}' is no history: its dimensions are ({', '.join(dims)})\n    try:      tension")
     t, s = np.asarray(result[dims[0]]), None
     if dims[1:] == ("s",):
-        s = np.asarray(result["s"] if at is None else np.atleast_1d(np.asarray(at, float)))
+        s, values = result.both_sides(stored)
         if at is not None:
-            values = result.at(s=s, names=[stored], side="left")[stored]
+            s, values = _at_places(result, stored, s, values, np.atleast_1d(np.asarray(at, float)))
     elif at is not None:
         raise ResultError(f"'{name}' has no value at an arc length: its dimensions are ({', '.join(dims)})")
-    first, last = times or (None, None)
-    a, b = -np.inf if first is None else first, np.inf if last is None else last
+    a, b = _window(times)
     inside = (t >= a) & (t <= b)
     if not inside.any():
         over = f"{t[0]:.6g} to {t[-1]:.6g} s" if t.size else "none"
         raise ResultError(f"no value of '{name}' lies between t = {a:g} and {b:g} s\n    expected: a window in {over}")
     basis = "every step" if dims[0] == "steps/t" else "every output"
     return History(name, result.units[stored], t[inside], np.asarray(values)[inside], s, basis)
+
+
+def _window(times: Window | None) -> tuple[float, float]:
+    """From and to, s; ResultError for what is no window."""
+    if times is None:
+        return -np.inf, np.inf
+    if len(times) != 2:
+        raise ResultError(f"times = {times!r} is no window\n    expected: (from, to), in s; None for no limit")
+    first, last = times
+    return -np.inf if first is None else float(first), np.inf if last is None else float(last)
+
+
+def _at_places(result: Result, name: str, s: Floats, values: Floats, at: Floats) -> tuple[Floats, Floats]:
+    """Arc lengths and values (nt, n) at places, of which those where the quantity jumps come twice."""
+    columns, places = [], []
+    for x in at:
+        exact = np.flatnonzero(np.abs(s - x) <= 1e-9 * np.ptp(s)) if np.ptp(s) > 0.0 else np.zeros(1, int)
+        found = values[:, exact] if exact.size else np.asarray(result.at(s=[x], names=[name], side="left")[name])
+        columns.append(found)
+        places += [x] * found.shape[1]
+    return np.array(places), np.concatenate(columns, axis=1)
 
 
 class Histories:
@@ -89,10 +111,12 @@ class Histories:
         extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
 
         names: None for end forces, tension, curvature, bending moment, torque and contact force, where the result has
-        them; times: from and to, s; at: arc lengths, m, None: all output points.
+        them; times: from and to, s; at: arc lengths, m, None: all output points.  A quantity along the line has a value
+        at each place of `both_sides(name)[0]`: where it jumps, one before and one after.
         """
         found = {}
-        for name in usual_names(self) if names is None else names:
+        asked = usual_names(self) if names is None else [names] if isinstance(names, str) else names
+        for name in asked:
             history = history_of(self, name, times, at if lies_along(self, name) else None)
             found[name] = moments.summary(history.t, history.values)
         return found
@@ -140,13 +164,14 @@ class Histories:
         law = fatigue.curve_of(curve)
         tension = history_of(self, "tension", times, at)
         if law.kind == "T-N":
-            if strength is None or section is not None:
-                raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: strength=..., in N")
+            if strength is None or section is not None or not 0.0 < strength < np.inf:
+                expected = "strength=..., in N, above 0, and no section"
+                raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: {expected}")
             return np.asarray(tension.s), fatigue.damage(tension.values, law, concentration / strength)
-        if section is None or strength is not None:
+        if section is None or strength is not None or len(section) != 3 or not all(0.0 < x < np.inf for x in section):
             fix = "section=(area m2, outer diameter m, Young's modulus Pa)"
             raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
-        bends = _bends(self, times, at)
+        bends = _bends(self, times, np.asarray(tension.s))
         found = []
         for k in range(FIBRES):
             angle = 2.0 * np.pi * k / FIBRES
@@ -156,13 +181,12 @@ class Histories:
         return np.asarray(tension.s), np.max(found, axis=0)
 
 
-def _bends(result: Result, times: Window | None, at: Any) -> Floats:
-    """Curvature (nt, n, 2) 1/m about two axes across the mean tangent of every place."""
-    size = history_of(result, "curvature", times, at).values
-    s, t = np.asarray(result["s"]), np.asarray(result["t"])
-    first, last = times or (None, None)
-    inside = (t >= (-np.inf if first is None else first)) & (t <= (np.inf if last is None else last))
-    theta, phi = result["theta"][inside], result["phi"][inside]
+def _bends(result: Result, times: Window | None, at: Floats) -> Floats:
+    """Curvature (nt, n, 2) 1/m about two axes across the mean tangent at places (n,) m of `history_of`."""
+    (s, size), (_, theta), (_, phi) = (result.both_sides(name) for name in ("curvature", "theta", "phi"))
+    a, b = _window(times)
+    inside = (result["t"] >= a) & (result["t"] <= b)
+    size, theta, phi = size[inside], theta[inside], phi[inside]
     tangent = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
     before = np.concatenate([tangent[:, :1], tangent[:, :-1]], axis=1)
     after = np.concatenate([tangent[:, 1:], tangent[:, -1:]], axis=1)
@@ -170,8 +194,11 @@ def _bends(result: Result, times: Window | None, at: Any) -> Floats:
     length = np.linalg.norm(axis, axis=2, keepdims=True)
     axis = np.divide(axis, length, out=np.zeros_like(axis), where=length > 0.0)
     mean = tangent.mean(axis=0)
-    if at is not None:
-        nearest = np.abs(s[:, None] - np.atleast_1d(np.asarray(at, float))).argmin(axis=0)
+    if at.size != s.size or not np.array_equal(at, s):
+        nearest = np.array([np.abs(s - x).argmin() for x in at])
+        twice = np.flatnonzero(np.diff(at) == 0.0) + 1  # the second of two is the value after a jump
+        nearest[twice] += 1
+        size = np.stack([np.interp(at, s, row) for row in size]) if not np.isin(at, s).all() else size[:, nearest]
         axis, mean = axis[:, nearest], mean[nearest]
     aside = np.eye(3)[np.abs(mean).argmin(axis=1)]
     one = np.cross(mean, aside)
@@ -188,8 +215,10 @@ def lies_along(result: Result, name: str) -> bool:
 
 
 def _one(history: History) -> History:
-    """The same as one history; ResultError if it is several."""
+    """The same as one history, of two values at one place the one that ranges more; ResultError if it is several."""
     values = history.values.reshape(history.values.shape[0], -1)
+    if history.s is not None and values.shape[1] == 2 and history.s[0] == history.s[1]:
+        return history._replace(values=values[:, int(np.ptp(values, axis=0).argmax())])
     if values.shape[1] != 1:
         fix = "at=..., an arc length in m" if history.s is not None else "a quantity with one value"
         raise ResultError(f"'{history.name}' has {values.shape[1]} values at a time\n    try:      {fix}")

@@ -7,6 +7,7 @@ import hashlib
 import json
 import math
 import re
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from copy import deepcopy
 from dataclasses import dataclass
@@ -24,6 +25,15 @@ from hybrid.store.selection import optional_package
 from hybrid.studies.sensitivity import DESIGNS, design
 
 Row = dict[str, Any]
+LONGEST_PATH = 4096
+
+
+def digest_of(file: str) -> str:
+    """A hash of a file; empty if it is not there."""
+    try:
+        return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:16]
+    except OSError:
+        return ""
 
 
 @dataclass(frozen=True)
@@ -51,9 +61,14 @@ class Cases:
         digest = hashlib.sha256(json.dumps([self.base, self.keys, self.static], sort_keys=True).encode())
         for row in self.rows:
             digest.update(json.dumps(row, sort_keys=True).encode())
-        for file in sorted(_files_in(self.base) | {x for row in self.rows for x in _files_in(row)}):
-            digest.update(Path(file).read_bytes())
+        digest.update(json.dumps(self.files, sort_keys=True).encode())
         return digest.hexdigest()[:16]
+
+    @property
+    def files(self) -> dict[str, str]:
+        """Hashes of the files that scenes read, by path."""
+        named = _files_in(self.base) | {x for row in self.rows for x in row.values() if isinstance(x, str)}
+        return {x: digest_of(x) for x in sorted(named) if len(x) < LONGEST_PATH and Path(x).is_file()}
 
 
 def cases_of(study: Study) -> Cases:
@@ -74,13 +89,35 @@ def cases_of(study: Study) -> Cases:
     short = short_names(keys)
     keys = {short[name]: paths for name, paths in keys.items()}
     units = {short[name]: unit for name, unit in units.items()}
+    _refuse_names(keys, study)
     rows = _chosen(study, [{short[name]: value for name, value in row.items()} for row in rows])
     if not rows:
         raise SceneError([Complaint("only_if", str(study.only_if), "a condition that some case fulfils", "relax it")])
     _check_keys(text, study.scene, keys, rows[0])
+    rows = [_with_absolute_files(row, keys, Path(study.scene).parent) for row in rows]
     base = scene.model_dump(mode="json", exclude_none=True)
     bounds = {short[name]: (each.low, each.high) for name, each in study.vary.items() if each.low is not None}
     return Cases(base, keys, rows, _derived(study, rows), units, study.static, bounds)  # type: ignore[arg-type]
+
+
+def _refuse_names(keys: Mapping[str, Sequence[str]], study: Study) -> None:
+    """SceneError for a name that means two things, or a key that two variables set."""
+    known: dict[str, str] = {}
+    for name, paths in keys.items():
+        if name in TAKEN or name == "s" or name in study.derive:
+            expected = f"a name of its own, none of {', '.join((*TAKEN, 's'))}, and not that of a derived column"
+            raise SceneError([Complaint("vary", name, expected, f"{name}_: {{key: ...}}")])
+        for path in paths:
+            if path in known:
+                expected = f"a key of its own: {known[path]} sets it too"
+                raise SceneError([Complaint(f"vary.{name}", path, expected, "leave one of them out")])
+            known[path] = name
+
+
+def _with_absolute_files(row: Row, keys: Mapping[str, Sequence[str]], folder: Path) -> Row:
+    """The same with names of files relative to the scene file made absolute."""
+    named = {name for name, paths in keys.items() if any(re.search(r"\.(file|rao)$", path) for path in paths)}
+    return {k: str((folder / v).absolute()) if k in named and isinstance(v, str) else v for k, v in row.items()}
 
 
 def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:
@@ -201,11 +238,13 @@ def _evaluated(where: str, text: str, rows: list[Row]) -> list[Any]:
     functions |= {"abs": abs, "min": min, "max": max, "round": round}
     evaluator = package.SimpleEval(functions=functions)
     try:
-        tree = evaluator.parse(text)
         found = []
-        for row in rows:
-            evaluator.names = {"pi": pi} | row
-            found.append(evaluator.eval(text, tree))
+        with warnings.catch_warnings():
+            warnings.simplefilter("error")  # an assignment, m = 5 for m == 5, is only warned of
+            tree = evaluator.parse(text)
+            for row in rows:
+                evaluator.names = {"pi": pi} | row
+                found.append(evaluator.eval(text, tree))
         return found
     except Exception as error:
         expected = f"arithmetic and comparisons of {', '.join(rows[0])}"

@@ -53,16 +53,23 @@ def usual(static: bool) -> dict[str, Kept]:
     return {name: Kept(quantity=q, take=take) for name, (q, take) in (AT_REST if static else USUAL).items()}
 
 
+def names_of(wanted: Mapping[str, Kept]) -> dict[str, tuple[str, str]]:
+    """Names under which things are kept: of which entry of `collect`, and what is taken."""
+    found: dict[str, tuple[str, str]] = {}
+    for name, kept in wanted.items():
+        for take in kept.take:
+            found[f"{name}_{take}" if len(kept.take) > 1 or take in ("history", "profile") else name] = (name, take)
+    return found
+
+
 def collected(result: Result, wanted: Mapping[str, Kept]) -> dict[str, tuple[Variable, Floats]]:
     """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken.
 
     ResultError for a quantity that the result does not have, or what cannot be taken of it.
     """
     found: dict[str, tuple[Variable, Floats]] = {}
-    for name, kept in wanted.items():
-        for take in kept.take:
-            key = f"{name}_{take}" if len(kept.take) > 1 or take in ("history", "profile") else name
-            found[key] = _taken(result, name, kept, take)
+    for key, (name, take) in names_of(wanted).items():
+        found[key] = _taken(result, name, wanted[name], take)
     return found
 
 
@@ -71,7 +78,8 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
     name, at = kept.quantity, None if kept.at is None else np.atleast_1d(np.asarray(kept.at, float))
     if take in ("max", "min") and at is None and kept.times is None and f"envelope/{name}_{take}" in result:
         values = result[f"envelope/{name}_{take}"]  # of every step
-        worst = np.nanmax(values) if take == "max" else np.nanmin(values)
+        known = values[np.isfinite(values)]
+        worst = (known.max() if take == "max" else known.min()) if known.size else np.nan
         return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
     places = {f"{own}_at": ("m", at)} if at is not None and at.size > 1 else {}
     dims = tuple(places)
@@ -85,6 +93,12 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
     if at is not None and not lies_along(result, name):
         raise ResultError(f"'{name}' has no value at an arc length")
     history = history_of(result, name, kept.times, at)
+    if history.s is None and history.values.ndim > 1:
+        raise ResultError(
+            f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      end_force_end"
+        )
+    if places and history.s is not None and history.s.size != at.size:  # type: ignore[union-attr]
+        places = {f"{own}_at": ("m", history.s)}  # a place where the quantity jumps comes twice
     unit, about = history.unit, f"{name}, {history.basis}"
     values = history.values
     if take == "profile":
@@ -125,4 +139,5 @@ def _placed(variable: Variable, values: Floats, take: str = "max") -> tuple[Vari
     """Values (n,) at the places that are wanted; without any the largest of all (of smallest values the smallest)."""
     if variable.dims:
         return variable, values
-    return variable, np.asarray((np.nanmin if take == "min" else np.nanmax)(values) if values.size else np.nan)
+    known = values[np.isfinite(values)]
+    return variable, np.asarray((known.min() if take == "min" else known.max()) if known.size else np.nan)

@@ -22,16 +22,16 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, ComputationError, HybridError, ResultError, SceneError
+from hybrid.errors import EVENTS_BY_WEIGHT, Complaint, ComputationError, HybridError, ResultError, SceneError
 from hybrid.model.plan import plan
 from hybrid.scene.read import SceneLike
 from hybrid.scene.study import Kept, Study, read_study, study_from
 from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
 from hybrid.store.selection import optional_package
-from hybrid.store.study_file import DONE, FAILED, OWN, Column, StudyFile, counts_of, open_study
-from hybrid.studies.cases import Cases, cases_of, scene_of
-from hybrid.studies.collect import Variable, collected, usual
+from hybrid.store.study_file import DONE, FAILED, OPEN, OWN, Column, StudyFile, counts_of, open_study
+from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of
+from hybrid.studies.collect import Variable, collected, names_of, usual
 
 if TYPE_CHECKING:
     import xarray
@@ -42,6 +42,8 @@ BATCH_TIME, MOST_IN_BATCH = 4.0, 200
 AHEAD = 3
 # So often a batch is tried whose worker died; then its cases are computed one by one.
 TRIES = 3
+# How the reason of a case begins that was computed, and of which something could not be kept.
+NOT_KEPT = "not kept: "
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,8 @@ def study(
     """
     asked, target = _asked(source, vary, collect, more, output)
     cases, wanted = cases_of(asked), asked.collect or usual(asked.static)
-    identity = _identity(cases, wanted)
+    _refuse_collisions(cases, wanted)
+    identity = _identity(cases, wanted, asked.derive)
     with locked(target):
         if target.exists() and overwrite:
             StudyFile(target)  # nothing else is removed
@@ -124,7 +127,11 @@ def study(
 
 def case_of(path: str | Path, case: int, output: str | Path | None = None) -> Any:
     """Compute one case of a study again, with everything in its result; output: as of `hybrid.run`."""
+    if not Path(path).is_dir():
+        raise ResultError(f"{path} is not the results of a study\n    expected: its folder, such as STUDY.zarr")
     attributes = StudyFile(path).attributes
+    if changed := [file for file, digest in json.loads(attributes["files"]).items() if digest_of(file) != digest]:
+        raise ResultError(f"{', '.join(changed)} has changed since {path} was computed: the case would be another one")
     stored = json.loads(attributes["study"])
     if not 0 <= case < len(stored["rows"]):
         raise ResultError(f"{path} has no case {case}\n    expected: 0 to {len(stored['rows']) - 1}")
@@ -149,10 +156,20 @@ def _asked(
     return found, Path(output if output is not None else beside).expanduser().resolve()
 
 
-def _identity(cases: Cases, wanted: Mapping[str, Kept]) -> str:
+def _refuse_collisions(cases: Cases, wanted: Mapping[str, Kept]) -> None:
+    """SceneError where something that is kept has the name of a variable, of a derived column or of another thing."""
+    names = names_of(wanted)
+    both = set(names) & {*cases.keys, *cases.derived, *OWN, "case", "s"}
+    if both or len(names) < sum(len(kept.take) for kept in wanted.values()):
+        given = ", ".join(sorted(both)) or "the same name twice"
+        expected = "names of their own, also with _max and the like behind them, for what is kept"
+        raise SceneError([Complaint("collect", given, expected, "another name")])
+
+
+def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str]) -> str:
     import hashlib
 
-    kept = {name: each.model_dump(mode="json") for name, each in wanted.items()}
+    kept = {name: each.model_dump(mode="json") for name, each in wanted.items()} | {"derive": dict(derived)}
     return hashlib.sha256((cases.identity + json.dumps(kept, sort_keys=True)).encode()).hexdigest()[:16]
 
 
@@ -182,7 +199,8 @@ def _created(
     attributes = {
         "identity": identity, "title": asked.title or Path(asked.scene).stem, "study": json.dumps(stored),
         "variables": json.dumps(list(columns)), "scene_file": Path(asked.scene).name,
-        "sample": json.dumps(asked.sample.model_dump() if asked.sample else None), "bounds": json.dumps(cases.bounds),
+        "files": json.dumps(cases.files), "sample": json.dumps(asked.sample.model_dump() if asked.sample else None),
+        "bounds": json.dumps(cases.bounds),
     }  # fmt: skip
     return StudyFile.create(target, columns, len(rows), batch, attributes)
 
@@ -226,7 +244,7 @@ def _computed(job: Job, row: dict[str, Any]) -> Outcome:
         try:
             return Outcome(DONE, "", events, spent, steps, collected(result, job.wanted))
         except (HybridError, KeyError, AttributeError) as error:
-            return Outcome(FAILED, f"not kept: {str(error).splitlines()[0]}", events, spent, steps, {})
+            return Outcome(FAILED, NOT_KEPT + str(error).splitlines()[0], events, spent, steps, {})
 
 
 # ---- here -----------------------------------------------------------------------------------------
@@ -271,6 +289,7 @@ def _compute(
                     outcomes = future.result()
                 else:
                     raise ResultError(_gone(file, future.status))
+                _refuse_what_is_never_kept(file, outcomes)
                 _write(file, k, outcomes)
                 future.release()
                 tell(dashboard)
@@ -282,6 +301,16 @@ def _compute(
         finally:
             with suppress(Exception):
                 client.cancel(list(running))
+
+
+def _refuse_what_is_never_kept(file: StudyFile, outcomes: list[Outcome]) -> None:
+    """ResultError if of the first batch nothing could be kept, for the reason of `collect`: so it would be of all."""
+    reasons = {one.reason for one in outcomes if one.reason.startswith(NOT_KEPT)}
+    if len(reasons) == 1 and all(one.reason in reasons for one in outcomes) and not (file.status != OPEN).any():
+        detail = reasons.pop().removeprefix(NOT_KEPT)
+        raise ResultError(
+            f"of the first {len(outcomes)} cases nothing could be kept: {detail}\n    try:      another collect"
+        )
 
 
 def _gone(file: StudyFile, detail: str) -> str:
@@ -353,25 +382,27 @@ def _main_is_not_imported() -> Iterator[None]:
 
 
 def _write(file: StudyFile, batch: int, outcomes: list[Outcome]) -> None:
-    """Outcomes of a batch as columns; a case whose arrays do not fit those of the study has failed."""
+    """Outcomes of a batch as columns; arrays that do not fit those of the study are left out, with the reason."""
     shapes: dict[str, tuple[int, ...]] = {}
     variables: dict[str, Variable] = {}
     coordinates: dict[str, Column] = {}
     fitting = []
     for one in outcomes:
-        why = ""
+        kept, why = dict(one.kept), []
         for name, (variable, values) in one.kept.items():
+            misfit = shapes.setdefault(name, values.shape) != values.shape
             for dim, (unit, along) in variable.coordinates.items():
                 known = coordinates[dim].values if dim in coordinates else file.coordinate(dim)
                 if known is None:
                     text = "arc length" if unit == "m" else "time"
                     coordinates[dim] = Column(unit, text, (), np.asarray(along, float))
                 elif known.shape != np.shape(along) or not np.allclose(known, along, rtol=1e-9, atol=1e-12):
-                    why = f"{name}: its {dim} is not that of the first case"
-            if shapes.setdefault(name, values.shape) != values.shape:
-                why = why or f"{name}: its shape is not that of the first case"
+                    misfit = True
+            if misfit:
+                why.append(f"{name}, whose times or places are not those of the first case")
+                del kept[name]
         if why:
-            one = one._replace(status=FAILED, reason=f"not kept: {why}", kept={})
+            one = one._replace(reason=NOT_KEPT + "; ".join(why), kept=kept)
         for name, (variable, _) in one.kept.items():
             variables.setdefault(name, variable)
         fitting.append(one)

@@ -46,9 +46,9 @@ def refused(uses: list[Callable[[], Any]]) -> int:
 # --- several lines -------------------------------------------------------------------------------
 
 
-def system() -> hybrid.SystemSimulation:
+def system(duration: float = 1.0) -> hybrid.SystemSimulation:
     data = next(iter(hybrid.import_moordyn(DECK).scenes.values())).scene.model_dump(exclude_none=True)
-    return hybrid.SystemSimulation(data | {"time": {"duration": 1.0, "step": 0.05}})
+    return hybrid.SystemSimulation(data | {"time": {"duration": duration, "step": 0.05}})
 
 
 def uses_of_a_system(s: hybrid.SystemSimulation) -> Iterator[Callable[[], Any]]:
@@ -82,18 +82,22 @@ def test_wrong_uses_of_several_lines() -> None:
 
 
 def test_two_threads_in_several_lines() -> None:
-    with system() as lines:
+    """A second thread is refused in words, and the first goes on; repeated until both have met."""
+    with system(30.0) as lines:
         found: list[str] = []
-        busy = threading.Thread(target=lambda: lines.advance(1.0))
-        busy.start()
-        while busy.is_alive():
-            for use in (lambda: lines.point("point4"), lambda: lines.line("line1"), lambda: lines.advance(1.0)):
-                try:
-                    use()
-                except ValueError as error:
-                    found.append(str(error))
-        busy.join()
-        assert lines.t == pytest.approx(1.0)
+        for k in range(1, 60):
+            busy = threading.Thread(target=lines.advance, args=(0.5 * k,))
+            busy.start()
+            while busy.is_alive():
+                for use in (lambda: lines.point("point4"), lambda: lines.line("line1")):
+                    try:
+                        use()
+                    except ValueError as error:
+                        found.append(str(error))
+            busy.join()
+            assert lines.t == pytest.approx(0.5 * k)
+            if any("another thread" in text for text in found):
+                break
         assert any("another thread" in text for text in found)
 
 

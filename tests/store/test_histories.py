@@ -103,12 +103,38 @@ def test_damage_along_the_line(result: hybrid.Result) -> None:
         (lambda r: r.spectrum("tension", segment=1e6), "expected"),
         (lambda r: r.damage("D sea", strength=1e6), "ranges of stress"),
         (lambda r: r.damage("studless chain T-N"), "strength"),
+        (lambda r: r.damage("D sea", section=(1e-3, 0.05)), "section="),
+        (lambda r: r.damage("studless chain T-N", strength=-1.0), "above 0"),
+        (lambda r: r.statistics("tension", times=(1.0,)), "no window"),
+        (lambda r: r.extreme("end_force_end", probability=1.5), "between 0 and 1"),
         (lambda r: r.damage("D see", section=(1, 1, 1)), "did you mean D sea"),
     ],
 )  # fmt: skip
 def test_what_cannot_be_is_refused_in_words(result: hybrid.Result, ask: object, text: str) -> None:
     with pytest.raises((ResultError, KeyError, AttributeError), match=text):
         ask(result)  # type: ignore[operator]
+
+
+def test_both_sides_of_a_jump_are_counted() -> None:
+    """EI changes a hundredfold at s = 30 m: curvature behind it is that of the softer side, and damage is done there."""
+    first = SCENE["cable"]["sections"][0] | {"length": 30.0, "bending_stiffness": 5e4}
+    scene = SCENE | {
+        "cable": {"sections": [first, first | {"bending_stiffness": 5e2}]},
+        "time": {"duration": 20.0, "step": 0.1},
+    }
+    result = hybrid.run(scene)
+    s, curvature = result.both_sides("curvature")
+    left, right = np.flatnonzero(s == 30.0)
+    found = result.statistics("curvature")["curvature"]
+    assert (
+        found.maximum.shape == s.shape and found.maximum[right] == curvature[:, right].max() > 5.0 * found.maximum[left]
+    )
+    at = result.statistics("curvature", at=[10.0, 30.0])["curvature"].maximum
+    assert at.shape == (3,) and at[2] == found.maximum[right]
+    places, damage = result.damage("D sea", section=(5e-4, 0.04, 2e11))
+    assert np.array_equal(places, s) and damage[right] > 5.0 * damage[left]
+    alone_places, alone = result.damage("D sea", section=(5e-4, 0.04, 2e11), at=[30.0])
+    assert alone_places.tolist() == [30.0, 30.0] and alone == pytest.approx(damage[[left, right]], rel=1e-9)
 
 
 def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:

@@ -142,6 +142,10 @@ def test_short_names_are_unlike() -> None:
         ({}, "variables, or a table"),
         ({"vary": {STEP: [0.1] * 1001, CELLS: [8] * 1001}}, "cases"),
         ({"vary": {STEP: [0.1]}, "cases": "nowhere.csv"}, "nowhere.csv"),
+        ({"vary": {STEP: [0.1, 0.2]}, "only_if": "step = 0.1"}, "only_if"),
+        ({"vary": {"a": {"key": STEP, "values": [0.1]}, "b": {"key": STEP, "values": [0.2]}}}, "sets it too"),
+        ({"vary": {STEP: [0.1]}, "derive": {"step": "2 * step"}}, "of its own"),
+        ({"vary": {STEP: [0.1]}, "collect": {"x": {"quantity": "curvature", "take": ["damage"], "curve": "D sea"}}}, "tension, of which"),
     ],
 )  # fmt: skip
 def test_what_is_no_study_is_refused(folder: Path, study: dict, text: str) -> None:
@@ -241,15 +245,60 @@ def test_one_case_again_with_its_whole_result(folder: Path, found: object, tmp_p
         hybrid.study_case(folder / "heave.zarr", 9)
 
 
-def test_equilibria_and_quantities_that_are_not_there(folder: Path, tmp_path: Path) -> None:
-    """A study at rest; a quantity that a result does not have is the reason of a failure, not the end of the study."""
+def test_equilibria(folder: Path, tmp_path: Path) -> None:
+    """A study at rest is the statics of each scene."""
     vary = {"cable.sections[0].mass": [6, 8]}
     rest = hybrid.study(folder / "scene.yaml", tmp_path / "rest.zarr", vary=vary, static=True, workers=1)
     expected = hybrid.static(hybrid.load_scene(folder / "scene.yaml", ["cable.sections[0].mass=6"])).tension.max()
     assert rest["tension_max"].values[0] == pytest.approx(expected, rel=1e-12)
-    wrong = {"x": {"quantity": "tensoin"}}
-    lost = hybrid.study(folder / "scene.yaml", tmp_path / "lost.zarr", vary=vary, collect=wrong, static=True, workers=1)
-    assert lost["status"].values.tolist() == [FAILED, FAILED] and "tension" in str(lost["reason"].values[0])
+
+
+def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> None:
+    """A quantity that no result has, or one with several values: said after the first batch, and nothing is written."""
+    vary = {"cable.sections[0].mass": [6, 8]}
+    for wrong, text in (
+        ({"quantity": "tensoin"}, "did you mean"),
+        ({"quantity": "reaction_end"}, "3 values at a time"),
+    ):
+        with pytest.raises(ResultError, match=text):
+            hybrid.study(
+                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, workers=1,
+                overwrite=(tmp_path / "x.zarr").exists(),
+            )  # fmt: skip
+
+
+def test_names_that_mean_two_things_are_refused(folder: Path, tmp_path: Path) -> None:
+    vary = {"p_max": {"key": "time.step", "values": [0.1, 0.2]}}
+    with pytest.raises(SceneError, match="p_max"):
+        collect = {"p": {"quantity": "tension", "take": ["max", "min"]}}
+        hybrid.study(folder / "scene.yaml", tmp_path / "y.zarr", vary=vary, collect=collect)
+
+
+def test_files_are_those_beside_the_scene(folder: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """A varied file is looked for beside the scene, not where the study is called; when it changes, --case says so."""
+    for where, lift in ((folder, 0.0), (tmp_path, 5.0)):
+        (where / "a.csv").write_text("t,x,y,z\n" + "".join(f"{t},35,0,{lift if t > 1 else 0}\n" for t in range(9)))
+    (folder / "moved.yaml").write_text(
+        SCENE.replace("{heave: {amplitude: 1.0, period: 5.0}, ramp: 5}", "{file: a.csv, ramp: 2}")
+    )
+    monkeypatch.chdir(tmp_path)
+    vary = {"ends.end.motion.file": ["a.csv"]}
+    cases = cases_of(study_from({"scene": "moved.yaml", "vary": vary}, folder))
+    assert cases.rows == [{"file": str(folder / "a.csv")}] and list(cases.files) == [str(folder / "a.csv")]
+    before = cases.identity
+    (folder / "a.csv").write_text("t,x,y,z\n" + "".join(f"{t},35,0,0\n" for t in range(12)))
+    assert cases_of(study_from({"scene": "moved.yaml", "vary": vary}, folder)).identity != before
+
+
+def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path) -> None:
+    """Where one section is longer a profile has other places: it is left out, and what is one number is kept."""
+    kept = {"t": {"quantity": "tension", "take": ["max", "profile"]}}
+    vary = {"cable.sections[0].length": [60, 62]}
+    found = hybrid.study(
+        folder / "scene.yaml", tmp_path / "l.zarr", vary=vary, collect=kept, static=True, workers=1, batch=2
+    )
+    assert found["status"].values.tolist() == [DONE, DONE] and np.isfinite(found["t_max"].values).all()
+    assert np.isnan(found["t_profile"].values[1]).all() and "t_profile" in str(found["reason"].values[1])
 
 
 def test_the_command_says_ranges_and_reasons(
