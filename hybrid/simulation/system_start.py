@@ -7,13 +7,17 @@ from collections.abc import Iterator
 import numpy as np
 
 from hybrid.errors import ComputationError, Outcome
+from hybrid.kernels.bodies import NUMBERS
+from hybrid.kernels.members import PIECE, PUSH, WATER, WET
+from hybrid.kernels.state import Floats
 from hybrid.model.system import SystemModel, balanced_places, build_system
 from hybrid.scene.system import System
 from hybrid.solve.system import JoinedLine, SystemState, joined_ends
 from hybrid.solve.system_statics import LineFailed, Start, SystemEquilibrium, solve_system_statics
 
-# Equilibria until the water around members no longer changes, and what of the largest number of a body counts as that.
-MOST_ROUNDS, SAME_WATER = 30, 1e-9
+# Equilibria until the water around members is that of the place found, and what of the largest wetted part, velocity
+# and acceleration there counts as the same.
+MOST_ROUNDS, SAME_WATER = 40, 1e-8
 
 
 def equilibrium_of_system(system: System, model: SystemModel, t: float) -> SystemEquilibrium:
@@ -23,17 +27,33 @@ def equilibrium_of_system(system: System, model: SystemModel, t: float) -> Syste
         found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, _starts(system, model))
         if not any(body.members for body in model.bodies):
             return found
+        part, before = 1.0, None
         for _ in range(MOST_ROUNDS):  # members feel the water where they come to rest
-            before = numbers.copy()
-            still = np.inf if np.isinf(t) else t
-            model.stir(still, found.state.bodies, 0.0, numbers)
-            if np.abs(numbers - before).max() <= SAME_WATER * np.abs(numbers).max():
+            there = numbers.copy()
+            model.stir(t, found.state.bodies, 0.0, there)
+            if _same_water(there, numbers):
                 return found
+            change = there - numbers
+            if before is not None:  # Aitken's factor, for members that the water lifts out of it or pulls under
+                more = change - before
+                part = float(np.clip(-part * (before * more).sum() / max((more * more).sum(), 1e-300), 0.05, 1.0))
+            numbers += part * change
+            before = change
             start = [("members where they came to rest", found.state)]
             found = solve_system_statics(joined_lines(model, t), len(model.free), numbers, iter(start))
-        raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, "members of a body do not come to rest in this water")
+        told = f"the place of a body and the water around its members do not agree after {MOST_ROUNDS} equilibria; "
+        raise LineFailed(-1, Outcome.NOT_CONVERGED, None, None, told + "take a nearer initial_guess, or more pieces")
     except LineFailed as failed:
         raise named(failed, model) from None
+
+
+def _same_water(there: Floats, taken: Floats) -> bool:
+    """Whether wetted parts, velocity and acceleration of the water in numbers of bodies are the same."""
+    now, then = (x[:, NUMBERS:].reshape(-1, PIECE) for x in (there, taken))
+    return all(
+        np.abs(now[:, a:b] - then[:, a:b]).max() <= SAME_WATER * np.abs(now[:, a:b]).max()
+        for a, b in ((WET, WATER), (WATER, PUSH), (PUSH, PIECE))
+    )
 
 
 def _starts(system: System, model: SystemModel) -> Iterator[Start]:

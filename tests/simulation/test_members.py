@@ -53,6 +53,44 @@ def test_a_current_pushes_with_the_drag_of_the_members() -> None:
         assert np.abs(result["bodies/it/moment"][-1, [0, 2]]).max() < 1e-9 * expected
 
 
+def floating(**more: Any) -> dict[str, Any]:
+    """The body upright at the surface, in a current; a line to each side."""
+    members = [{"start": [0, 0, -2], "end": [0, 0, 2], "diameter": 0.5, "drag": 1.0, "pieces": 8}]
+    floats = {"hydrostatics": {"heave": 5e3, "roll": 1e9, "pitch": 1e9}, "volume": 0.0}
+    given = body(**({"members": members, "centre_of_buoyancy": [0, 0, 0]} | floats | more))
+    made = scene({"current": [0.8, 0, 0], "surface": 0.0}, given)
+    made["points"]["west"]["position"], made["points"]["east"]["position"] = [-101, 0, -2], [101, 0, -2]
+    for line in made["lines"].values():
+        line["sections"] = [HUNG | {"drag": {"normal": 0.0}}]
+    return made
+
+
+@pytest.mark.parametrize("guess", [-6.0, -1.0, 0.0, 4.0])
+def test_the_wetted_length_is_that_of_the_place_where_the_body_rests(guess: float) -> None:
+    """Drag of a member through the surface, whatever the first guess; its hydrostatics are large numbers beside it."""
+    with hybrid.static(floating(initial_guess=[0, 0, guess])) as result:
+        wet = 2.0 - result["bodies/it/position"][-1, 2]
+        assert 2.1 < wet < 3.0
+        assert -result["bodies/it/force"][-1, 0] == pytest.approx(0.5 * RHO * 0.5 * 0.64 * wet, rel=1e-6)
+
+
+@pytest.mark.parametrize("guess", [-0.4, 1.5])
+def test_a_member_that_its_drag_lifts_out_of_the_water_comes_to_rest(guess: float) -> None:
+    """A bar across the current hangs from above: one that is as wet as at the place before swings in and out."""
+    bar = {"start": [0, -2, 0], "end": [0, 2, 0], "diameter": 0.5, "drag": 1.0}
+    made = floating(initial_guess=[0, 0, guess], hydrostatics=None, mass=60.0, centre=[0, 0, -0.3], members=[bar])
+    made["environment"]["fluid"]["current"] = [1.0, 0, 0]
+    made["points"], made["lines"] = {}, {}
+    for name, y in (("w", -2.0), ("e", 2.0)):
+        made["points"] |= {f"{name}1": {"position": [0, y, 8]}, f"{name}2": {"body": "it", "place": [0, y, 0]}}
+        sections = [HUNG | {"length": 8.5, "drag": {"normal": 0.0}}]
+        made["lines"][name] = {"start": f"{name}1", "end": f"{name}2", "sections": sections, "mesh": {"cells": 8}}
+    with hybrid.static(made) as result:
+        wet = 0.5 - result["bodies/it/position"][-1, 2] / 0.5
+        assert 0.05 < wet < 0.95
+        assert -result["bodies/it/force"][-1, 0] == pytest.approx(0.5 * RHO * 0.5 * 4.0 * wet, rel=1e-6)
+
+
 def test_a_body_is_slowed_down_as_drag_and_added_mass_say() -> None:
     """m v' = -c v^2 from v0: v = v0 / (1 + c v0 t / m), pushed for a moment; m with the added mass of its members."""
     push = {"force": {"history": [[0, 0, 0, 0], [0.02, 4000, 0, 0], [1, 4000, 0, 0], [1.02, 0, 0, 0]]}}
