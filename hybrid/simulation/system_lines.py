@@ -13,7 +13,7 @@ from hybrid.kernels.entry import sharpest
 from hybrid.kernels.forces import FRICTION
 from hybrid.kernels.report import FORCE_A, LOCAL_ERROR
 from hybrid.kernels.run import blank_books
-from hybrid.kernels.state import Batch, Ends, State, Work, batch_of_one
+from hybrid.kernels.state import Batch, Ends, Floats, State, Work, batch_of_one
 from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
@@ -61,6 +61,8 @@ class LineResult:
         self.recorder: Recorder | DeferredRecorder = result_recorder(
             scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
+        loaded, bodies = model.loaded_ends, scene.ends.bodies()
+        self._carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)
         self._waiting: list[Batch] = []
         self._log: list[tuple[float, ...]] = []
@@ -94,18 +96,34 @@ class LineResult:
 
     # --- steps and outputs --------------------------------------------------------------------------
 
-    def log(self, t: float, dt: float, taken: SystemTaken, repeats: int, work: Work, cpu: float) -> None:
-        """Log a step that ended at t (s)."""
-        report = work.report
-        a, b = report[FORCE_A : FORCE_A + 3], report[FORCE_A + 3 : FORCE_A + 6]
-        pulls = float(np.sqrt(a @ a)), float(np.sqrt(b @ b))
-        error = float(report[LOCAL_ERROR])
+    def end_forces(self, state: State, report: Floats) -> Floats:
+        """(6,) N: forces of the line on what is at its start and at its end, inertial, of a state and its report.
+
+        At a free point that the line carries the report has the loads of the point as well: there it is the tension,
+        continued from the last two cells.
+        """
+        forces = report[FORCE_A : FORCE_A + 6].copy()
+        for k in self._carried:
+            e, T, h = (x[:2] if k == 0 else x[:-3:-1] for x in (state.e, state.T, self.model.line.h))
+            d, over = e / np.linalg.norm(e, axis=1)[:, None], h[0] / (h[0] + h[1]) if len(h) > 1 else 0.0
+            along = d[0] + over * (d[0] - d[-1])
+            pull = (T[0] + over * (T[0] - T[-1])) / np.linalg.norm(along) * along
+            forces[3 * k : 3 * k + 3] = -pull if k else pull
+        return forces
+
+    def log(self, t: float, dt: float, taken: SystemTaken, repeats: int, state: State, work: Work, cpu: float) -> None:
+        """Log a step that ended at t (s) in a state."""
+        forces = self.end_forces(state, work.report)
+        pulls = float(np.linalg.norm(forces[:3])), float(np.linalg.norm(forces[3:]))
+        error = float(work.report[LOCAL_ERROR])
         self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
 
     def output(self, t: float, ends: Ends, state: State, work: Work) -> None:
         """Record a state at t (s); both ends count as held, by their points."""
         held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
-        self._waiting.append(batch_of_one(t, held, state, work.report, self.books.work[0], self.model.sea.values))
+        report = work.report.copy()
+        report[FORCE_A : FORCE_A + 6] = self.end_forces(state, report)
+        self._waiting.append(batch_of_one(t, held, state, report, self.books.work[0], self.model.sea.values))
         if len(self._waiting) >= WAITING or not self._moves:
             self.write_down()
 

@@ -348,8 +348,8 @@ class SystemRun:
             self.t, self.state, self._other = t, self._other, self.state
             self.steps += 1
             cpu = clock.process_time() - self._begin
-            for line, work in zip(self.lines, solver.work, strict=True):
-                line.log(t, self.last_step, taken, repeats, work, cpu)
+            for line, state, work in zip(self.lines, self.state.lines, solver.work, strict=True):
+                line.log(t, self.last_step, taken, repeats, state, work, cpu)
             repeats = 0
 
     def _stopped(self, solver: SystemSolver, taken: SystemTaken, dt: float) -> LineFailed:

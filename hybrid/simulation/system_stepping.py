@@ -13,7 +13,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ComputationError, SceneError
-from hybrid.kernels.report import FORCE_A
 from hybrid.kernels.state import Floats
 from hybrid.model.driven_end import FRAME, TURN, DrivenEnd
 from hybrid.scene.points import FreePoint
@@ -227,7 +226,7 @@ class SystemSimulation:
 
     @one_thread
     def point(self, name: str) -> PointState:
-        """Where a point is, and the force of its lines on it; of a free point that force is what moves it."""
+        """Where a point is, and the force of its lines on it; of a free point without the loads on itself."""
         self._check_point(name)
         force = np.zeros(3)
         for line, end in self.scene.lines_at(name):
@@ -246,8 +245,9 @@ class SystemSimulation:
     @one_thread
     def forces(self, name: str) -> tuple[Floats, Floats]:
         """Forces (3,) N of a line on the points at its start and at its end, inertial."""
-        report = self._run.solver.work[self._line(name)].report
-        return report[FORCE_A : FORCE_A + 3].copy(), report[FORCE_A + 3 : FORCE_A + 6].copy()
+        k = self._line(name)
+        forces = self._run.lines[k].end_forces(self._run.state.lines[k], self._run.solver.work[k].report)
+        return forces[:3], forces[3:]
 
     def _check_point(self, name: object) -> None:
         if not isinstance(name, str) or name not in self.scene.points:

@@ -98,11 +98,26 @@ def test_every_line_and_point_is_in_the_result(moved: hybrid.Result) -> None:
         moved["tension"]
 
 
-def test_forces_at_the_free_point_balance(moved: hybrid.Result) -> None:
-    """What the lines and the water put into the float comes out of it: no force is left, at any output."""
-    total = sum(moved.lines[x][f"reaction_{end}"] for x, end in (("west", "end"), ("east", "start"), ("hose", "start")))
-    largest = max(np.abs(line.tension).max() for line in moved.lines.values())
-    assert np.abs(total).max() < 1e-5 * largest
+def test_end_forces_at_a_free_point_are_those_of_the_lines_alone() -> None:
+    """Together they bear weight, buoyancy, drag and inertia of the float, whichever line carries these."""
+    calm = {"fluid": {"density": 1025, "current": [0.4, 0.1, 0], "surface": 0.0}, "gravity": 9.81}
+    sea = calm | {"seabed": {"z": -100, "stiffness": 5000}}
+    result = hybrid.run(mooring(environment=sea, time={"duration": 8.0, "step": 0.05}, output={"every": 0.05}))
+    at = (("west", "end"), ("east", "start"), ("hose", "start"))
+    total = sum(result.lines[x][f"reaction_{end}"] for x, end in at)
+    v = result["points/float/velocity"]
+    u = np.array([0.4, 0.1, 0.0]) - v
+    loads = 0.5 * 1025 * 3 * np.linalg.norm(u, axis=1)[:, None] * u
+    loads += [0, 0, (6 * 1025 - 900) * 9.81] - 900 * np.gradient(v, 0.05, axis=0)
+    largest = max(np.abs(line.tension).max() for line in result.lines.values())
+    left, swing = np.abs(total - loads), float(np.ptp(total, axis=0).max())
+    assert left[0].max() < 2e-5 * largest and swing > 80.0
+    assert left[1:-1].max() < 0.02 * swing
+    for name, end in at:
+        line = result.lines[name]
+        force = np.linalg.norm(line[f"reaction_{end}"], axis=1)
+        assert force == pytest.approx(line.tension[:, -1 if end == "end" else 0], rel=1e-3)
+        assert line[f"steps/end_force_{end}"] == pytest.approx(force[1:], rel=1e-6)
 
 
 def test_energy_of_all_lines_closes_with_second_order() -> None:
