@@ -59,6 +59,7 @@ def test_readme_commands_run(clone: Path, monkeypatch: pytest.MonkeyPatch, capsy
         "static",
         "plot",
         "report",
+        "stats",
         "export",
         "schema",
         "trade",

@@ -1,0 +1,105 @@
+"""Studies: what two workers gain over one, what a study costs over bare runs, and the memory of a worker.
+
+    pytest bench/test_bench_study.py -m bench -n 0 -s
+
+HYBRID_STUDY_CASES (400) variants of a touchdown: 60 cells, steps of 0.25 s, 100 s.
+"""
+
+from __future__ import annotations
+
+import os
+import resource
+import time as clock
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.scene.study import study_from
+from hybrid.studies.cases import cases_of, scene_of
+from hybrid.studies.collect import usual
+from hybrid.studies.study import Job, StudyRunning, compute_batch
+
+pytestmark = pytest.mark.bench
+
+CASES = int(os.environ.get("HYBRID_STUDY_CASES", "400"))
+SCENE = """
+environment: {fluid: {density: 1025}, seabed: {z: -100, stiffness: 5.0e+3, damping: 5.0e+2}}
+cable:
+  sections: [{length: 250, mass: 20, diameter: 0.05, axial_stiffness: 2.0e+8, drag: {normal: 1.2, tangential: 0.05}, added_mass: {normal: 1.0}}]
+ends:
+  start: {kind: pinned, position: [0, 0, -100]}
+  end: {kind: pinned, position: [205, 0, 0], motion: {heave: {amplitude: 2.0, period: 8.0}, ramp: 16}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 60}
+time: {duration: 100, step: 0.25}
+output: {every: 0.5}
+"""
+VARY = {"A": {"key": "ends.end.motion.heave.amplitude", "from": 0.5, "to": 1.5, "count": CASES}}
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "scene.yaml").write_text(SCENE)
+    return tmp_path
+
+
+def timed(folder: Path, workers: int) -> tuple[float, float]:
+    """Wall time (s) from the first workers being there to the last case; processor time (s) of the runs."""
+    moments: list[float] = []
+
+    def tell(now: StudyRunning) -> None:
+        moments.append(clock.perf_counter())
+
+    found = hybrid.study(folder / "scene.yaml", folder / f"{workers}.zarr", vary=VARY, workers=workers, progress=tell)
+    assert (found["status"].values == 1).all()
+    return moments[-1] - moments[0], float(found["cpu"].values.sum())
+
+
+def test_two_workers_and_overhead(folder: Path) -> None:
+    """Asked: two cores at least 1.8 times one; at most 8 % over bare runs."""
+    cases = cases_of(study_from({"scene": "scene.yaml", "vary": VARY}, folder))
+    hybrid.run(cases.scene(0))
+    begin = clock.perf_counter()
+    for row in cases.rows[: CASES // 4]:
+        with hybrid.run(scene_of(cases.base, cases.keys, row)):
+            pass
+    bare = 4.0 * (clock.perf_counter() - begin)
+    one, cpu = timed(folder, 1)
+    two, _ = timed(folder, 2)
+    print(
+        f"\n{CASES} cases: bare {bare:.1f} s (a quarter, times 4), one worker {one:.1f} s ({one / bare - 1:+.1%}), two {two:.1f} s"
+    )
+    print(
+        f"two workers are {one / two:.2f} x one; processor time of the runs {cpu:.1f} s; load {os.getloadavg()[0]:.1f}"
+    )
+
+
+def test_memory_of_a_worker_is_flat(folder: Path) -> None:
+    """Largest memory after 200 and after 1000 runs in one process."""
+    cases = cases_of(study_from({"scene": "scene.yaml", "vary": VARY, "static": True}, folder))
+    job = Job(cases.base, cases.keys, cases.rows[:100], usual(True), True)
+    found = []
+    for _ in range(10):
+        compute_batch(job)
+        found.append(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024)
+    print(f"\nlargest memory after each 100 equilibria: {np.round(found, 1).tolist()} MB")
+    assert found[-1] < found[1] * 1.05
+
+
+def test_empty_tasks() -> None:
+    """What the scheduler takes for a task: 10 000 empty ones in one cluster."""
+    import distributed
+
+    from hybrid.studies.study import _client
+
+    with _client(2, None) as client:
+        begin = clock.perf_counter()
+        futures = client.map(int, range(10_000), pure=False)
+        distributed.wait(futures)
+        spent = clock.perf_counter() - begin
+    print(
+        f"\n10 000 empty tasks in {spent:.1f} s: {1e6 * spent / 1e4:.0f} us each; 10^5 runs in batches of 100 are 1000 tasks"
+    )
