@@ -52,6 +52,7 @@ class BodyModel:
     start: Floats  # (STATE,) where it is first looked for
     loads: tuple[EndLoad, ...]  # forces and moments that are given
     members: Members | None = None  # on which the water acts
+    own_mass: Floats | None = None  # (36,) of its mass matrix without that of its members
 
     def load(self, t: float, since: float, out: Floats) -> None:
         """Write the force and the moment given at t (s; infinity: of full size) into `out` (NUMBERS,).
@@ -63,6 +64,12 @@ class BodyModel:
             if since < x.until:
                 at = FORCE if x.what == "force" else MOMENT
                 out[at : at + 3] += x.grown(t)
+
+    def take_added_mass(self, row: Floats) -> None:
+        """Have the added mass of its members as they are wet in a row (STATE,) of a state."""
+        if self.members is not None:
+            assert self.own_mass is not None
+            self.numbers[MASS : MASS + 36] = self.own_mass + self.members.added_mass(row).ravel()
 
     @property
     def breaks(self) -> list[float]:
@@ -93,9 +100,11 @@ def body_model(
     if not body.members or around is None:
         return BodyModel(name, numbers, start, tuple(loads))
     members = Members(*pieces_of(body, density), around)
-    numbers[MASS : MASS + 36] += members.added_mass(start).ravel()
     numbers[PIECES] = len(members.pieces)
-    return BodyModel(name, np.append(numbers, members.pieces), start, tuple(loads), members)
+    own_mass = numbers[MASS : MASS + 36].copy()
+    made = BodyModel(name, np.append(numbers, members.pieces), start, tuple(loads), members, own_mass)
+    made.take_added_mass(start)
+    return made
 
 
 class KnownMotion(EndMotion):

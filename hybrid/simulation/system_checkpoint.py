@@ -28,7 +28,7 @@ def checkpoint(run: SystemRun) -> dict[str, Any]:
     return {
         "t": run.t, "steps": run.steps, "last": run.last_step, "loaded": run.loaded, "leg": [*run.leg],
         "cpu": run.cpu, "dry": sorted(run.dry), "bodies": run.state.bodies, "body_work": run.solver.body_work,
-        "lines": lines, "broken": [*run.failures.broken],
+        "lines": lines, "broken": [*run.failures.broken], "rest": run.rest,
     }  # fmt: skip
 
 
@@ -38,7 +38,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         if not isinstance(saved["broken"], list):
             raise ValueError("broken: numbers of what has broken were expected")
         run.failures.again(saved["broken"])
-    saved = {"broken": [], **saved}
+    saved = {"broken": [], "rest": run.rest, **saved}  # an earlier program took members as at the first guess
     template = checkpoint(run) | {"dry": None, "broken": None}
     for line in template["lines"].values():
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
@@ -47,6 +47,8 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         raise ValueError("dry: names of bodies were expected")
     if not (0.0 <= found["leg"][0] <= found["t"] and found["leg"][1] >= 0 and found["steps"] >= 0):
         raise ValueError(f"leg: a time up to {found['t']:g} s was expected")
+    run.start_from(found["rest"])
+    run.make_solver()
     set_state(run, found)
 
 

@@ -63,9 +63,11 @@ class SystemRun:
         if source is None:
             self.found = equilibrium_of_system(system, self.model, 0.0 if moves else np.inf)
             self.state: SystemState = self.found.state.copy()
+            self.start_from(self.found.state.bodies)
         else:
             blank = [blank_state(x.cells, len(x.line.torsion)) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
+            self.start_from(self.model.body_places)
         self.lines = [
             LineResult(k, name, scene, model, self.found, state, len(self.times))
             for k, (name, scene, model, state) in enumerate(
@@ -222,6 +224,12 @@ class SystemRun:
         except KeyboardInterrupt:
             self.finish("interrupted", f"stopped from outside at t = {self.t:.6g} s")
             raise
+
+    def start_from(self, bodies: Floats) -> None:
+        """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
+        self.rest = bodies.copy()
+        for body, row in zip(self.model.bodies, bodies, strict=True):
+            body.take_added_mass(row)
 
     def make_solver(self) -> None:
         """A solver for the model as it is."""

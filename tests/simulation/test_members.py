@@ -55,7 +55,7 @@ def test_a_current_pushes_with_the_drag_of_the_members() -> None:
 
 def floating(**more: Any) -> dict[str, Any]:
     """The body upright at the surface, in a current; a line to each side."""
-    members = [{"start": [0, 0, -2], "end": [0, 0, 2], "diameter": 0.5, "drag": 1.0, "pieces": 8}]
+    members = [{"start": [0, 0, -2], "end": [0, 0, 2], "diameter": 0.5, "drag": 1.0, "added_mass": 1.0, "pieces": 8}]
     floats = {"hydrostatics": {"heave": 5e3, "roll": 1e9, "pitch": 1e9}, "volume": 0.0}
     given = body(**({"members": members, "centre_of_buoyancy": [0, 0, 0]} | floats | more))
     made = scene({"current": [0.8, 0, 0], "surface": 0.0}, given)
@@ -72,6 +72,18 @@ def test_the_wetted_length_is_that_of_the_place_where_the_body_rests(guess: floa
         wet = 2.0 - result["bodies/it/position"][-1, 2]
         assert 2.1 < wet < 3.0
         assert -result["bodies/it/force"][-1, 0] == pytest.approx(0.5 * RHO * 0.5 * 0.64 * wet, rel=1e-6)
+
+
+def test_the_motion_does_not_depend_on_the_first_guess() -> None:
+    """Added mass as well as drag are those of the wetted length where the motion starts."""
+    found = []
+    for guess in (-6.0, 0.0, 4.0):
+        made = floating(initial_guess=[0, 0, guess], force={"value": [3000, 0, 0], "until": 1.0})
+        made |= {"time": {"duration": 2.0, "step": 0.05}, "output": {"every": 0.1, "points": 3}}
+        with hybrid.run(made) as result:
+            found.append(result["bodies/it/velocity"][:, 0])
+    assert np.ptp(found[0]) > 0.1
+    np.testing.assert_allclose(found[1:], [found[0]] * 2, rtol=0, atol=1e-6)
 
 
 @pytest.mark.parametrize("guess", [-0.4, 1.5])

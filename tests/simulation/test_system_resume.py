@@ -59,15 +59,16 @@ def spar() -> dict[str, Any]:
     }
     places = {"east": (400, 0), "north": (-200, 346), "south": (-200, -346)}
     return {
-        "environment": {"fluid": {"density": 1025, "current": [0.4, 0, 0]}},
+        "environment": {"fluid": {"density": 1025, "current": [0.4, 0, 0], "surface": 0.0}},
         "points": {name: {"position": [x, y, -150]} for name, (x, y) in places.items()}
         | {f"to_{name}": {"body": "spar", "place": [x / 80, y / 80, -20]} for name, (x, y) in places.items()},
         "bodies": {
             "spar": {
-                "initial_guess": [0, 0, 0], "mass": 3e6, "centre": [0, 0, -25], "inertia": [8e8, 8e8, 4e7],
+                "initial_guess": [0, 0, 9], "mass": 3e6, "centre": [0, 0, -25], "inertia": [8e8, 8e8, 4e7],
                 "added_mass": [2.6e6, 2.6e6, 3e5, 1.5e9, 1.5e9, 0], "damping": [2e5, 2e5, 1e5, 2e7, 2e7, 1e7],
                 "hydrostatics": {"heave": 7.8e5, "roll": 1.2e8, "pitch": 1.2e8},
                 "force": {"value": [3e5, 0, 0], "until": 5},
+                "members": [{"start": [0, 0, -50], "end": [0, 0, 20], "diameter": 8, "drag": 1, "added_mass": 1}],
             }
         },
         "lines": {name: {"start": name, "end": f"to_{name}"} | line for name in places},
