@@ -91,14 +91,13 @@ def test_memory_of_a_worker_is_flat(folder: Path) -> None:
 
 def test_empty_tasks() -> None:
     """What the scheduler takes for a task: 10 000 empty ones in one cluster."""
-    import distributed
 
     from hybrid.studies.study import _client
 
     with _client(2, None) as client:
         begin = clock.perf_counter()
         futures = client.map(int, range(10_000), pure=False)
-        distributed.wait(futures)
+        client.gather(futures)
         spent = clock.perf_counter() - begin
     print(
         f"\n10 000 empty tasks in {spent:.1f} s: {1e6 * spent / 1e4:.0f} us each; 10^5 runs in batches of 100 are 1000 tasks"
