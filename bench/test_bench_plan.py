@@ -126,4 +126,4 @@ def test_default_is_no_dearer(name):
     ratio = cost["default"] / min(cost[x] for x in cost if x != "default")
     each = ", ".join(f"{x} {y:.2f} s" for x, y in cost.items())
     print(f"{name}: {each}; default over the cheaper {ratio:.2f}")
-    assert ratio < 1.6  # of the touchdown 1.05 to 1.44: its first catenary may need a finer run, by other cells
+    assert ratio <= 1.05

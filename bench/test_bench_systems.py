@@ -1,4 +1,4 @@
-"""Fifty random systems of lines, points and bodies: how many equilibria are found, and in which time.
+"""Fifty random systems: how many equilibria are found, and in which time; a thousand lines in one file.
 
 pytest bench/test_bench_systems.py -m bench -s
 """
@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 import time as clock
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -103,6 +104,23 @@ class Drawing:
         return tables | ({"bodies": self.bodies} if self.bodies else {})
 
 
+def test_a_thousand_lines_run(tmp_path: Path) -> None:
+    """Written to a file, with 50 cells each."""
+    count = 1000
+    rope = {"length": 100, "mass": 5, "diameter": 0.04, "axial_stiffness": 1e7, "drag": {"normal": 1.2}}
+    heave = {"heave": {"amplitude": 1, "period": 8}, "ramp": 8}
+    points = {f"a{k}": {"position": [20.0 * k, 0, -80]} for k in range(count)}
+    points |= {f"b{k}": {"position": [20.0 * k, 50, 0], "motion": heave} for k in range(count)}
+    lines = {
+        f"l{k}": {"start": f"a{k}", "end": f"b{k}", "sections": [rope], "mesh": {"cells": 50}} for k in range(count)
+    }
+    scene = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines}
+    begin = clock.process_time()
+    with hybrid.run(scene | {"time": {"duration": 2.0, "step": 0.1}}, tmp_path / "many.h5") as result:
+        print(f"\n{count} lines of 50 cells, 20 steps: {clock.process_time() - begin:.1f} s of processor time")
+        assert result.status == "complete" and len(result.lines) == count
+
+
 def test_equilibria_of_random_systems() -> None:
     found, times = 0, []
     print()
@@ -117,4 +135,4 @@ def test_equilibria_of_random_systems() -> None:
             print(f"system {seed}, {len(scene['lines'])} lines: {str(error).splitlines()[0]}")
         times.append(clock.process_time() - begin)
     print(f"{found} of {COUNT} found; median {np.median(times):.2f} s, most {max(times):.1f} s of processor time")
-    assert found >= 0.9 * COUNT
+    assert found >= 0.9 * COUNT and np.median(times) <= 0.3

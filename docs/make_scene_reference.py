@@ -33,6 +33,21 @@ you type;
 
 This page is made from that schema by `python docs/make_scene_reference.py`.
 
+## The least that is needed
+
+Copy this, and change the numbers; everything else has a default, and `hybrid plan scene.yaml` says which:
+
+```yaml
+cable:
+  sections: [{length: 100, mass: 2.0, diameter: 0.03}]     # m, kg/m, m
+ends:
+  start: {kind: pinned, position: [0, 0, 0]}
+  end: {kind: pinned, position: [80, 0, 0]}
+initial: equilibrium
+```
+
+With most of what a scene may have:
+
 ```yaml
 title: Two sections, hung between two points, one of them moving
 environment:

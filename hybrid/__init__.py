@@ -26,6 +26,7 @@ if TYPE_CHECKING:
     from hybrid.scene.schema import Scene
     from hybrid.scene.system import System
     from hybrid.simulation.api import resume, run, static
+    from hybrid.simulation.listed_outputs import kinds_of_quantities, listed_outputs
     from hybrid.simulation.stepping import Simulation
     from hybrid.simulation.system_stepping import SystemSimulation
     from hybrid.simulation.system_stiffness import offsets, stiffness
@@ -37,8 +38,10 @@ if TYPE_CHECKING:
     from hybrid.studies.study import case_of as study_case
     from hybrid.studies.study import study
     from hybrid.studies.tradeoff import trade
+    from hybrid.view.comparison import write_comparison as compare
     from hybrid.view.plots import plot_summary as plot
     from hybrid.view.plots import plot_zones
+    from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map
     from hybrid.view.report import write_report as report
 
 _HOME = {
@@ -53,6 +56,7 @@ _HOME = {
     "Simulation": ("hybrid.simulation.stepping", "Simulation"),
     "SystemSimulation": ("hybrid.simulation.system_stepping", "SystemSimulation"),
     "System": ("hybrid.scene.system", "System"),
+    "compare": ("hybrid.view.comparison", "write_comparison"),
     "export_fmu": ("hybrid.couple.fmu_export", "export_fmu"),
     "export": ("hybrid.exports.api", "export"),
     "export_moordyn": ("hybrid.interop.moordyn", "export_moordyn"),
@@ -63,7 +67,13 @@ _HOME = {
     "open": ("hybrid.store.reader", "open_result"),
     "parse_scene": ("hybrid.scene.read", "parse_scene"),
     "plan": ("hybrid.model.plan", "plan"),
+    "listed_outputs": ("hybrid.simulation.listed_outputs", "listed_outputs"),
+    "kinds_of_quantities": ("hybrid.simulation.listed_outputs", "kinds_of_quantities"),
     "plot": ("hybrid.view.plots", "plot_summary"),
+    "plot_energy": ("hybrid.view.quantities", "plot_energy"),
+    "plot_quantity": ("hybrid.view.quantities", "plot_quantity"),
+    "plot_shape": ("hybrid.view.quantities", "plot_shape"),
+    "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
     "plot_zones": ("hybrid.view.plots", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
     "resume": ("hybrid.simulation.api", "resume"),
@@ -92,10 +102,13 @@ __all__ = [
     "Simulation",
     "System",
     "SystemSimulation",
+    "compare",
     "export",
     "export_fmu",
     "export_moordyn",
     "import_moordyn",
+    "kinds_of_quantities",
+    "listed_outputs",
     "load_scene",
     "load_system",
     "offsets",
@@ -104,6 +117,10 @@ __all__ = [
     "parse_scene",
     "plan",
     "plot",
+    "plot_energy",
+    "plot_quantity",
+    "plot_shape",
+    "plot_zone_map",
     "plot_zones",
     "report",
     "resume",

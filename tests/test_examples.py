@@ -466,3 +466,10 @@ def test_python_example_prints_what_it_promises(tmp_path: Path, capsys: pytest.C
     for joint, cm in ((0.2, 1.91), (0.4, 3.17), (0.6, 4.16), (0.8, 4.72), (1.0, 5.36), (1.2, 5.45), (1.7, 8.03)):
         assert listed[round(2.0 - joint, 1)] == pytest.approx(cm, abs=0.03)
     assert (tmp_path / "picture.png").stat().st_size > 10_000
+
+
+def test_armoured_cable_has_the_torque_of_its_mean_tension() -> None:
+    result = ran("armoured_cable")
+    w = 9.81 * (2.0 - 1025.0 * 0.25 * math.pi * 0.025**2)
+    for k, force in ((0, 6000.0), (-1, 3.0)):
+        assert result["torque"][k] == pytest.approx(0.004 * (force + 0.5 * w * 250.0), rel=2e-3)

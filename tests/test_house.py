@@ -35,7 +35,8 @@ ALLOWED: dict[str, tuple[str, ...]] = {
     "interop": ("errors", "scene"),
     "studies": (*COMPUTING, "simulation", "view"),
     "couple": (*COMPUTING, "simulation", "interop"),
-    "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "__init__"),
+    "live": (*COMPUTING, "simulation", "view"),
+    "cli": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple", "live", "__init__"),
     "__init__": (*COMPUTING, "simulation", "view", "exports", "interop", "studies", "couple"),
 }
 
@@ -52,6 +53,16 @@ ONLY = {
     "typer": ("cli",),
     "rich": ("cli",),
     "pythonfmu3": ("couple",),
+    "zarr": ("store",),
+    "xarray": ("store", "scene"),
+    "distributed": ("studies",),
+    "dask": ("studies",),
+    "SALib": ("studies",),
+    "simpleeval": ("studies",),
+    "rainflow": ("statistics", "exports"),
+    "starlette": ("live",),
+    "uvicorn": ("live",),
+    "websockets": (),
     "filelock": ("kernels", "store"),
 }  # fmt: skip
 

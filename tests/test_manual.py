@@ -134,6 +134,8 @@ def test_the_site_is_built_strictly_and_asks_no_other_host(tmp_path: Path) -> No
         assert not re.search(asks, page.read_text(encoding="utf-8")), page
     for sheet in (tmp_path / "site").rglob("*.css"):
         assert not re.search(r"url\([\"']?(?:https?:)?//|@import", sheet.read_text(encoding="utf-8")), sheet
+    index = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
+    assert '<script src="manual/iframe-worker.js">' in index and (tmp_path / "site/search/search_index.js").is_file()
     assert "<math" in (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
     api = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
     assert all(f'id="hybrid.{name}"' in api for name in hybrid.__all__)

@@ -15,7 +15,7 @@ PICTURE = ROOT / "docs" / "pictures" / "rooms.svg"
 # Floors from the top; in each room's entry its column and what it does.
 FLOORS = (
     {"cli": (2.3, "commands, console, tables")},
-    {"studies": (0.05, "many runs, other programs"), "couple": (1.3, "FMU")},
+    {"studies": (0.05, "many runs, other programs"), "couple": (1.3, "FMU"), "live": (3.2, "page for the browser")},
     {
         "simulation": (0.5, "run, static, resume, errors"),
         "interop": (2.3, "MoorDyn decks"),

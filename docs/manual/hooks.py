@@ -19,6 +19,7 @@ WITH_EQUATIONS = {"theory.md", "zones.md", "accuracy.md", "extend.md"}
 WIDE = {"validation.md", "extremes.md", "trade.md"}  # tables that need the room of a list of contents
 # In docstrings: a parameter, or several, and what it is, at the beginning of a paragraph or after a sentence.
 PARAMETER = re.compile(r"(<p>|[.;]\s+)((?:[a-z_]+,\s+)*[a-z_]+):\s+(?=\S)")
+SHIM = "https://unpkg.com/iframe-worker/shim"  # which the plugin `offline` asks of another host
 NAMED = re.compile(r"\[(?:docs/)?(\w+\.md)\]\(")
 
 
@@ -50,6 +51,16 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
         return html
     begin = html.index("doc-contents")
     return html[:begin] + PARAMETER.sub(_parameter, html[begin:])
+
+
+def on_post_page(output: str, **_: Any) -> str:
+    """Search works where pages are opened from a folder: the worker that it needs there comes from the site itself."""
+    return output.replace(SHIM, "manual/iframe-worker.js")
+
+
+def on_post_template(output_content: str, **_: Any) -> str:
+    """Of pages that are no Markdown, such as 404.html, the same."""
+    return output_content.replace(SHIM, "manual/iframe-worker.js")
 
 
 def _parameter(found: re.Match[str]) -> str:

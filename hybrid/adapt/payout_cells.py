@@ -2,6 +2,7 @@
 
 The material has a velocity and accelerations of its own at the fairlead: those of the last node less what comes from
 the flow of material through it (docs/theory.md, 19).  A new node lies on the cubic through the last four.
+Lines and states are those of `from_far_end`: the fairlead is their end.
 """
 
 from __future__ import annotations
@@ -27,6 +28,21 @@ class Flow(NamedTuple):
     later: tuple[float, float]  # both of them when the algorithmic acceleration stands for
     cell: float  # m, length of a cell that has just entered
     tension: Floats  # (N,) N, before the last step
+
+
+def from_far_end(state: State, side: int) -> State:
+    """A state whose last node is that of the fairlead, end `side` of the line; and back."""
+    if side:
+        return state
+    turned = {name: np.ascontiguousarray(x[::-1]) for name, x in state._asdict().items() if name != "turn"}
+    turned["e"] *= -1.0
+    turned["w"], turned["wa"], turned["wd"] = -turned["w"], -turned["wa"], -turned["wd"]
+    return state._replace(**turned)
+
+
+def line_from_far_end(line: Line, side: int, far: float) -> Line:
+    """What of a line `enter` and `leave` ask for, counted from the far end, at the arc length far, m."""
+    return line if side else line._replace(s=far - line.s[::-1], h=line.h[::-1], ck=line.ck[::-1])
 
 
 def lack_at(reel: Reel, t: float) -> tuple[Floats, Floats]:

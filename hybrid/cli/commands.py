@@ -1,4 +1,4 @@
-"""The commands: hybrid run | resume | static | plan | plot | report | export | trade | import | schema.
+"""The commands: hybrid run | resume | static | plan | view | plot | report | export | trade | import | schema.
 
 The package imports what a command needs when it runs, so `hybrid --help` costs nothing.
 Results and JSON go to the output stream; the progress line, notes and errors to the error stream.
@@ -20,6 +20,7 @@ import hybrid
 import hybrid.cli.result_commands  # registers its commands
 import hybrid.cli.statistics_command
 import hybrid.cli.study_command
+import hybrid.cli.view_command
 from hybrid.cli.app import (
     REFUSED,
     Drawn,
@@ -41,7 +42,7 @@ from hybrid.cli.app import (
     words,
 )  # fmt: skip
 from hybrid.cli.pipe import guard_output
-from hybrid.cli.plan_tables import contents_table, plan_lines
+from hybrid.cli.plan_tables import contents_table, outputs_table, plan_lines
 from hybrid.cli.system_commands import plan_of_lines, resume_lines, run_lines, static_lines
 from hybrid.cli.system_stiffness import refuse_for_a_cable, show_holding
 from hybrid.cli.tables import (
@@ -166,11 +167,19 @@ def static(
 def plan(
     scene: SceneFile, settings: Settings = None,
     verbose: Annotated[bool, flag("--verbose", "-v", help="All that is on and off, and why.")] = False,
+    outputs: Annotated[
+        bool, flag("--outputs", help="Instead: what the result will hold, and what it may, with units.")
+    ] = False,
     as_json: Json = False,
 ) -> None:  # fmt: skip
     """Show what a run would compute, and by which keys of the scene; compute nothing."""
     with session(as_json, False) as console:
         asked = load_either(console, scene, settings)
+        if outputs:
+            found, more = hybrid.listed_outputs(asked), hybrid.kinds_of_quantities()
+            console.json("outputs", recorded=[x._asdict() for x in found], on_request=[x._asdict() for x in more])
+            console.show(lambda: outputs_table(found, more))
+            return
         if not isinstance(asked, hybrid.Scene):
             plan_of_lines(console, asked, verbose)
             return

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from hybrid.cli.progress_line import span
@@ -11,6 +12,7 @@ from hybrid.store.hockling import kink_torque
 if TYPE_CHECKING:
     from hybrid.model.plan import Plan
     from hybrid.scene.schema import Scene
+    from hybrid.simulation.listed_outputs import Listed
 
 LINES, COLUMNS = 14, 80  # of the short form
 # Forces whose names are too long for it.
@@ -103,6 +105,8 @@ def _hockling(plan: Plan) -> str:
     if found is None:
         return ""
     text = f"a loop can form from {found.torque:.3g} N m on (s = {found.s:.4g} m)"
+    if found.of_tension:
+        text += f", of which tension makes {abs(found.of_tension):.3g}"
     if found.diameter > 0.0 and found.min_bend_radius > 0.0:
         text += f", kinks from {kink_torque(found.stiffness, found.diameter, found.min_bend_radius):.3g}"
     return text
@@ -147,3 +151,25 @@ def contents_table(plan: Plan) -> Any:
         kind, count = ("adaptive", f"{plan.base_cells} to {cells}") if moving else (zone.kind, str(cells))
         zones.add_row(kind, f"{zone.s_a:.6g} m", f"{zone.s_b:.6g} m", count)
     return Group("", entries, zones)
+
+
+def outputs_table(found: Sequence[Listed], more: Sequence[Listed]) -> Any:
+    """What a result will hold, and kinds of quantities that the scene could ask for."""
+    from rich.console import Group
+    from rich.table import Table
+
+    table = Table.grid(padding=(0, 2))
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(no_wrap=True)
+    table.add_column(overflow="fold")
+    table.add_row("recorded", "unit", "over", "what it is", style="bold")
+    for x in found:
+        table.add_row(x.name, x.unit or "-", ", ".join(x.dims), x.description)
+    table.add_row()
+    table.add_row("on request", "unit", "", "output.quantities: {name: {kind: ...}}", style="bold")
+    for x in more:
+        table.add_row(x.name, x.unit, "", x.description)
+    table.add_row("wall_tension, von_mises", "N, Pa", "", "cable.sections[..].pipe: {wall: ...}")
+    table.add_row("elevation", "m", "", "output.elevation: [[x, y], ...], in waves")
+    return Group("", table)

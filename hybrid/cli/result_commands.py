@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import AbstractContextManager, ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -41,24 +42,44 @@ def plot(
         Any, typer.Option(metavar="S,S,..", parser=numbers, help="Arc lengths to follow over time (m).")
     ] = None,
     zones: Annotated[bool, flag("--zones", help="Draw zones along s over time instead.")] = False,
+    quantity: Annotated[
+        str | None, typer.Option(metavar="NAME", help="One quantity instead; `hybrid plan --outputs` lists them.")
+    ] = None,
+    at: Annotated[
+        Any, typer.Option(metavar="S,S,..", parser=numbers, help="Its histories at these arc lengths (m).")
+    ] = None,
+    envelope: Annotated[bool, flag("--envelope", help="Its lowest and highest value along the line.")] = False,
+    spectrum: Annotated[bool, flag("--spectrum", help="The spectra of its histories.")] = False,
     film: Annotated[bool, flag("--animate", help="Make a film instead, RUN.mp4 or a .gif.")] = False,
     line: LineName = None,
     overwrite: Foreign = False,
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Draw a result: shapes, profiles along the cable, histories; its zones over time; or a film."""
+    """Draw a result: shapes, profiles along the cable, histories; its zones over time; one quantity; or a film."""
+    chosen = at is not None or envelope or spectrum
+    if (quantity or chosen) and (zones or film or times or history):
+        raise typer.BadParameter("--quantity, --at, --envelope and --spectrum are of a picture of their own")
     if (zones or film) and (times or history):
         raise typer.BadParameter("--times and --history choose what a page without --zones or --animate shows")
     if zones and film:
         raise typer.BadParameter("--zones and --animate are two pictures: ask for one at a time")
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
+        from hybrid.view.save import save_figure
+
         if film:
             _film(console, opened, result, output, overwrite)
             return
         if zones:
             picture = output or result.with_suffix(".zones.png")
             hybrid.plot_zones(opened, picture, overwrite=overwrite)
+        elif quantity or chosen:
+            quantity = quantity or "tension"
+            picture = output or result.with_suffix(f".{quantity.replace('/', '_')}.png")
+            ax = hybrid.plot_quantity(opened, quantity, at=at, envelope=envelope, spectrum=spectrum)
+            figure = ax.get_figure(root=True)
+            assert figure is not None
+            save_figure(figure, picture, overwrite=overwrite)
         else:
             picture = output or result.with_suffix(".png")
             hybrid.plot(opened, picture, times=times, history=history, overwrite=overwrite)
@@ -69,8 +90,9 @@ def plot(
 
 @app.command()
 def report(
-    result: Annotated[
-        Path, typer.Argument(metavar="RUN.h5", help="The result to report, or STUDY.zarr.", show_default=False)
+    results: Annotated[
+        list[Path],
+        typer.Argument(metavar="RUN.h5 ..", help="Result; several to compare; or STUDY.zarr.", show_default=False),
     ],
     output: Annotated[Path | None, output_option("Page; else RUN.html, beside it.")] = None,
     line: LineName = None,
@@ -78,7 +100,11 @@ def report(
     quiet: Quiet = False,
     as_json: Json = False,
 ) -> None:
-    """Write one HTML file that explains a result: what to know first, moving pictures, events; or one of a study."""
+    """Write one HTML file that explains a result, lays several over each other, or shows a study."""
+    result = results[0]
+    if len(results) > 1:
+        _comparison(results, output, line, overwrite, session(as_json, quiet))
+        return
     if result.is_dir():
         with session(as_json, quiet) as console:
             from hybrid.view.study_report import write_study_report
@@ -94,6 +120,21 @@ def report(
         if as_json and not opened.lines:
             facts = [fact._asdict() for fact in facts_of(opened)]
         console.done(f"{size / 1e6:.1f} MB", page, status=opened.status, size=size, facts=facts)
+
+
+def _comparison(
+    files: list[Path], output: Path | None, line: str | None, overwrite: bool, session: AbstractContextManager[Console]
+) -> None:
+    """A page of several results, by the names of their files where these differ."""
+    with session as console, ExitStack() as stack:
+        names = [file.stem for file in files]
+        names = [str(file) for file in files] if len(set(names)) < len(names) else names
+        if len(set(names)) < len(names):
+            raise UsageError(f"{', '.join(map(str, files))}: a result is compared with itself")
+        opened = [stack.enter_context(opened_line(file, line))[0] for file in files]
+        target = output or files[0].with_name("_".join(file.stem for file in files) + ".html")
+        page = hybrid.compare(dict(zip(names, opened, strict=True)), target, overwrite=overwrite)
+        console.done(f"{page.stat().st_size / 1e6:.1f} MB", page, size=page.stat().st_size)
 
 
 @app.command()

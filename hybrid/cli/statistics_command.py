@@ -39,9 +39,11 @@ def stats(
 ) -> None:  # fmt: skip
     """Statistics of a result: means, deviations, extremes, periods, what three hours bring; fatigue damage."""
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
-        if opened.lines:
+        if opened.lines and (names is None or not all(name in opened for name in names)):
             first = next(iter(opened.lines))
             raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      --line {first}")
+        from hybrid.store.statistics_table import rows_of
+
         rows = rows_of(opened, names, at, times, hours * HOUR)
         for row in rows:
             console.json("statistics", **row)
@@ -54,45 +56,6 @@ def stats(
             facts = _fatigue_facts(opened, s, damage, times)
             console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")
         console.json("done", file=str(result), status=opened.status, fatigue=facts)
-
-
-def rows_of(
-    result: Result, names: list[str] | None, at: list[float] | None, times: Any, duration: float
-) -> list[dict[str, Any]]:
-    """One row for each history: its summary, and the extreme of `duration` (s) or why there is none."""
-    from hybrid.statistics.extremes import of_record
-    from hybrid.statistics.moments import summary
-    from hybrid.store.histories import history_of, lies_along, usual_names
-
-    rows = []
-    for name in usual_names(result) if names is None else names:
-        history = history_of(result, name, times, at if lies_along(result, name) else None)
-        values = history.values.reshape(history.t.size, -1)
-        if names is None and not values.any():
-            continue
-        if history.s is None:
-            picked: list[tuple[float | None, int]] = [(None, k) for k in range(values.shape[1])]
-        elif at is None:
-            k = int(values.max(axis=0).argmax())
-            picked = [(float(history.s[k]), k)]
-        else:
-            picked = [(float(s), k) for k, s in enumerate(history.s)]
-        for s, k in picked:
-            found = summary(history.t, values[:, k])
-            row: dict[str, Any] = {"quantity": name, "unit": history.unit, "s": s, "of": history.basis}
-            row |= {key: _number(value) for key, value in found._asdict().items()}
-            row["extreme"] = None
-            try:
-                row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
-            except ResultError as error:
-                row["no_extreme"] = str(error).splitlines()[0]
-            rows.append(row)
-    return rows
-
-
-def _number(value: Any) -> float | None:
-    x = float(value)
-    return x if np.isfinite(x) else None
 
 
 def _table(rows: list[dict[str, Any]], hours: float) -> Any:

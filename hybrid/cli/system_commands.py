@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import hybrid
 from hybrid.cli.plan_tables import contents_table
 from hybrid.cli.tables import extremes_facts
+from hybrid.store.limits import held_of
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -74,10 +75,14 @@ def _ended(console: Console, result: Result, target: Path, plot: bool, text: str
             pictures.append(target.with_suffix(f".{name}.png"))
             hybrid.plot(line, pictures[-1])
     lines = {name: extremes_facts(line) for name, line in result.lines.items()}
+    held = [x._asdict() | {"text": x.text} for x in held_of(result)]
     points, bodies = _last(result, "points"), _last(result, "bodies")
     console.events(result.events)
-    console.show(lambda: _table(lines, points, bodies))
-    console.done(text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, **facts)
+    console.show(lambda: _table(lines, points, bodies, held))
+    console.done(
+        text, target, *pictures, status=result.status, lines=lines, points=points, bodies=bodies, quantities=held,
+        **facts,
+    )  # fmt: skip
 
 
 def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
@@ -90,7 +95,7 @@ def _last(result: Result, group: str) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any]) -> Any:
+def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any], held: list[dict[str, Any]]) -> Any:
     from rich.table import Table
 
     table = Table.grid(padding=(0, 2))
@@ -99,12 +104,16 @@ def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any]
         at = f"{most['value']:.5g} N at s = {most['s']:.5g} m"
         table.add_row(f"line {name}", f"tension {least['value']:.5g} to {at}")
     for name, facts in points.items():
+        turned = f", turned by {_vector(facts['rotation'], 1e-6)} deg" if "rotation" in facts else ""
         force = f", force of the lines {_vector(facts['force'])} N" if "force" in facts else ""
-        table.add_row(f"point {name}", f"{_vector(facts['position'])} m{force}")
+        moment = f", moment {_vector(facts['moment'])} N m" if "moment" in facts else ""
+        table.add_row(f"point {name}", f"{_vector(facts['position'])} m{turned}{force}{moment}")
     for name, facts in bodies.items():
         turned = f"{_vector(facts['position'])} m, turned by {_vector(facts['rotation'], 1e-6)} deg"
         loads = f"force of the lines {_vector(facts['force'])} N, moment {_vector(facts['moment'])} N m"
         table.add_row(f"body {name}", f"{turned}, {loads}")
+    for x in held:
+        table.add_row(x["name"], f"{x['text']}, t = {x['t']:.5g} s" + "; BROKEN" * x["broken"])
     table.columns[0].style = "bold"
     return table
 
@@ -112,6 +121,17 @@ def _table(lines: dict[str, Any], points: dict[str, Any], bodies: dict[str, Any]
 def _vector(x: list[float], least: float = 0.0) -> str:
     zero = max(1e-9 * max(abs(c) for c in x), least)
     return "[" + ", ".join(f"{c if abs(c) > zero else 0.0:.5g}" for c in x) + "]"
+
+
+def _clamps(asked: System, name: str) -> list[str]:
+    """How the ends of a line are clamped, those that are."""
+    found = []
+    for end in ("start", "end"):
+        held = asked.clamp(name, end)
+        if held is not None:
+            spring = "" if held.bend_stiffness is None else f" by {held.bend_stiffness:g} N m/rad"
+            found.append(f"{end} clamped{spring}{', free to spin' if held.swivel else ''}")
+    return found
 
 
 def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
@@ -122,7 +142,8 @@ def plan_of_lines(console: Console, asked: System, verbose: bool) -> None:
     for name, line in made.lines.items():
         kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
         joined = asked.lines[name]
-        rows.append(f"line {name:<12s}{joined.start} to {joined.end}, {kinds}, {sum(line.cells)} cells")
+        clamps = "".join(f"; {text}" for text in _clamps(asked, name))
+        rows.append(f"line {name:<12s}{joined.start} to {joined.end}, {kinds}, {sum(line.cells)} cells{clamps}")
     rows.append(f"{'free points':<17s}{', '.join(made.free) or 'none'}")
     if asked.bodies:
         rows.append(f"{'bodies':<17s}{', '.join(f'{name} ({body.kind})' for name, body in asked.bodies.items())}")

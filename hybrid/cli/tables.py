@@ -41,6 +41,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
 
     Of every accepted step where the file has its envelope, else of the outputs.
     """
+    from hybrid.store.limits import held_of
     from hybrid.view.worst import limits_of, worst
 
     found: dict[str, Any] = {}
@@ -51,6 +52,7 @@ def extremes_facts(result: Result) -> dict[str, Any]:
         x = worst(result, "curvature")
         straight = not x.value * float(result.s[-1] - result.s[0]) > 1e-6
         found["bend_radius_min"] = None if straight else {"value": 1.0 / x.value, "s": x.s, "t": x.t}
+    found["quantities"] = [x._asdict() | {"text": x.text} for x in held_of(result)]
     return found | {"limits": [x._asdict() for x in limits_of(result)]}
 
 
@@ -72,6 +74,9 @@ def extremes_rows(facts: dict[str, Any], moves: bool) -> Iterator[tuple[str, str
         elif held is not None:
             text += f"; within {limit}"
         yield title, text
+    for x in facts["quantities"]:
+        when = f", t = {x['t']:.5g} s" * moves + (f", s = {x['s']:.5g} m" if x["s"] is not None else "")
+        yield x["name"], x["text"] + when + "; BROKEN" * x["broken"]
 
 
 def extremes_table(facts: dict[str, Any]) -> Any:

@@ -111,7 +111,7 @@ def _interface(scene: Scene) -> dict[str, Any]:
     with Simulation(scene) as cable:
         positions = cable.state.position[[0, -1]]
         time = scene.require_time()
-        payout = getattr(scene.ends.end, "payout", None)
+        payout = next(filter(None, (getattr(end, "payout", None) for end in scene.ends.both)), None)
         return {
             "payout": payout is not None,
             "winch": payout is not None and payout.from_outside,

@@ -17,6 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.store.bends import Bends, bends_of
 from hybrid.store.selection import Part, error_name, head_lines, optional_package
 
 # A sine read n times a period shows 1 - cos(pi/n) less than its range at worst: 5 % for 10.
@@ -73,7 +74,7 @@ def count(chosen: Part) -> Counted:
             f"{len(part.times)} output{'s have' if len(part.times) > 1 else ' has'} no cycles\n"
             "    try:      a result of `hybrid run`, and a window of time with more outputs"
         )
-    bends = _bends_of(part)
+    bends = bends_of(part.result, part.rows)
     places = _places(part, bends, asked)
     series = [x for s, name in places.items() for x in _series_at(part, bends, s, name)]
     largest = {q: max((np.abs(x.values).max() for x in series if x.quantity == q), default=0.0) for q in _UNITS}
@@ -104,7 +105,7 @@ def count(chosen: Part) -> Counted:
 # ---- where ----------------------------------------------------------------------------------------
 
 
-def _places(part: Part, bends: _Bends, asked: Sequence[float]) -> dict[float, str]:
+def _places(part: Part, bends: Bends, asked: Sequence[float]) -> dict[float, str]:
     """Arc lengths (m) in their order, and why each is there."""
     s, result = bends.s, part.result
     largest = np.ptp(_about_main_axis(bends.vectors)[0], axis=0)
@@ -125,35 +126,6 @@ def _places(part: Part, bends: _Bends, asked: Sequence[float]) -> dict[float, st
     return places
 
 
-class _Bends(NamedTuple):
-    """Curvature as vectors (nt, n, 3) about the axis of the bend, 1/m, inertial, at s (n,), m; jumps come twice."""
-
-    s: np.ndarray
-    vectors: np.ndarray
-
-    def at(self, s: float) -> np.ndarray:
-        """(nt, 1, 3) at an arc length s, m; (nt, 2, 3), on the left and on the right, where curvature jumps."""
-        exact = np.flatnonzero(np.abs(self.s - s) <= 1e-9 * np.ptp(self.s))
-        if exact.size:
-            return self.vectors[:, exact]
-        k = int(np.clip(np.searchsorted(self.s, s) - 1, 0, len(self.s) - 2))
-        w = (s - self.s[k]) / (self.s[k + 1] - self.s[k])
-        return np.asarray((1.0 - w) * self.vectors[:, k : k + 1] + w * self.vectors[:, k + 1 : k + 2])
-
-
-def _bends_of(part: Part) -> _Bends:
-    """The bends of the outputs that were chosen."""
-    s, curvature = part.result.both_sides("curvature")
-    theta, phi = (part.result.both_sides(name)[1][part.rows] for name in ("theta", "phi"))
-    t = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
-    axis = np.cross(
-        np.concatenate([t[:, :1], t[:, :-1]], axis=1), np.concatenate([t[:, 1:], t[:, -1:]], axis=1), axis=2
-    )
-    size = np.linalg.norm(axis, axis=2, keepdims=True)
-    axis = np.divide(axis, size, out=np.zeros_like(axis), where=size > 0.0)
-    return _Bends(s, curvature[part.rows][..., None] * axis)
-
-
 def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The component about the axis of most bending, per place (nt, n), and its share of the square (n,)."""
     axes = np.linalg.eigh(np.einsum("tni,tnj->nij", bends, bends))[1][..., -1]
@@ -166,7 +138,7 @@ def _about_main_axis(bends: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 # ---- what -----------------------------------------------------------------------------------------
 
 
-def _series_at(part: Part, bends: _Bends, s: float, place: str) -> list[Series]:
+def _series_at(part: Part, bends: Bends, s: float, place: str) -> list[Series]:
     """End force or tension, and curvature, at one place; of two values the one that has the larger range."""
     result, times = part.result, part.times
     series = []
@@ -181,7 +153,7 @@ def _series_at(part: Part, bends: _Bends, s: float, place: str) -> list[Series]:
         series.append(
             Series(place, s, "tension", times, found[k], f"at every output{side}" + _error(part, "tension", s, k))
         )
-    values, share = _about_main_axis(bends.at(s))
+    values, share = _about_main_axis(bends.at(np.array([s])).vectors)
     k = int(np.ptp(values, axis=0).argmax())
     side = _SIDES[k] if values.shape[1] > 1 else ""
     basis = f"about the axis it bends most about, at every output{side}; zones: " + _kinds(part, s)

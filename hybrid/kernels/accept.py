@@ -23,6 +23,8 @@ from hybrid.kernels.books import (
     LETS_GO,
     MEASURED,
     MOVED,
+    NEAR_PLANE,
+    NEARS_PLANE,
     NOW,
     OUTCOME,
     PARITY,
@@ -181,6 +183,17 @@ def remember_worst(line, old, new, books, t, dt):
 
 
 @inner
+def is_near_plane(line, state, most):
+    """Whether all nodes are less than `most`, m, from the plane of the line through its first node."""
+    n, r = line.plane[2], state.r
+    for i in range(1, r.shape[0]):
+        off = (r[i, 0] - r[0, 0]) * n[0] + (r[i, 1] - r[0, 1]) * n[1] + (r[i, 2] - r[0, 2]) * n[2]
+        if not abs(off) < most:
+            return False
+    return True
+
+
+@inner
 def watch(line, ends, old, new, books, report, t, dt):
     """What there is to look at after a step, as bits; and how far the line has moved, how its peak tension varies."""
     clock, flags = books.clock, 0
@@ -203,6 +216,8 @@ def watch(line, ends, old, new, books, report, t, dt):
         flags |= BENT
     if slack:
         flags |= SLACKENED
+    if clock[NEAR_PLANE] > 0.0 and is_near_plane(line, new, clock[NEAR_PLANE]):
+        flags |= NEARS_PLANE
     if pull(ends, new, report, books.loaded, 0) > clock[RELEASE_START]:
         flags |= LETS_GO
     if pull(ends, new, report, books.loaded, 1) > clock[RELEASE_END]:

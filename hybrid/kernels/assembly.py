@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from hybrid.kernels.axial_law import LOSS, SHIFT
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH, eliminate_narrow, eliminate_wide
 from hybrid.kernels.cell import Chord, chord, damped_stretch, moment_force, pull, rotary_force, stretch, turning
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import after, angular_velocity, before, bending, damped_bending
-from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces import Z3, Z9, get3, node_loads
 from hybrid.kernels.report import (
     ASSEMBLED,
@@ -37,6 +38,14 @@ from hybrid.kernels.rotations import (
     msub,
     scale,
     sub,
+)
+from hybrid.kernels.tension_torque import (
+    couple_length,
+    couple_rows,
+    damping_loss,
+    note_element,
+    note_end_torque,
+    rest_strain,
 )
 
 UNIT = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
@@ -127,14 +136,16 @@ def cell_at(line, ends, state, i, cv):
 
 
 @inner
-def element_at_start(line, ends, state, cell, cv, report):
+def element_at_start(line, ends, state, cell, cv, couple, report):
     """The element between the start and the first cell."""
     M, A, a = scale(-1.0, get3(ends.moment, 0)), Z9, Z3
     if line.element[0]:
         d, _, il = cell.chord
-        R, kb, k0 = get9(ends.frame, 0), get3(line.kb, 0), get3(line.k0, 0)
+        R, kb, k0 = get9(ends.frame, 0), get3(line.kb, 0), rest_strain(line, state.T, 0)
+        rates, tau = (Z3, Z9, Z3), 0.0
         if line.bits & STIFFNESS_DAMPING:
             wb, We, Wp = angular_velocity(d, cell.d1, state.w[0], il, cell.D1, cv)
+            rates, tau = (wb, We, Wp), line.tau[0]
             M, C, Cd, loss = damped_bending(R, cell.R, kb, k0, line.tau[0], get3(ends.spin, 0), wb)
             A, a = after(C, d, il)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
@@ -142,11 +153,16 @@ def element_at_start(line, ends, state, cell, cv, report):
         else:
             M, C = bending(R, cell.R, kb, k0)
             A, a = after(C, d, il)
+        if couple.shape[0] > 0:
+            fixed = (get3(ends.spin, 0), Z9, Z3)
+            note_element(couple, line, state.T, 0, R, cell.R, (Z3, 0.0), (d, il), fixed, rates, tau)
+    elif couple.shape[0] > 0:
+        note_end_torque(couple, line, 0, M, cell.chord.d, cell.chord.il)
     return Element(M, A, a, Z9, Z3)
 
 
 @inner
-def element_after(line, ends, state, i, cell, following, cv, report):
+def element_after(line, ends, state, i, cell, following, cv, couple, report):
     """The element at the node after cell i, before the cell `following` or the end."""
     n = line.h.shape[0]
     M, A, a, B, b = Z3, Z9, Z3, Z9, Z3
@@ -155,7 +171,8 @@ def element_after(line, ends, state, i, cell, following, cv, report):
     if i < n and line.element[i + 1]:
         d, _, il = cell.chord
         dn, _, iln = following.chord
-        kb, k0 = get3(line.kb, i + 1), get3(line.k0, i + 1)
+        kb, k0 = get3(line.kb, i + 1), rest_strain(line, state.T, i + 1)
+        rates, rates_after, tau = (Z3, Z9, Z3), (Z3, Z9, Z3), 0.0
         if line.bits & STIFFNESS_DAMPING:
             wa, Wae, Wap = angular_velocity(d, cell.d1, state.w[i], il, cell.D1, cv)
             wb, We, Wp = get3(ends.spin, 1), Z9, Z3
@@ -163,6 +180,7 @@ def element_after(line, ends, state, i, cell, following, cv, report):
             if i + 1 < n:
                 wb, We, Wp = angular_velocity(dn, following.d1, state.w[i + 1], iln, following.D1, cv)
                 tau = 0.5 * (tau + line.tau[i + 1])
+            rates, rates_after = (wa, Wae, Wap), (wb, We, Wp)
             M, C, Cd, loss = damped_bending(cell.R, following.R, kb, k0, tau, wa, wb)
             A, a = after(C, dn, iln)
             A, a = madd(A, mat_mat(Cd, We)), add(a, mat_vec(Cd, Wp))
@@ -173,13 +191,20 @@ def element_after(line, ends, state, i, cell, following, cv, report):
             M, C = bending(cell.R, following.R, kb, k0)
             A, a = after(C, dn, iln)
             B, b = before(C, M, d, il)
+        if couple.shape[0] > 0:
+            next_cell = (dn, iln) if i + 1 < n else (Z3, 0.0)
+            note_element(
+                couple, line, state.T, i + 1, cell.R, following.R, (d, il), next_cell, rates, rates_after, tau
+            )  # fmt: skip
         if i + 1 == n:
             A, a = Z9, Z3  # the frame of the end is given
+    elif couple.shape[0] > 0 and i < n:
+        note_end_torque(couple, line, i + 1, M, cell.chord.d, cell.chord.il)
     return Element(M, A, a, B, b)
 
 
 @inner
-def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
+def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, couple, report):
     """Force of cell i between the elements `here` and `there`; of no cell beyond the last one, whose dT is 0."""
     if i >= line.h.shape[0]:
         return Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, 1.0, 0.0)
@@ -192,9 +217,18 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
         row, late = damped_stretch(d, cell.e1, cell.d1, line.tau[i], cv)
         gap -= late
         along = dot(d, cell.e1)
-        report[STIFFNESS_DAMPING_POWER] += line.tau[i] * along * along / hck
+        if couple.shape[0] > 0:
+            report[STIFFNESS_DAMPING_POWER] += damping_loss(couple, line, i, along)
+        elif not bits & AXIAL_LAW:
+            report[STIFFNESS_DAMPING_POWER] += line.tau[i] * along * along / hck
+    if bits & AXIAL_LAW:
+        gap += line.h[i] * line.law[i, SHIFT]
+        report[STIFFNESS_DAMPING_POWER] += line.law[i, LOSS]
     if gaps.shape[0] > 0 and hck == 0.0:
         gap = gaps[i]
+    if couple.shape[0] > 0:
+        more, less = couple_length(couple, line, i, T)
+        hck, gap = hck + more, gap + less
     if bent:
         Q = sub(there.M, here.M)
         DQ = mscale(-1.0, madd(there.B, here.A))
@@ -303,7 +337,7 @@ def size_of_spin(line, i, cell, here, there, ca):
 
 
 @inner
-def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed):
+def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed, couple):
     """The whole block row of node i, with its balance also where it is held."""
     for j in range(SIZE * WIDTH):
         W[j] = 0.0
@@ -326,6 +360,8 @@ def fill(W, line, state, i, node, cell_before, cell, force_before, force, here, 
         W[o + 19] = force.np[j]
     W[WIDTH + 23], W[2 * WIDTH + 23], W[3 * WIDTH + 23] = node.rhs
     fill_spin(W, line, state, i, cell, here, there, ca, passed)
+    if couple.shape[0] > 0:
+        couple_rows(W, couple, line, state.e, i)
 
 
 @kernel  # called for two nodes of a line, not inlined for all
@@ -345,14 +381,14 @@ def keep_row(rows, i, W):
 
 
 @inner
-def eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide):
+def eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide, couples):
     """Eliminate the block row of node i, which stands in W where it is wide; False when its block is singular."""
     size, row = node.size, force_before.row
     if wide:
-        for j in range(6, 14):
+        for j in range(1 if couples else 6, 20 if couples else 14):
             W[j] *= size
         W[23] *= size
-        return eliminate_wide(W, X, i, kept, size)
+        return eliminate_wide(W, X, i, kept, size, couples)
     sized = (size * row[0], size * row[1], size * row[2])
     hck, gap = size * force_before.hck, size * force_before.gap
     if node.held:
@@ -388,19 +424,19 @@ def march(line, sea, ends, r, state, cv, ca, work):
     force_before = Force(Z3, Z9, Z3, Z9, Z3, Z9, Z3, Z3, -1.0, 0.0)  # there is no cell before the start: dT = 0
     bent_before = False
     cell = cell_at(line, ends, state, 0, cv)
-    here = element_at_start(line, ends, state, cell, cv, report)
+    couple = work.couple
+    here = element_at_start(line, ends, state, cell, cv, couple, report)
     report[MOMENT_A], report[MOMENT_A + 1], report[MOMENT_A + 2] = here.M
     for i in range(n + 1):
         following = cell_at(line, ends, state, i + 1, cv)
-        there = element_after(line, ends, state, i, cell, following, cv, report)
+        there = element_after(line, ends, state, i, cell, following, cv, couple, report)
         bent = i < n and (line.element[i] != 0 or line.element[i + 1] != 0 or line.spin[i] != 0)
-        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, report)
+        force = cell_force(line, state, i, cell, here, there, bent, work.gaps, cv, ca, couple, report)
         node = balance(line, sea, ends, r, u, state, i, cell_before, cell, force_before, force, cv, ca, report)
         wide = bent or bent_before
         if wide or keeps_rows or (keeps_start and i == 0):
-            fill(
-                W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, work.torsion.passed
-            )  # fmt: skip
+            passed = work.torsion.passed
+            fill(W, line, state, i, node, cell_before, cell, force_before, force, here, there, ca, passed, couple)
             if keeps_start and i == 0:
                 keep_row(rows, 0, W)
             if node.held:
@@ -409,7 +445,7 @@ def march(line, sea, ends, r, state, cv, ca, work):
                 keep_row(rows, i, W)
         if i == n:
             kept += last_kept
-        if not eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide):
+        if not eliminate(W, X, i, kept, node, cell_before, cell, force_before, wide, couple.shape[0] > 0):
             return i
         if i == n - 1:
             report[MOMENT_B], report[MOMENT_B + 1], report[MOMENT_B + 2] = there.M

@@ -8,11 +8,12 @@ from __future__ import annotations
 
 from typing import Any, NamedTuple
 
+from hybrid.kernels.axial_law import LOSS, SHIFT
 from hybrid.kernels.block_elimination import ROW
 from hybrid.kernels.block_elimination_plane import KEPT, TRIPLE, WIDE, eliminate2, eliminate_chain
 from hybrid.kernels.cell import Chord
 from hybrid.kernels.compile import inner, kernel
-from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.node_forces_plane import node_loads2
 from hybrid.kernels.plane import (
     angle_between,
@@ -166,7 +167,11 @@ def cell_force(line, state, i, cell, here, there, bent, gaps, cv, ca, report):
         tau = cell.tau
         x, y, along = 1.0 + tau * cv, tau * cell.turn, dot2(d, cell.e1)
         row, gap = (x * d[0] + y * m[0], x * d[1] + y * m[1]), gap - tau * along
-        report[STIFFNESS_DAMPING_POWER] += tau * along * along / hck
+        if not line.bits & AXIAL_LAW:
+            report[STIFFNESS_DAMPING_POWER] += tau * along * along / hck
+    if line.bits & AXIAL_LAW:
+        gap += h * line.law[i, SHIFT]
+        report[STIFFNESS_DAMPING_POWER] += line.law[i, LOSS]
     if gaps.shape[0] > 0 and hck == 0.0:
         gap = gaps[i]
     if bent:

@@ -35,6 +35,7 @@ from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.rotations import add, cross, dot, mat_vec, scale, sub
 from hybrid.kernels.seabed import contact, friction, pressure
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
+from hybrid.kernels.tension_torque import twist_of_line
 from hybrid.kernels.zone_criteria import end_turn
 
 # Torque of the whole line as far as its rods do not carry it: N m, given; rad/(N m), by which it follows from the turn of
@@ -299,13 +300,13 @@ read = reader(blank_error_job())
 
 
 @inner
-def whole_torque(torque, ends, e):
+def whole_torque(torque, line, ends, e, T):
     """Torque of the whole line as far as its rods do not carry it, N m; a turn of the ends is counted on."""
     if not torque[COMPLIANCE] < math.inf:
         return torque[GIVEN]
     turn = end_turn(e, ends.frame) - torque[TURN] + math.pi
     torque[TURN] += turn - 2.0 * math.pi * math.floor(turn / (2.0 * math.pi)) - math.pi
-    return (torque[TURN] - torque[FREE_TURN]) / torque[COMPLIANCE]
+    return (torque[TURN] - torque[FREE_TURN] + twist_of_line(line, T)) / torque[COMPLIANCE]
 
 
 @inner
@@ -313,7 +314,7 @@ def solve_error(job, state, old, history, s, moving):
     """Solve for the unknowns `x` of the error; whether they are finite."""
     line, ends, bending, arrays = job.line, job.ends, job.bending, job.arrays
     chords, dM, M, work = arrays.chords, arrays.dM, arrays.M, arrays.work
-    torque = whole_torque(arrays.torque, ends, state.e)
+    torque = whole_torque(arrays.torque, line, ends, state.e, state.T)
     tabulate_chords(state.e, chords)
     neglected_moments(line, ends, bending, chords, chords, state.T, 0.0, work[0], dM, M)
     if torque != 0.0:

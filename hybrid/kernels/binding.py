@@ -34,6 +34,13 @@ class Table:
         self.numbers: NDArray[np.int64] = np.zeros(at, np.int64) if room is None else room
         self.bind(**example._asdict())
 
+    def again(self, room: NDArray[np.int64]) -> Table:
+        """Another one with the same bound in it, its numbers in `room`."""
+        other = Table.__new__(Table)
+        other._places, other._sizes, other._bound, other.numbers = self._places, self._sizes, {**self._bound}, room
+        room[:] = self.numbers
+        return other
+
     def bind(self, **values: Any) -> None:
         """Put values in their places; TypeError: an array that the kernel would not understand."""
         for name, value in values.items():

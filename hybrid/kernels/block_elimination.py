@@ -19,6 +19,7 @@ matrix needs (`solve_again`): KEPT numbers a block,
     wide     0..11 balance against (dr, dpsi) of block i-2;  12..36 against block i-1, after that;  37..61 pivot block
     narrow   0..8 balance against dr_{i-1};  9..11 length;  12..27 pivot block
     both     62 unit of the length row;  63 whether it is wide;  64..68 right-hand side of the pivot block
+    wide     69..72 length against (dr, dpsi) of block i-2, which tension that makes a torque reaches
 """
 
 from __future__ import annotations
@@ -31,7 +32,7 @@ SIZE = 5  # unknowns of a block
 WIDTH = 24  # columns of W
 SPAN = 9  # columns of X_i
 ROW = SIZE * SPAN  # numbers of X_i
-KEPT = 69  # numbers kept of a block, for another right-hand side
+KEPT = 73  # numbers kept of a block, for another right-hand side
 
 
 @inner
@@ -158,18 +159,21 @@ def solve_block(W, X, i):
 
 
 @inner
-def eliminate_wide(W, X, i, kept, size):
+def eliminate_wide(W, X, i, kept, size, couples):
     """Eliminate block row i (5 unknowns); False when the block is singular.
 
-    kept: where its factors go in X, 0: nowhere; size: unit of its length row.
+    kept: where its factors go in X, 0: nowhere; size: unit of its length row; couples: whether that row reaches back to
+    block i-2, as the balance of the node does (kernels.tension_torque).
     """
     if kept > 0:
+        for j in range(4):
+            X[kept + 69 + j] = W[1 + j]
         for r in range(1, 4):
             for j in range(4):
                 X[kept + 4 * (r - 1) + j] = W[r * WIDTH + 1 + j]
         X[kept + 62], X[kept + 63] = size, 1.0
     if i >= 2:
-        for r in range(1, 4):  # only the balance of the node reaches back to block i-2
+        for r in range(0 if couples else 1, 4):  # the balance of the node reaches back to block i-2
             o = r * WIDTH
             W[o + 23] -= subtract_block(W, o + 5, X, i - 2, W[o + 1], W[o + 2], W[o + 3], W[o + 4])
     if kept > 0:
@@ -395,6 +399,9 @@ def solve_again(X, W, b, x):
         size = X[k + 62]
         if X[k + 63] > 0.0:
             x[i, 0], x[i, 4] = size * b[i, 0], b[i, 4]
+            if i >= 2:
+                for j in range(4):
+                    x[i, 0] -= X[k + 69 + j] * x[i - 2, j + 1]
             for r in range(3):
                 y = b[i, r + 1]
                 if i >= 2:

@@ -49,8 +49,9 @@ from hybrid.kernels.state import Floats
     MUTE_SLACK,  # 1 when an event has told of that
     CORRECTION,  # of the last try: next correction of Newton's method, as predicted
     RELEASE_START, RELEASE_END,  # N, force at which an end is let go; infinity: never
-) = range(40)  # fmt: skip
-CLOCK_SIZE = 40
+    NEAR_PLANE,  # m, distance from its plane below which a line in space has come back to it; 0: it never does
+) = range(41)  # fmt: skip
+CLOCK_SIZE = 41
 
 # --- count -----------------------------------------------------------------------------------------
 
@@ -93,6 +94,7 @@ UNKNOWN_ERROR = 256
 IS_BENT, MEETS_ITSELF = 512, 1024
 LETS_GO = 2048
 ITERATIONS_CUT = 4096
+NEARS_PLANE = 8192
 
 # --- powers and work --------------------------------------------------------------------------------
 

@@ -26,6 +26,7 @@ TURN = 0.3  # rad that a cell turns through
 SHORTEST_CELL = 0.6  # of l0
 EDGE_CELL, EDGE_WIDTH = 1.0, 3.0  # of l0: cells beside a contact edge, and how far from it
 FARTHEST = 30.0  # of l0: how far an edge is foreseen to go in a step
+HORIZON = 2.5  # steps of the way of an edge for which cells are made when they change, so that fewer steps do
 STEEPEST = 0.8  # by which W may grow with s: cells beside each other differ by little more than 2
 AHEAD = 0.75  # of W from which cells are halved where others must be: changes become fewer
 MERGE = 0.5  # of W that two cells made one may be long
@@ -68,7 +69,7 @@ def lower_between(W, s, a, b, to):
 
 @inner
 def lower_at_edge(line, sea, state, zones, i, dt):
-    """W about a contact edge in cell i, and over the way that it will go in a step of dt."""
+    """W about a contact edge in cell i, and over the way that it will go in dt."""
     p, q = depth(sea, state.r, i), depth(sea, state.r, i + 1)
     s, h = line.s, line.s[i + 1] - line.s[i]
     part = p / (p - q)
@@ -82,12 +83,9 @@ def lower_at_edge(line, sea, state, zones, i, dt):
 
 
 @inner
-def find_wanted(line, sea, state, zones, dt):
-    """Wanted lengths at nodes for the next step, of dt, into zones.wanted, graded."""
-    kinds, T, W, s = zones.kinds, state.T, zones.wanted, line.s
-    n = T.shape[0]
-    for i in range(n + 1):
-        W[i] = wanted_length(line, kinds, T, i, zones.limits)
+def lower_at_edges(line, sea, state, zones, dt):
+    """W about all contact edges, and over the way that they will go in dt; graded."""
+    n, W, s = line.h.shape[0], zones.wanted, line.s
     if line.bits & SEABED:
         for i in range(n):
             if (depth(sea, state.r, i) > 0.0) != (depth(sea, state.r, i + 1) > 0.0):
@@ -96,6 +94,28 @@ def find_wanted(line, sea, state, zones, dt):
         W[i] = min(W[i], W[i - 1] + STEEPEST * (s[i] - s[i - 1]))
     for i in range(n - 1, -1, -1):
         W[i] = min(W[i], W[i + 1] + STEEPEST * (s[i + 1] - s[i]))
+
+
+@inner
+def is_too_long(zones, s):
+    """Whether a cell is longer than wanted, and can be cut."""
+    W = zones.wanted
+    for i in range(s.shape[0] - 1):
+        if s[i + 1] - s[i] > min(W[i], W[i + 1]) and zones.place[i + 1] > zones.place[i] + 1:
+            return True
+    return False
+
+
+@inner
+def find_wanted(line, sea, state, zones, dt):
+    """Wanted lengths at nodes for the next HORIZON steps of dt into zones.wanted, graded; whether the next needs others."""
+    for i in range(line.h.shape[0] + 1):
+        zones.wanted[i] = wanted_length(line, zones.kinds, state.T, i, zones.limits)
+    lower_at_edges(line, sea, state, zones, dt)
+    now = is_too_long(zones, line.s)
+    if line.bits & SEABED:
+        lower_at_edges(line, sea, state, zones, HORIZON * dt)
+    return now
 
 
 @inner
@@ -110,37 +130,32 @@ def least_wanted(zones, p, b):
 
 @inner
 def halves(zones, p, a, size, unit):
-    """Whether the part of `size` finest cells of length `unit` from place a on is halved, and whether it must be now."""
+    """Whether the part of `size` finest cells of length `unit` from place a on is halved."""
     W, middle, h = least_wanted(zones, p, a + size), a + size // 2, size * unit
     if h > W * AHEAD:
         zones.calm[middle] = 0
-        return True, h > W and not zones.here[middle]
+        return True
     if not zones.here[middle]:
-        return False, False
+        return False
     zones.calm[middle] = zones.calm[middle] + 1 if h <= MERGE * W else 0
-    return zones.calm[middle] < CALM_STEPS, False
+    return zones.calm[middle] < CALM_STEPS
 
 
 @inner
 def plan_base_cell(zones, p, begin, size, unit):
-    """Nodes of a base cell of `size` finest cells, into zones.plan; whether some must be there at once.
+    """Nodes of a base cell of `size` finest cells, into zones.plan.
 
     p: its first node now.  Parts in their order along the line: the one that begins at an offset is as long as the largest power of two in it.
     """
-    offset, part, at_once = 0, size, False
+    offset, part = 0, size
     while offset < size:
         while zones.place[p + 1] <= begin + offset:
             p += 1
-        while part > 1:
-            halved, now = halves(zones, p, begin + offset, part, unit)
-            at_once |= now
-            if not halved:
-                break
+        while part > 1 and halves(zones, p, begin + offset, part, unit):
             part //= 2
             zones.plan[begin + offset + part] = True
         offset += part
         part = offset & -offset
-    return at_once
 
 
 @inner
@@ -149,8 +164,8 @@ def plan_cells(line, sea, state, zones, dt):
 
     may go; dt: s, of the step before, which the next one is taken to be as long as.
     """
-    find_wanted(line, sea, state, zones, dt)
-    begin, p, at_once = 0, 0, False
+    at_once = find_wanted(line, sea, state, zones, dt)
+    begin, p = 0, 0
     for k in range(zones.plan.shape[0]):
         zones.plan[k] = False
     for j in range(zones.parts.shape[0]):
@@ -158,7 +173,7 @@ def plan_cells(line, sea, state, zones, dt):
         while zones.place[p] < begin:
             p += 1
         zones.plan[begin] = True
-        at_once |= plan_base_cell(zones, p, begin, size, zones.H[j] / size)
+        plan_base_cell(zones, p, begin, size, zones.H[j] / size)
         begin += size
     zones.plan[begin] = True
     gone = 0

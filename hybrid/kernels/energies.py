@@ -4,20 +4,32 @@ from __future__ import annotations
 
 from hybrid.kernels.assembly import get3, get9
 from hybrid.kernels.cell import chord, turning
-from hybrid.kernels.compile import kernel
+from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import bending, damped_bending, strain_of_element
-from hybrid.kernels.forces import ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.forces import AXIAL_LAW, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.rotations import add, cross, dot, frame, scale, sub
+from hybrid.kernels.tension_torque import couples, rest_strain, stretch_energy
+from hybrid.kernels.zone_torque import FIRST, LAST, TORQUE
+
+
+@inner
+def stretch_of(line, e, i, low, high):
+    """Energy of stretch of cell i between two torques (N m), where tension makes a torque."""
+    _, l, _ = chord(get3(e, i))
+    return stretch_energy(line, i, l - line.h[i], low, high)
 
 
 @kernel
-def observe(line, ends, e, v, a1, w, M, strain, energy):
+def observe(line, ends, e, v, a1, w, T, turn, M, strain, energy):
     """Moments M (N+1, 3) N m inertial and log strains (N+1, 3) rad in the frame of the cell before; energies (5,) J.
 
-    energy: kinetic (structure, with rotary inertia), bending, torsion, stretch, gravity is left to the caller.
-    A moment is that of the part after the node on the part before.
+    energy: kinetic (structure, with rotary inertia), bending, torsion, stretch (not of a line with an axial law, which
+    reports it); gravity is left to the caller.
+    A moment is that of the part after the node on the part before.  T: (N,) N and turn: (K, 3) as of a State are read
+    where tension makes a torque; the torsion of catenary zones is left to the caller.
     """
     n = e.shape[0]
+    coupled, torque, zone = couples(line), 0.0, 0
     for j in range(4):
         energy[j] = 0.0
     for i in range(n + 1):
@@ -27,10 +39,13 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
         right = i < n
         M[i, 0], M[i, 1], M[i, 2] = 0.0, 0.0, 0.0
         strain[i, 0], strain[i, 1], strain[i, 2] = 0.0, 0.0, 0.0
+        torque_before, torque = torque, 0.0
         if right:
             ei = get3(e, i)
             d, l, il = chord(ei)
-            if line.ck[i] > 0.0:  # from the stretch, because a damped cell's tension is more than elastic
+            if (
+                line.ck[i] > 0.0 and not coupled and not line.bits & AXIAL_LAW
+            ):  # from the stretch, because a damped cell's tension is more than elastic
                 longer = l - line.h[i]
                 energy[3] += 0.5 * longer * longer / (line.h[i] * line.ck[i])
             if line.bits & ROTARY and line.spin[i]:
@@ -42,6 +57,15 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
                 M[i, 0], M[i, 1], M[i, 2] = -m[0], -m[1], -m[2]
             if i == n and line.spin[n - 1]:
                 M[i, 0], M[i, 1], M[i, 2] = get3(ends.moment, 1)
+            if coupled:
+                zone += zone < turn.shape[0] and i > line.torsion[zone, LAST]
+                if zone < turn.shape[0] and i >= line.torsion[zone, FIRST]:
+                    torque = turn[zone, TORQUE]
+                elif i == 0 or i == n:
+                    d, _, _ = chord(get3(e, min(i, n - 1)))
+                    torque = dot(get3(M, i), d)
+                if left:
+                    energy[3] += stretch_of(line, e, i - 1, torque_before, torque)
             continue
         Ra, Rb = get9(ends.frame, 0), get9(ends.frame, 1)
         wa, wb = get3(ends.spin, 0), get3(ends.spin, 1)
@@ -55,11 +79,15 @@ def observe(line, ends, e, v, a1, w, M, strain, energy):
             Rb = frame(get3(a1, i), d)
             d1, _ = turning(d, il, sub(get3(v, i + 1), vi), 0.0)
             wb = add(cross(d, d1), scale(w[i], d))
-        kb, k0 = get3(line.kb, i), get3(line.k0, i)
-        k = strain_of_element(Ra, Rb, kb, k0)
+        kb, k0 = get3(line.kb, i), rest_strain(line, T, i)
+        k = strain_of_element(Ra, Rb, kb, get3(line.k0, i))
         x = sub(k, k0)
         energy[1] += 0.5 * (kb[0] * x[0] * x[0] + kb[1] * x[1] * x[1])
         energy[2] += 0.5 * kb[2] * x[2] * x[2]
+        if coupled:
+            torque = kb[2] * x[2]
+            if left:
+                energy[3] += stretch_of(line, e, i - 1, torque_before, torque)
         if line.bits & STIFFNESS_DAMPING:
             tau = 0.5 * (line.tau[max(i - 1, 0)] + line.tau[min(i, n - 1)])
             m, _, _, _ = damped_bending(Ra, Rb, kb, k0, tau, wa, wb)

@@ -15,6 +15,7 @@ from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.resolution_checks import sharpest_in_plane, sharpest_in_space
 from hybrid.kernels.run import blank_job, in_plane, in_space
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, Work, blank_state, no_ends, no_torsion
+from hybrid.kernels.tension_torque import COUPLES
 from hybrid.kernels.zone_torque import pass_torque, torsion_of
 
 NO_PUSH: Floats = np.zeros((0, 4))
@@ -47,6 +48,8 @@ def check_turns(line: Line, state: State) -> None:
     """ValueError: a state does not know the turns of the zones of its line that a torque passes through."""
     if state.turn.shape[0] != line.torsion.shape[0]:
         raise ValueError(f"a state with {state.turn.shape[0]} turns on a line that has {line.torsion.shape[0]}")
+    if state.slow.shape[0] != line.law.shape[0]:
+        raise ValueError(f"a state with {state.slow.shape[0]} mean tensions on a line that has {line.law.shape[0]}")
 
 
 def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, int]:
@@ -59,6 +62,8 @@ def sharpest(line: Line, ends: Ends, state: State) -> tuple[float, int, float, i
 def workspace_of(line: Line, keep: bool = False) -> Work:
     """Arrays for a line, with what a torque through its catenary zones takes; keep: as of `workspace`."""
     work = workspace(line.h.size, keep or bool(line.torsion.size))
+    if line.tension_twist.size:
+        work = work._replace(couple=np.zeros((line.s.size, COUPLES)))
     if line.torsion.size and not line.bits & PLANAR:
         torsion = torsion_of(line, keep)
         work = work._replace(torsion=torsion)
@@ -78,6 +83,7 @@ def workspace(n_cells: int, keep: bool = False) -> Work:
         gaps=np.zeros(0),
         rows=np.zeros((0, SIZE * WIDTH)),
         torsion=no_torsion(),
+        couple=np.zeros((0, COUPLES)),
     )
 
 

@@ -143,7 +143,12 @@ def note_rod_end(line, ends, state, books, i, passed, t):
     n = line.h.shape[0]
     for side in (-1, 1):
         cell = i - 1 if side < 0 else i
-        if cell < 0 or cell == n or not line.spin[cell]:
+        if cell < 0 or cell == n:
+            continue
+        if not line.spin[cell]:
+            if books.right[i] != i:  # the catenary beside the rod has a value of its own there
+                widen(books.extremes, MOMENT, i if side < 0 else books.right[i], 0.0, t)
+                widen(books.extremes, TORQUE, i if side < 0 else books.right[i], passed, t)
             continue
         d, _, _ = chord(get3(state.e, cell))
         torque, moment = passed, 0.0
@@ -256,23 +261,26 @@ def fold_extremes(places, s, columns, now, out):
     places, s: m, not decreasing; two equal ones are the left and the right value there, in both.  columns: column of
     `now` of each place.  Rows in which something is not known yet are left out.
     """
-    last = places.size - 1
-    for row in range(out.shape[1]):
-        known = True
+    last, rows, known = places.size - 1, out.shape[1], 0
+    for row in range(rows):
+        finite = True
         for c in columns:
-            known &= np.isfinite(now[0, row, c]) and np.isfinite(now[1, row, c])
-        if not known:
-            continue
-        k = 0
-        for i in range(s.size):
-            while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
-                k += 1
-            if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
-                k += 1
-            m = min(k + 1, last)
-            x = (s[i] - places[k]) / (places[m] - places[k]) if places[m] > places[k] and s[i] > places[k] else 0.0
-            near = columns[m] if x > 0.5 else columns[k]
+            finite &= np.isfinite(now[0, row, c]) and np.isfinite(now[1, row, c])
+        known |= finite << row
+    k = 0
+    for i in range(s.size):
+        while k < last and places[k + 1] <= s[i] and not (s[i] == places[k] and places[k + 1] == s[i]):
+            k += 1
+        if i > 0 and s[i] == s[i - 1] and k < last and places[k] == s[i] and places[k + 1] == s[i]:
+            k += 1
+        m = min(k + 1, last)
+        x = (s[i] - places[k]) / (places[m] - places[k]) if places[m] > places[k] and s[i] > places[k] else 0.0
+        a, b = columns[k], columns[m]
+        near = b if x > 0.5 else a
+        for row in range(rows):
+            if not known >> row & 1:
+                continue
             for bound in range(2):
-                value = (1.0 - x) * now[bound, row, columns[k]] + (x * now[bound, row, columns[m]] if x > 0.0 else 0.0)
+                value = (1.0 - x) * now[bound, row, a] + (x * now[bound, row, b] if x > 0.0 else 0.0)
                 if (value > out[bound, row, i]) if bound else (value < out[bound, row, i]):
                     out[bound, row, i], out[2 + bound, row, i] = value, now[2 + bound, row, near]

@@ -21,6 +21,8 @@ PLANAR = 2048
 # Contact of the line with itself (hybrid.kernels.self_contact).
 SELF_CONTACT = 4096
 SELF_FRICTION = 8192
+# No force: tension that is no multiple of strain (hybrid.kernels.axial_law).
+AXIAL_LAW = 16384
 
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),

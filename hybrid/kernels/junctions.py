@@ -1,35 +1,46 @@
 """Points and bodies at which lines meet: their equations, from what every line hands over (kernels.joined_lines).
 
 An end that is joined to a point moves as the point, one that is joined to a body by  G z = dr + dtheta x rho  of the
-body's z = (dr, dtheta), with rho the arm of its fairlead.  What a line hands over,
+body's z = (dr, dtheta), with rho the arm of its fairlead, and where it is clamped to that by dtheta as well.  What a
+line hands over,
 
-    S (dT, q, dr_N) = right-hand side,   rows: length of the last cell, balance of the start, balance of the end,
+    S (dT, q_0, q_N) = right-hand side,   rows: length of the last cell, force and moment on the start, on the end,
 
-goes by G^T into the balances of points and bodies: forces, and rho x force as moments.  A force F turns with the arm of
+goes by G^T into the balances of points and bodies: forces, and rho x force and moments.  A force F turns with the arm of
 its fairlead, which adds  [F]x [rho]x  to the moment.
+A point that lines are clamped to is a body without mass.
 """
 
 from __future__ import annotations
 
+from hybrid.kernels.assembly import LEAST_SPIN_STIFFNESS
 from hybrid.kernels.bodies import LINES, X, add_own, reach_out, vector
+from hybrid.kernels.carried_frames import TURNS, WITH_POINT, answer_of_end, place_frame, turns
 from hybrid.kernels.compile import inner
 from hybrid.kernels.joined_lines import (
+    COLUMNS,
+    END_TURN,
     LEFT,
-    OF_START,
+    OF,
+    SHIFT,
+    TURN,
     balance_of_start,
+    carry_end_turn,
+    carry_functional,
     carry_start,
+    carry_turn,
     end_row,
     last_block,
+    moment_of_end,
     solve_back,
 )
-from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.rotations import cross, hat, mat_mat
 from hybrid.kernels.run import read
 
 START, END = 0, 1
-# Columns of S: of the tension, of the start, of the end, and the right-hand side; its rows: the first three.
-TENSION, OF = 0, (1, 4)
-RIGHT = 7
+# Columns of S: the tension, shift and turn of the start, of the end, and the right-hand side; its rows: as the first.
+TENSION, AT, RIGHT, HANDED = 0, (1, 7), 13, 14
 
 
 @inner
@@ -49,8 +60,8 @@ def count_tensions(joints):
 
 
 @inner
-def place_ends(l, job, joints, fairleads, arms, gaps, points, old, new, work, given):
-    """Arms of the fairleads of a line, and how far its ends have still to go to them; given: those are."""
+def place_ends(l, job, joints, fairleads, seats, arms, gaps, points, old, new, work, given):
+    """Arms of the fairleads of a line, frames that are carried, and how far its ends have still to go; given: those are."""
     for k in range(2):
         joint, node = joints[l, k], k * job.line.h.shape[0]
         if joint >= points:
@@ -60,6 +71,8 @@ def place_ends(l, job, joints, fairleads, arms, gaps, points, old, new, work, gi
                 arms[l, k, i] = rho[i]
                 if not given:
                     gaps[l, k, i] = place[i] - job.old.r[node, i] - job.work.u[node, i]
+            if turns(seats, l, k):
+                place_frame(job.ends, k, seats[l, k], new[b])
         if k == START and joint >= 0:
             for i in range(3):
                 job.ends.position[0, i] = job.old.r[0, i]
@@ -68,8 +81,8 @@ def place_ends(l, job, joints, fairleads, arms, gaps, points, old, new, work, gi
 
 
 @inner
-def add_pull(joint, report, k, arm, net, work):
-    """The force of an end on its point or body."""
+def add_pull(joint, report, k, arm, clamped, net, work):
+    """The force of an end on its point or body, and where it is clamped there its moment."""
     o, points = FORCE_A + 3 * k, net.shape[0]
     F = (report[o], report[o + 1], report[o + 2])
     if joint < points:
@@ -80,67 +93,107 @@ def add_pull(joint, report, k, arm, net, work):
     for i in range(3):
         work[joint - points, LINES + i] += F[i]
         work[joint - points, LINES + 3 + i] += M[i]
+        if clamped:
+            moment = report[MOMENT_A + 3 * k + i]
+            work[joint - points, LINES + 3 + i] += moment if k == START else -moment
 
 
 @inner
-def hand_over(l, job, joints, first, columns, functional, gaps, S):
+def put_functional(f, low, high, joined, S, e):
+    """A functional of the last block and q as row e of S."""
+    S[e, RIGHT] = -f[LEFT]
+    for b in range(low, high):
+        S[e, 1 + b if b < END_TURN else AT[END] + 3 + b - END_TURN] = f[OF + b]
+    if joined:
+        S[e, TENSION] = f[0]
+        for b in range(3):
+            S[e, AT[END] + b] = f[1 + b]
+
+
+@inner
+def hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S):
     """What a line hands over: its rows and columns of S."""
-    for r in range(7):
-        for c in range(8):
+    for r in range(RIGHT):
+        for c in range(HANDED):
             S[r, c] = 0.0
     start, end = joints[l, START], joints[l, END]
-    n, X_, o = job.line.h.shape[0], job.work.X, first[l]
+    n, X_, o, f = job.line.h.shape[0], job.work.X, first[l], functional
+    starts, ends = turns(seats, l, START), turns(seats, l, END)
+    low, high = used_columns(start >= 0, starts, ends)
+    for k in range(2):
+        if turns(seats, l, k):
+            b = joints[l, k] - points
+            answer_of_end(job, k, new[b], work[b], job.task.cv, answers[k])
     if start >= 0:
         carry_start(X_, job.work.W, columns, o, n, end >= 0)
-        balance_of_start(X_, job.work.rows[0], columns, o, n, end >= 0, functional)
+    if starts:
+        carry_turn(X_, job.work.W, columns, o, n, end >= 0, answers[START])
+    if ends:
+        carry_end_turn(X_, job.work.W, columns, o, n, answers[END])
+    if start >= 0:
+        for a in range(6 if starts else 3):
+            if a < 3:
+                balance_of_start(job.work.rows[0], a, starts, answers[START], f)
+            else:
+                moment_of_end(START, a - 3, answers[START], f)
+            carry_functional(X_, columns, o, 0, n, end >= 0, low, high, f)
+            put_functional(f, low, high, end >= 0, S, AT[START] + a)
+    if end < 0:
+        return
+    k = last_block(X_, n)
+    for r in range(4):
+        e = TENSION if r == 0 else AT[END] - 1 + r
+        S[e, TENSION] = end_row(X_, k, r, 0)
+        S[e, RIGHT] = X_[k + 64 + r]
+        for b in range(3):
+            S[e, AT[END] + b] = end_row(X_, k, r, 1 + b)
+        for b in range(low, high):
+            S[e, 1 + b if b < END_TURN else AT[END] + 3 + b - END_TURN] = -columns[b, o + n, r]
+    if ends:
         for a in range(3):
-            f = functional[a]
-            for b in range(3):
-                S[1 + a, 1 + b] = f[OF_START + b]
-            S[1 + a, RIGHT] = -f[LEFT]
-            if end >= 0:
-                S[1 + a, 0] = f[0]
-                for b in range(3):
-                    S[1 + a, 4 + b] = f[1 + b]
-    if end >= 0:
-        k = last_block(X_, n)
-        for r in range(4):
-            e = 0 if r == 0 else 3 + r
-            S[e, 0] = end_row(X_, k, r, 0)
-            S[e, RIGHT] = X_[k + 64 + r]
-            for b in range(3):
-                S[e, 4 + b] = end_row(X_, k, r, 1 + b)
-                if start >= 0:
-                    S[e, 1 + b] = -columns[b, o + n, r]
-        for e in range(7):
-            for b in range(3):
-                S[e, RIGHT] -= S[e, 4 + b] * gaps[l, END, b]
+            moment_of_end(END, a, answers[END], f)
+            carry_functional(X_, columns, o, n - 1, n, True, low, high, f)
+            put_functional(f, low, high, True, S, AT[END] + 3 + a)
+    for e in range(RIGHT):
+        for b in range(3):
+            S[e, RIGHT] -= S[e, AT[END] + b] * gaps[l, END, b]
 
 
 @inner
-def follow(joint, points, arm, G):
-    """G (3, 6) of an end; returns how many columns it has."""
-    for i in range(3):
+def used_columns(carries, starts, ends):
+    """Which columns of D a line has: the first, and the one behind the last."""
+    low = SHIFT if carries else END_TURN
+    high = COLUMNS if ends else END_TURN if starts else TURN if carries else END_TURN
+    return low, high
+
+
+@inner
+def follow(joint, points, arm, clamped, G):
+    """G (6, 6) of an end; returns how many rows and columns it has."""
+    for i in range(6):
         for j in range(6):
             G[i, j] = 1.0 if i == j else 0.0
     if joint < points:
-        return 3
+        return 3, 3
     H = hat(vector(arm, 0))
     for i in range(3):
         for j in range(3):
             G[i, 3 + j] = -H[3 * i + j]
-    return 6
+    return 6 if clamped else 3, 6
 
 
 @inner
-def add_row(S, r, part, A, e, m, tension, at, size, G):
-    """A part of row r of S into row e of A; tension: its column there, -1: none; at, size: of the unknowns of both ends."""
+def add_row(S, r, part, A, e, m, tension, at, rows, size, G):
+    """A part of row r of S into row e of A; tension: its column there, -1: none.
+
+    at, rows, size: where the unknowns of both ends begin, rows and columns of their G.
+    """
     if tension >= 0:
         A[e, tension] += part * S[r, TENSION]
     A[e, m] += part * S[r, RIGHT]
     for k in range(2):
-        for i in range(3):
-            value = part * S[r, 1 + 3 * k + i]
+        for i in range(rows[k]):
+            value = part * S[r, AT[k] + i]
             if value != 0.0:
                 for j in range(size[k]):
                     if G[k, i, j] != 0.0:
@@ -148,33 +201,48 @@ def add_row(S, r, part, A, e, m, tension, at, size, G):
 
 
 @inner
-def spread(l, joints, report, arms, points, tensions, row, S, G, A, m):
+def spread(l, joints, seats, job, arms, points, tensions, row, S, G, A, m):
     """S of a line into the equations A of all tensions, points and bodies; row: of its tension, -1: none."""
-    start, end = joints[l, START], joints[l, END]
-    size = (
-        follow(start, points, arms[l, START], G[START]) if start >= 0 else 0,
-        follow(end, points, arms[l, END], G[END]) if end >= 0 else 0,
-    )
+    start, end, report, kb = joints[l, START], joints[l, END], job.work.report, job.line.kb
+    rows0, size0, rows1, size1 = 0, 0, 0, 0
+    if start >= 0:
+        rows0, size0 = follow(start, points, arms[l, START], turns(seats, l, START), G[START])
+    if end >= 0:
+        rows1, size1 = follow(end, points, arms[l, END], turns(seats, l, END), G[END])
+    rows, size = (rows0, rows1), (size0, size1)
     at = (first_unknown(max(start, 0), tensions, points), first_unknown(max(end, 0), tensions, points))
     if row >= 0:
-        add_row(S, 0, 1.0, A, row, m, row, at, size, G)
+        add_row(S, TENSION, 1.0, A, row, m, row, at, rows, size, G)
     for k in range(2):
         for j in range(size[k]):
-            for i in range(3):
+            for i in range(rows[k]):
                 if G[k, i, j] != 0.0:
-                    add_row(S, 1 + 3 * k + i, G[k, i, j], A, at[k] + j, m, row, at, size, G)
+                    add_row(S, AT[k] + i, G[k, i, j], A, at[k] + j, m, row, at, rows, size, G)
         if size[k] == 6:
             o = FORCE_A + 3 * k
             T = mat_mat(hat((report[o], report[o + 1], report[o + 2])), hat(vector(arms[l, k], 0)))
             for i in range(3):
                 for j in range(3):
                     A[at[k] + 3 + i, at[k] + 3 + j] += T[3 * i + j]
+        if rows[k] == 6:  # of rods that may all spin freely
+            node = k * job.line.h.shape[0]
+            for i in range(3):
+                A[at[k] + 3 + i, at[k] + 3 + i] -= LEAST_SPIN_STIFFNESS * (kb[node, 0] + kb[node, 2])
+            if seats[l, k, TURNS] == WITH_POINT:
+                # the moment in axes of the point: that of rods which may all spin is then 0 about their axis wherever
+                # they are, and so is its change; in inertial axes they would spin at random until all else balances
+                o, sign = MOMENT_A + 3 * k, 1.0 if k == START else -1.0
+                H = hat((sign * report[o], sign * report[o + 1], sign * report[o + 2]))
+                for i in range(3):
+                    for j in range(3):
+                        A[at[k] + 3 + i, at[k] + 3 + j] += H[3 * i + j]
 
 
 @inner
 def assemble_junctions(
-    tables, joints, arms, gaps, first, columns, functional, net, bodies, old, new, work, S, G, A, m, cv, ca
-):
+    tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G, A, m,
+    cv, ca,
+):  # fmt: skip
     """Equations (m, m+1) of the last tensions, the points and the bodies, from what the lines hand over."""
     for r in range(m):
         for c in range(m + 1):
@@ -185,27 +253,36 @@ def assemble_junctions(
         if start < 0 and end < 0:
             continue
         job = read(tables[l])
-        hand_over(l, job, joints, first, columns, functional, gaps, S)
-        spread(l, joints, job.work.report, arms, points, tensions, row if end >= 0 else -1, S, G, A, m)
+        hand_over(l, job, joints, seats, first, columns, functional, gaps, answers, new, work, points, S)
+        spread(l, joints, seats, job, arms, points, tensions, row if end >= 0 else -1, S, G, A, m)
         if end >= 0:
             row += 1
     add_own(bodies, old, new, work, A, first_unknown(points, tensions, points), m, cv, ca)
 
 
 @inner
-def shift_of(joint, tensions, points, arm, gap, A, m):
-    """Shift of an end by the solution, and what is still to go beside it; the last: without that."""
+def shift_of(joint, tensions, points, arm, gap, clamped, A, m, q, o):
+    """Shift of an end with what is still to go beside it; without that it goes into q from o on, and its turn from
+    o + 3 on where it is clamped."""
     at = first_unknown(joint, tensions, points)
-    q = (A[at, m], A[at + 1, m], A[at + 2, m])
+    s = (A[at, m], A[at + 1, m], A[at + 2, m])
     if joint >= points:
-        t = cross((A[at + 3, m], A[at + 4, m], A[at + 5, m]), vector(arm, 0))
-        q = (q[0] + t[0], q[1] + t[1], q[2] + t[2])
-    return (q[0] + gap[0], q[1] + gap[1], q[2] + gap[2]), q
+        turn = (A[at + 3, m], A[at + 4, m], A[at + 5, m])
+        t = cross(turn, vector(arm, 0))
+        s = (s[0] + t[0], s[1] + t[1], s[2] + t[2])
+        if clamped:
+            q[o + 3], q[o + 4], q[o + 5] = turn
+    if o == SHIFT:
+        q[0], q[1], q[2] = s
+    return (s[0] + gap[0], s[1] + gap[1], s[2] + gap[2])
 
 
 @inner
-def correct_all(tables, joints, arms, gaps, first, columns, points, work, A, m):
-    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite."""
+def correct_all(tables, joints, seats, arms, gaps, first, columns, points, work, A, m, q):
+    """Corrections of all lines and bodies from the solution; returns -1, or a line whose correction is not finite.
+
+    q: (COLUMNS,), worked in.
+    """
     row, tensions = 0, count_tensions(joints)
     for b in range(work.shape[0]):
         at = first_unknown(points + b, tensions, points)
@@ -213,13 +290,17 @@ def correct_all(tables, joints, arms, gaps, first, columns, points, work, A, m):
             work[b, X + k] = A[at + k, m]
     for l in range(tables.shape[0]):
         job, start, end = read(tables[l]), joints[l, START], joints[l, END]
-        x, n, q, place = job.work.x, job.line.h.shape[0], (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+        x, n, place = job.work.x, job.line.h.shape[0], (0.0, 0.0, 0.0)
+        starts, ends = turns(seats, l, START), turns(seats, l, END)
+        low, high = used_columns(start >= 0, starts, ends)
+        for b in range(COLUMNS):
+            q[b] = 0.0
         if end >= 0:
-            far, _ = shift_of(end, tensions, points, arms[l, END], gaps[l, END], A, m)
+            far = shift_of(end, tensions, points, arms[l, END], gaps[l, END], ends, A, m, q, END_TURN - 3)
             x[n, 0], x[n, 1], x[n, 2], x[n, 3] = A[row, m], far[0], far[1], far[2]
             row += 1
         if start >= 0:
-            place, q = shift_of(start, tensions, points, arms[l, START], gaps[l, START], A, m)
-        if not solve_back(job.work.X, columns, first[l], start >= 0, q, place, x, end >= 0):
+            place = shift_of(start, tensions, points, arms[l, START], gaps[l, START], starts, A, m, q, SHIFT)
+        if not solve_back(job.work.X, columns, first[l], low, high, q, start >= 0, place, x, end >= 0):
             return l
     return -1

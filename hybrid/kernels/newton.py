@@ -78,6 +78,9 @@ LOW_TENSION = 1e-3
 LARGEST_TURN = 0.7
 
 call_torque = caller_of_six(0)
+call_law = caller_of_six(0)
+# ca, 1/s2, of a solve for accelerations is larger (solve.stepper.HEAVY): mean tensions stay as they are.
+AT_REST = 1e30
 
 
 @inner
@@ -86,6 +89,15 @@ def pass_torque(space, line, ends, state, work, part, cv):
     if space is not None:
         if work.torsion.address != 0:
             call_torque(work.torsion.address, line, ends, state, work, part, cv)
+
+
+@inner
+def follow_law(line, old, new, work, dt, cv, ca):
+    """Linearise the law of length where tension is no multiple of strain (kernels.axial_law); dt: s, of a step, else 0."""
+    if line.law_at.shape[0] != 0:
+        if not dt > 0.0 and not (cv == 0.0 and ca < AT_REST):
+            dt = -1.0
+        call_law(line.law_at[0], line, old, new, work, dt, ca)
 
 
 @inner
@@ -168,11 +180,12 @@ def solve(
     cv, ca = s.cv, s.ca
     before, left = math.inf, math.inf
     noise = round_off_tension(line, ca, scale)
-    outcome, it, where = NOT_CONVERGED, 0, -1
+    outcome, it, where, size = NOT_CONVERGED, 0, -1, math.inf
     while it < most and outcome == NOT_CONVERGED:
         it += 1
         bad, good = -1, True
         pass_torque(space, line, ends, new, work, BEFORE_MARCH, cv)
+        follow_law(line, old, new, work, task.dt, cv, ca)
         if reel != 0:
             call_reel(reel, reel_table)
         if space is not None:
@@ -221,8 +234,12 @@ def solve(
     cut_short = task.cut and outcome == NOT_CONVERGED and it == most and before < math.inf
     if cut_short:
         outcome = OK
+        if it == 1:  # from one correction the next cannot be predicted: it is this one at most
+            left = size
     if task.what == STEP:
         find_rates(space, line, sea, old, new, work.u, s)
+    if task.what != ASSEMBLY:
+        follow_law(line, old, new, work, task.dt, cv, ca)
     pass_torque(space, line, ends, new, work, AFTER_STEP, cv)
     if task.what == STEP:
         if outcome == OK:

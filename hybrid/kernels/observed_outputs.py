@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import cross, dot
-from hybrid.kernels.state import Batch, Ends, Floats, Line, blank_line, no_ends
+from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, blank_line, no_ends
 
 FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
 
@@ -29,6 +31,8 @@ class Output(NamedTuple):
     v: Floats  # (N+1, 3) m/s
     a1: Floats  # (N, 3)
     w: Floats  # (N,) 1/s
+    T: Floats  # (N,) N
+    turn: Floats  # (K, 3) as `State.turn`
     moment: Floats  # (N+1, 3) N m, as of kernels.energies
     strain: Floats  # (N+1, 3) rad
     energy: Floats  # (5,) J: kinetic, bending, torsion, stretch, potential (of weight and buoyancy)
@@ -38,7 +42,19 @@ class Output(NamedTuple):
 def _blank() -> Output:
     nodes, cells = np.zeros((2, 3)), np.zeros((1, 3))
     return Output(
-        blank_line(1), no_ends(), nodes, cells, nodes, cells, np.zeros(1), nodes, nodes, np.zeros(5), np.zeros(2)
+        blank_line(1),
+        no_ends(),
+        nodes,
+        cells,
+        nodes,
+        cells,
+        np.zeros(1),
+        np.zeros(1),
+        NO_TURN,
+        nodes,
+        nodes,
+        np.zeros(5),
+        np.zeros(2),
     )
 
 
@@ -50,7 +66,7 @@ def observe_outputs(tables):
     """Find moment, strain, energy and bend of all outputs, (nb, size) tables of `Output`."""
     for k in range(tables.shape[0]):
         x = _read(tables[k])
-        observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.moment, x.strain, x.energy)
+        observe(x.line, x.ends, x.e, x.v, x.a1, x.w, x.T, x.turn, x.moment, x.strain, x.energy)
         high = 0.0
         for i in range(x.r.shape[0]):
             for j in range(3):
@@ -67,10 +83,13 @@ def observe_outputs(tables):
                 before = d
 
 
-def observed(line: Line, batch: Batch) -> tuple[Floats, Floats, Floats, Floats]:
+def observed(
+    line: Line, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
+) -> tuple[Floats, Floats, Floats, Floats]:
     """Moments and strains (nb, N+1, 3) as of kernels.energies, energies (nb, 5) J and bends (nb, N+1) 1/m of outputs.
 
     A line of catenary alone has no moment and no strain, (1, N+1, 3) of zeros; one of rod alone no bends, (nb, 0).
+    varied: arrays (nb, ...) of the line by name, where it is another one in every output.
     A bend is 2 tan(x/2) over the length of line around the node, x the angle from cell to cell; zero at the ends.
     """
     nb, n = batch.T.shape
@@ -78,12 +97,17 @@ def observed(line: Line, batch: Batch) -> tuple[Floats, Floats, Floats, Floats]:
     moment, strain = (np.zeros((nb if rods else 1, n + 1, 3)) for _ in range(2))
     energy, bend = np.zeros((nb, 5)), np.zeros((nb, n + 1 if catenary else 0))
     own = {"moment": moment, "strain": strain} if rods else {}
-    state = {"r": batch.r, "e": batch.e, "v": batch.v, "a1": batch.a1, "w": batch.w}
+    state = {"r": batch.r, "e": batch.e, "v": batch.v, "a1": batch.a1, "w": batch.w, "T": batch.T}
+    if batch.turn.size:
+        state["turn"] = batch.turn
     held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
     of_line = {"line.h": batch.h, "line.kb": batch.kb} if batch.h.size else {}
+    of_line |= {f"line.{name}": x for name, x in varied.items()}
+    there = batch.line(0, line)._replace(**{name: x[0] for name, x in varied.items()})
     first = Output(
-        batch.line(0, line), Ends(*(x[0] for x in held)),
-        **{name: x[0] for name, x in state.items()}, moment=moment[0], strain=strain[0], energy=energy[0], bend=bend[0],
+        there, Ends(*(x[0] for x in held)),
+        **{"turn": NO_TURN} | {name: x[0] for name, x in state.items()}, moment=moment[0], strain=strain[0],
+        energy=energy[0], bend=bend[0],
     )  # fmt: skip
     along = (
         state

@@ -3,7 +3,9 @@
 symbol  meaning                                                    unit
 L       unstretched length that is out                             m
 c       its rate, positive where line is paid out                  m/s
-p       arc length of the last material node                       m
+p       place of the last material node                            m
+
+Places, nodes and cells count from the far end towards the fairlead; `node` and `cell` give their numbers in the line.
 """
 
 from __future__ import annotations
@@ -23,6 +25,7 @@ from hybrid.kernels.reel import (
     DRAG_N,
     DRAG_T,
     FADING,
+    FAR,
     KAPPA_1,
     LENGTH,
     MASS,
@@ -31,6 +34,7 @@ from hybrid.kernels.reel import (
     POLAR,
     RATE,
     ROTARY,
+    SIDE,
     STRETCH,
     TAU,
     WEIGHT,
@@ -72,6 +76,18 @@ def amount_between(pieces, begin, end, out):
 
 
 @inner
+def node(line, reel, i):
+    """The number in the line of a node counted from the far end."""
+    return i if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - i
+
+
+@inner
+def cell(line, reel, c):
+    """The number in the line of a cell counted from the far end."""
+    return c if reel.numbers[SIDE] > 0.0 else line.h.shape[0] - 1 - c
+
+
+@inner
 def growing(line, reel):
     """The cell that grows; the nodes behind it ride with the fairlead."""
     return line.h.shape[0] - reel.layer.shape[0]
@@ -98,12 +114,13 @@ def fill_cells(line, reel):
     length, begin, g = reel.numbers[LENGTH], reel.numbers[PLACE], n - reel.layer.shape[0]
     for j in range(1 + PER_LENGTH):
         before[j] = reel.rest[j]
-    for c in range(g, n):
-        end = length - layer[c - g]
-        h = end - begin
+    for k in range(g, n):
+        end = length - layer[k - g]
+        h, c, i = end - begin, cell(line, reel, k), node(line, reel, k)
         amount_between(reel.pieces, begin, end, q)
-        q[PER_LENGTH], line.s[c + 1], reel.true[c] = h, end, h
-        fill_node(line, c, before, q, 1.0)
+        q[PER_LENGTH], reel.true[k] = h, h
+        line.s[node(line, reel, k + 1)] = reel.numbers[FAR] + reel.numbers[SIDE] * end
+        fill_node(line, i, before, q, 1.0)
         line.ck[c], line.tau[c], line.diameter[c] = q[STRETCH] / h, q[TAU] / h, q[DIAMETER] / h
         line.drag_n[c], line.drag_t[c] = 0.5 * q[DRAG_N], 0.5 * q[DRAG_T]
         line.added_n[c], line.added_t[c] = 0.5 * q[ADDED_N], 0.5 * q[ADDED_T]
@@ -112,20 +129,21 @@ def fill_cells(line, reel):
         for j in range(1 + PER_LENGTH):
             before[j] = q[j]
         begin = end
-    fill_node(line, n, before, q, 0.0)
+    fill_node(line, node(line, reel, n), before, q, 0.0)
 
 
 @inner
 def set_lengths(line, reel, t):
     """Lengths of cells at t: those that are new are on their way to their true ones, by a quintic that ends at rest."""
-    for c in range(line.h.shape[0]):
-        line.h[c] = reel.true[c]
-        x = (t - reel.since[c]) / reel.span[c]
+    for k in range(line.h.shape[0]):
+        c = cell(line, reel, k)
+        line.h[c] = reel.true[k]
+        x = (t - reel.since[k]) / reel.span[k]
         if x < 1.0:
             x = max(x, 0.0)
             value = 1.0 - x**3 * (10.0 - 15.0 * x + 6.0 * x * x)
             fading = x * (1.0 - x) ** 3 * (1.0 + 3.0 * x)
-            line.h[c] -= reel.lack[c] * value + reel.span[c] * reel.rate[c] * fading
+            line.h[c] -= reel.lack[k] * value + reel.span[k] * reel.rate[k] * fading
 
 
 @inner
@@ -144,8 +162,9 @@ def take_riding_off(line, reel):
     if reel.stage[0] > 0.0:
         first = growing(line, reel) + 1
         for k in range(reel.layer.shape[0] - 1):
+            i = node(line, reel, first + k)
             for j in range(3):
-                line.force[first + k, j] -= reel.riding[k, j]
+                line.force[i, j] -= reel.riding[k, j]
         reel.stage[0] = 0.0
 
 
@@ -155,7 +174,7 @@ def prepare(line, reel, t):
     numbers = reel.numbers
     take_riding_off(line, reel)
     fill_cells(line, reel)
-    for c in range(growing(line, reel), line.h.shape[0]):
-        line.h[c] = reel.true[c]
+    for k in range(growing(line, reel), line.h.shape[0]):
+        line.h[cell(line, reel, k)] = reel.true[k]
     if numbers[FADING] > -np.inf:
         set_lengths(line, reel, t)

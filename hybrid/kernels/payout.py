@@ -1,5 +1,6 @@
-"""A line that is paid out or taken in at its end: what changes with its length in every step (docs/theory.md, 19).
+"""A line that is paid out or taken in at one of its ends: what changes with its length in every step (docs/theory.md, 19).
 
+Nodes, cells and chords count from the far end, whichever end of the line that is (kernels.paid_length).
 The last node is the fairlead, through which material passes.  Nodes of a layer before it ride with it; all others are
 material.  Only the cell before the layer, which is the last one where there is none, changes its length, and with it
 the mass, the loads and the stiffness that it brings to its two nodes.
@@ -7,7 +8,7 @@ the mass, the loads and the stiffness that it brings to its two nodes.
     symbol  meaning                                                    unit
     L       unstretched length that is out                             m
     c       its rate, positive where line is paid out                  m/s
-    p       arc length of the last material node                       m
+    p       place of the last material node                            m
     K       acceleration of the fairlead less that of the material     m/s2
 
 A run calls `pay_out` by its address (kernels.run), so that lines of a fixed length compile none of it.
@@ -24,16 +25,10 @@ from hybrid.kernels.cell import Chord, chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.node_forces import Z3, get3, inertia_and_water
-from hybrid.kernels.paid_length import (
-    find_length,
-    growing,
-    prepare,
-    take_riding_off,
-)
+from hybrid.kernels.paid_length import cell, find_length, growing, node, prepare, take_riding_off
 from hybrid.kernels.reel import (
     ACCELERATION,
     DUE,
-    END,
     FADING,
     FLUX,
     FLUX_BEFORE,
@@ -41,9 +36,10 @@ from hybrid.kernels.reel import (
     LONGEST,
     RATE,
     SHORTEST,
+    SIDE,
     read,
 )
-from hybrid.kernels.report import FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
+from hybrid.kernels.report import FORCE_A, FORCE_B, LENGTH_OUT, PAYOUT_POWER, PAYOUT_RATE
 from hybrid.kernels.rotations import add, dot, frame, log_rotation, scale, sub
 from hybrid.kernels.winch import (
     BEGIN,
@@ -65,22 +61,40 @@ from hybrid.kernels.winch import (
 
 
 @inner
-def slope_at(line, state, i):
+def end_of(reel):
+    """Which end of the line the fairlead is: 0 or 1."""
+    return 1 if reel.numbers[SIDE] > 0.0 else 0
+
+
+@inner
+def chord_at(line, state, reel, c):
+    """Chord of a cell, towards the fairlead."""
+    return scale(reel.numbers[SIDE], get3(state.e, cell(line, reel, c)))
+
+
+@inner
+def lengths_at(line, reel, j):
+    """Lengths of the cells before and after node j."""
+    return line.h[cell(line, reel, j - 1)], line.h[cell(line, reel, j)]
+
+
+@inner
+def slope_at(line, state, reel, i):
     """r' and r'' at node i: of the parabola through it and its neighbours, or through the last three."""
     j = min(i, line.h.shape[0] - 1)
-    ha, hb = line.h[j - 1], line.h[j]
-    sa, sb = scale(1.0 / ha, get3(state.e, j - 1)), scale(1.0 / hb, get3(state.e, j))
+    ha, hb = lengths_at(line, reel, j)
+    sa, sb = scale(1.0 / ha, chord_at(line, state, reel, j - 1)), scale(1.0 / hb, chord_at(line, state, reel, j))
     part = ha / (ha + hb) if i == j else 1.0 + hb / (ha + hb)
     return add(sa, scale(part, sub(sb, sa))), scale(2.0 / (ha + hb), sub(sb, sa))
 
 
 @inner
-def velocity_at(line, state, i, rate, g):
+def velocity_at(line, state, reel, i, rate, g):
     """Velocity of the material at node i: that of a node behind the cell that grows is another one."""
-    v = get3(state.v, i)
+    v = get3(state.v, node(line, reel, i))
     if i <= g:
         return v
-    slope, _ = slope_at(line, state, i)
+    slope, _ = slope_at(line, state, reel, i)
     return sub(v, scale(rate, slope))
 
 
@@ -89,23 +103,27 @@ def of_material(line, sea, ends, state, reel, i):
     """What the force on node i, N, is more because it does not move as the material does, and r' there."""
     n, numbers, g = line.h.shape[0], reel.numbers, growing(line, reel)
     rate, acceleration, j = numbers[RATE], numbers[ACCELERATION], min(i, n - 1)
-    slope, bend = slope_at(line, state, i)
-    ha, hb = line.h[j - 1], line.h[j]
-    first, middle = velocity_at(line, state, j - 1, rate, g), velocity_at(line, state, j, rate, g)
-    last = velocity_at(line, state, j + 1, rate, g)
+    slope, bend = slope_at(line, state, reel, i)
+    ha, hb = lengths_at(line, reel, j)
+    first, middle = velocity_at(line, state, reel, j - 1, rate, g), velocity_at(line, state, reel, j, rate, g)
+    last = velocity_at(line, state, reel, j + 1, rate, g)
     va, vb = scale(1.0 / ha, sub(middle, first)), scale(1.0 / hb, sub(last, middle))
     part, v = (ha / (ha + hb), middle) if i == j else (1.0 + hb / (ha + hb), last)
     turns = add(va, scale(part, sub(vb, va)))
     K = add(scale(2.0 * rate, turns), add(scale(rate * rate, bend), scale(acceleration, slope)))
-    before, after, z = chord(get3(state.e, i - 1)), Chord(Z3, 0.0, 0.0), ends.position[1, 2]
-    if i < n:
-        d, l, il = chord(get3(state.e, i))
+    k, z = node(line, reel, i), ends.position[end_of(reel), 2]
+    before, after = Chord(Z3, 0.0, 0.0), Chord(Z3, 0.0, 0.0)
+    if k > 0:
+        d, l, il = chord(get3(state.e, k - 1))
+        before = Chord(d, l, il)
+    if k < n:
+        d, l, il = chord(get3(state.e, k))
         after = Chord(d, l, il)
-        for c in range(i, n):
-            z -= state.e[c, 2]
-    vi, ai = get3(state.v, i), get3(state.vd, i)
-    with_material, _, _, _ = inertia_and_water(line, sea, i, z, v, sub(ai, K), before, after, 0.0, 0.0, reel.report)
-    with_node, _, _, _ = inertia_and_water(line, sea, i, z, vi, ai, before, after, 0.0, 0.0, reel.report)
+    for c in range(i, n):
+        z -= numbers[SIDE] * state.e[cell(line, reel, c), 2]
+    vi, ai = get3(state.v, k), get3(state.vd, k)
+    with_material, _, _, _ = inertia_and_water(line, sea, k, z, v, sub(ai, K), before, after, 0.0, 0.0, reel.report)
+    with_node, _, _, _ = inertia_and_water(line, sea, k, z, vi, ai, before, after, 0.0, 0.0, reel.report)
     return sub(with_material, with_node), slope
 
 
@@ -118,14 +136,17 @@ def put_riding_on(line, sea, ends, state, reel):
         for j in range(3):
             reel.riding[k, j] = more[j]
     for k in range(reel.layer.shape[0] - 1):
+        i = node(line, reel, first + k)
         for j in range(3):
-            line.force[first + k, j] += reel.riding[k, j]
+            line.force[i, j] += reel.riding[k, j]
     reel.stage[0] = 1.0
 
 
 @inner
-def force_of_fairlead(report, more):
-    return (report[FORCE_B] + more[0], report[FORCE_B + 1] + more[1], report[FORCE_B + 2] + more[2])
+def force_of_fairlead(reel, report, more):
+    """Force of the line on the fairlead, N, of the material there, and where it stands in the report."""
+    at = FORCE_B if end_of(reel) else FORCE_A
+    return (report[at] + more[0], report[at + 1] + more[1], report[at + 2] + more[2]), at
 
 
 @inner
@@ -144,14 +165,14 @@ def correct_force(line, sea, ends, state, velocity, reel, report):
     """
     numbers = reel.numbers
     more, slope = of_material(line, sea, ends, state, reel, line.h.shape[0])
-    force = force_of_fairlead(report, more)
-    report[FORCE_B], report[FORCE_B + 1], report[FORCE_B + 2] = force
+    force, at = force_of_fairlead(reel, report, more)
+    report[at], report[at + 1], report[at + 2] = force
     report[LENGTH_OUT], report[PAYOUT_RATE] = numbers[LENGTH], numbers[RATE]
     report[PAYOUT_POWER] = numbers[RATE] * dot(force, slope)
-    numbers[FLUX] = dot(more, get3(velocity, 1))
+    numbers[FLUX] = dot(more, get3(velocity, end_of(reel)))
     for i in range(growing(line, reel) + 1, line.h.shape[0]):
         more, _ = of_material(line, sea, ends, state, reel, i)
-        numbers[FLUX] += dot(more, get3(state.v, i))
+        numbers[FLUX] += dot(more, get3(state.v, node(line, reel, i)))
     return pull_at(force, slope)
 
 
@@ -174,7 +195,8 @@ def remember(line, reel):
     n, before = line.h.shape[0], reel.before
     for c in range(n):
         before[c, 0] = line.h[c]
-    for i in range(growing(line, reel), n + 1):
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
         before[i, 1], before[i, 2] = line.mass[i], line.force[i, 2]
         for k in range(3):
             before[i, 3 + k] = line.kb[i, k]
@@ -197,11 +219,12 @@ def book(line, old, new, reel, dt):
         more = line.h[c] - before[c, 0]
         if more != 0.0:
             booked -= 0.5 * more * (stretch_work(line, old, c) + stretch_work(line, new, c))
-    for i in range(growing(line, reel), n + 1):
+    for j in range(growing(line, reel), n + 1):
+        i = node(line, reel, j)
         va, vb = get3(old.v, i), get3(new.v, i)
         booked += 0.25 * (line.mass[i] - before[i, 1]) * (dot(va, va) + dot(vb, vb))
         booked -= 0.5 * (line.force[i, 2] - before[i, 2]) * (old.r[i, 2] + new.r[i, 2])
-        if i < n and line.element[i]:
+        if j < n and line.element[i]:
             more = (line.kb[i, 0] - before[i, 3], line.kb[i, 1] - before[i, 4], line.kb[i, 2] - before[i, 5])
             if more[0] != 0.0 or more[1] != 0.0 or more[2] != 0.0:
                 booked += 0.25 * (strain_before(line, old, i, more) + strain_before(line, new, i, more))
@@ -245,7 +268,7 @@ def pay_out(table):
         state, before = before, state
     if winch[TENSION] > 0.0:
         accept(winch, numbers[LENGTH], numbers[RATE], numbers[ACCELERATION])
-    job.work[0, END] += book(line, before, state, reel, clock[b.LAST_DT])
+    job.work[0, end_of(reel)] += book(line, before, state, reel, clock[b.LAST_DT])
     remember(line, reel)
     last = reel.true[growing(line, reel)]
     if clock[b.NOW] >= numbers[FADING]:
@@ -272,7 +295,8 @@ def iterate(table):
         return 0
     state, at = job.old if job.counts[b.PARITY] else job.new, last_change(line)
     more, slope = of_material(line, job.sea, job.ends, state, reel, line.h.shape[0])
-    pull = pull_at(force_of_fairlead(job.report, more), slope) + job.X[at]
+    force, _ = force_of_fairlead(reel, job.report, more)
+    pull = pull_at(force, slope) + job.X[at]
     lost, steep = losses(winch, numbers[RATE])
     answer = softness(line, state, job.X)
     left = winch[INERTIA] * numbers[ACCELERATION] + lost + tension_held(winch, t) - pull
@@ -285,6 +309,13 @@ def iterate(table):
     prepare(line, reel, t)
     job.X[at] += answer * change
     return 0
+
+
+@kernel
+def fit_line(table):
+    """The line with the length that its reel has, at clock[NOW]."""
+    job = read(table)
+    prepare(job.line, job.reel, job.clock[b.NOW])
 
 
 @kernel

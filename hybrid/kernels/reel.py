@@ -3,7 +3,9 @@
 symbol  meaning                                                    unit
 L       unstretched length that is out                             m
 c       its rate, positive where line is paid out                  m/s
-p       arc length of the last material node                       m
+p       place of the last material node                            m
+
+Places, nodes and cells count here from the far end towards the fairlead, whichever end of the line that is.
 """
 
 from __future__ import annotations
@@ -25,7 +27,6 @@ from hybrid.kernels.winch import WINCH
     BEND_1, BEND_2, TWIST, KAPPA_1, KAPPA_2, KAPPA_3,
 ) = range(20)  # fmt: skip
 PER_LENGTH = 20
-END = 1  # place among powers and work
 # Numbers of a reel.
 (
     LENGTH, RATE, ACCELERATION,  # L, c and the rate of c at the end of the try
@@ -35,8 +36,10 @@ END = 1  # place among powers and work
     DUE,  # 1 when a node is to enter or to leave
     FLUX,  # W, into the line by what the corrected force of the fairlead does not do
     FLUX_BEFORE,  # and before the last step
-) = range(10)  # fmt: skip
-NUMBERS = 10
+    SIDE,  # 1 where the fairlead is the end of the line, -1 where it is the start
+    FAR,  # m, arc length of the far end
+) = range(12)  # fmt: skip
+NUMBERS = 12
 
 
 class Reel(NamedTuple):

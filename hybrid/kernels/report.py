@@ -25,6 +25,7 @@ The assembly of every iteration clears and writes the first `ASSEMBLED` numbers,
     SELF_FRICTION_WORK        work of its friction in the step, and what that has stored more  J
     LENGTH_OUT, PAYOUT_RATE   unstretched length of a line that is paid out, and its rate      m, m/s
     PAYOUT_POWER              power of the winch on the line                                   W
+    STRETCH_ENERGY            energy of stretch where an axial law is no straight line         J
 """
 
 from __future__ import annotations
@@ -42,4 +43,5 @@ PUSH_ENERGY, WRONG_PIVOTS = 29, 30
 LOCAL_ERROR, LOCAL_ERROR_NODE = 31, 32
 SELF_CONTACT_ENERGY, SELF_FRICTION_WORK = 33, 34
 LENGTH_OUT, PAYOUT_RATE, PAYOUT_POWER = 35, 36, 37
-REPORT_SIZE = 38
+STRETCH_ENERGY = 38
+REPORT_SIZE = 39

@@ -11,6 +11,7 @@ from hybrid.kernels.element import strain_of_element
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.plane import angle_between, chord2, end_chord, row_in_plane, stiffness_about_normal
 from hybrid.kernels.rotations import frame
+from hybrid.kernels.tension_torque import rest_strain
 
 # At a clamp whose first cell is longer than sqrt(EI/T) the moment is not resolved, whatever
 # the angle; angles above 1/CLAMP rad (3 deg) are worth a word.
@@ -18,12 +19,12 @@ CLAMP = 20.0
 
 
 @inner
-def strain_of(line, i, k, strains):
+def strain_of(line, T, i, k, strains):
     """Curvature (1/m), bending moment and torque (N m) of the element at node i, whose log strain is k (rad)."""
     strains[i, 0] = math.sqrt(k[0] * k[0] + k[1] * k[1]) / line.hn[i]
     x, y = line.kb[i, 0] * (k[0] - line.k0[i, 0]), line.kb[i, 1] * (k[1] - line.k0[i, 1])
     strains[i, 1] = math.sqrt(x * x + y * y)
-    strains[i, 2] = line.kb[i, 2] * (k[2] - line.k0[i, 2])
+    strains[i, 2] = line.kb[i, 2] * (k[2] - rest_strain(line, T, i)[2])
 
 
 @kernel
@@ -83,11 +84,12 @@ def sharpest_in_space(line, ends, e, T, a1, strains):
             weight = 2.0
             if T[c] > 0.0 and l * l * T[c] > stiffness:
                 weight = CLAMP * l * math.sqrt(T[c] / stiffness)
+            weight *= 0.5 * line.h[c] / line.hn[i]  # of a clamp with an angular spring the part of the cell
         k = strain_of_element(Ra, Rb, get3(line.kb, i), get3(line.k0, i))
         x = weight * math.sqrt(k[0] * k[0] + k[1] * k[1])
         y = abs(k[2]) if line.kb[i, 2] > 0.0 else 0.0
         if strains.shape[0] > 0:
-            strain_of(line, i, k, strains)
+            strain_of(line, T, i, k, strains)
         if not x <= bend:
             bend, bend_at = x, i
         if not y <= twist:

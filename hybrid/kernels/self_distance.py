@@ -26,6 +26,7 @@ from hybrid.kernels.state import Ends, Floats, Line, State, blank_line, blank_st
 # Distance of two points over the length of line between them below which they are no neighbours: half a circle has
 # 0.64, and two diameters of contact leave a loop of 2.5 diameters.
 TURNED = 0.4
+SAME = 1e-9  # of a diameter: a clearance that is less by this is the same
 NEIGHBOURS = 4  # cells between two cells that count, at least
 LEAF = 4  # cells in the smallest box
 BOX = 12  # numbers of a box: lowest and highest position, lowest and highest tangent
@@ -276,7 +277,10 @@ def search(line, ends, before, state, itself):
 @inner
 def note_found(found, t):
     """Keep the least clearance so far; whether surfaces have met that were apart."""
-    if found[DISTANCE] < math.inf and found[CLEARANCE] < found[LEAST]:
+    margin = SAME * abs(
+        found[DISTANCE] - found[CLEARANCE]
+    )  # a line in a plane passes itself at no distance, many times
+    if found[DISTANCE] < math.inf and found[CLEARANCE] < found[LEAST] - (margin if found[LEAST] < math.inf else 0.0):
         found[LEAST], found[LEAST_DISTANCE], found[LEAST_TIME] = found[CLEARANCE], found[DISTANCE], t
         found[LEAST_S], found[LEAST_OTHER] = found[S], found[OTHER_S]
     meets = False

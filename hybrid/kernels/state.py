@@ -20,8 +20,17 @@ NO_PLANE: Floats = np.full((3, 3), np.nan)
 NOT_VARYING: Floats = np.zeros(0)
 # Of a line without catenary zones that a torque passes through.
 NO_TORSION: Floats = np.zeros((0, 5))
+NO_TENSION_TORQUE: Floats = np.zeros(0)
 NO_TURN: Floats = np.zeros((0, 3))
 NO_TURNS: Floats = np.zeros((0, 0, 3))
+# Of a line whose tensions are multiples of strains (kernels.axial_law has the columns).
+NO_LAW: Floats = np.zeros((0, 7))
+NO_TABLE: Floats = np.zeros((0, 3))
+NO_SLOW: Floats = np.zeros(0)
+NO_ADDRESS: NDArray[np.int64] = np.zeros(0, np.int64)
+
+
+TENSION_TORQUE = ("tension_torque", "tension_twist")  # arrays of Line that are empty where there is none
 
 
 class Line(NamedTuple):
@@ -64,6 +73,15 @@ class Line(NamedTuple):
     # (K, 5) catenary zones that a torque passes through: first cell, cell after the last, compliance (rad per N m),
     # turn without torque (rad), stiffness-proportional damping time (s)
     torsion: Floats = NO_TORSION
+    law: Floats = (
+        NO_LAW  # (N, 7) of cells whose tension is no multiple of strain (kernels.axial_law); empty: there are none
+    )
+    law_table: Floats = NO_TABLE  # (K, 3) tables that it speaks of: strain, tension (N), energy per length (J/m)
+    law_at: NDArray[np.int64] = NO_ADDRESS  # (1,) address of kernels.axial_law.follow_law; empty: there is no such cell
+    # (N,) of sections in which tension makes a torque (kernels.tension_torque): torque by tension, N m per N; twist of half
+    # a cell by tension, rad/N; empty: there are none
+    tension_torque: Floats = NO_TENSION_TORQUE
+    tension_twist: Floats = NO_TENSION_TORQUE
 
 
 class Ends(NamedTuple):
@@ -155,6 +173,7 @@ class State(NamedTuple):
     # (K, 3) of zones that a torque passes through: turn of the frame after the zone against that before it, counted
     # beyond half a turn (rad), torque (N m), power that the torque gains because the zone bends without it (W)
     turn: Floats = NO_TURN
+    slow: Floats = NO_SLOW  # (N,) N, mean tension of lines with a `law`; else empty
 
     def copy(self) -> State:
         return State(*(x.copy() for x in self))
@@ -250,6 +269,7 @@ class Work(NamedTuple):
     gaps: Floats  # (N,) m, change of length asked of inextensible cells; empty: their law of length
     rows: Floats  # (N+1, ...) the block rows before their elimination; empty: they are not kept
     torsion: Torsion
+    couple: Floats  # (N+1, COUPLES) of elements where tension makes a torque (kernels.tension_torque); empty: nowhere
 
 
 def no_torsion() -> Torsion:
@@ -260,14 +280,32 @@ def no_torsion() -> Torsion:
     )
 
 
-def blank_state(n_cells: int, zones: int = 0) -> State:
-    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through."""
+def blank_state(n_cells: int, zones: int = 0, slow: bool = False) -> State:
+    """A state of zeros with room for `n_cells` cells; zones: those that a torque passes through; slow: mean tensions."""
     node, cell = (n_cells + 1, 3), (n_cells, 3)
     z = np.zeros
     w, wa, wd = z(n_cells), z(n_cells), z(n_cells)
     return State(
-        z(node), z(node), z(node), z(node), z(cell), z(n_cells), z(cell), w, wa, wd, z(node), z(node), z((zones, 3))
+        z(node),
+        z(node),
+        z(node),
+        z(node),
+        z(cell),
+        z(n_cells),
+        z(cell),
+        w,
+        wa,
+        wd,
+        z(node),
+        z(node),
+        z((zones, 3)),
+        z(n_cells if slow else 0),
     )
+
+
+def state_for(line: Line) -> State:
+    """A state of zeros of a line."""
+    return blank_state(line.h.size, len(line.torsion), line.law.size > 0)
 
 
 def no_sea(n_cells: int) -> Sea:
@@ -305,7 +343,8 @@ def blank_line(n_cells: int) -> Line:
     cell = dict.fromkeys(cells, np.zeros(n_cells))
     kinds = {"element": np.zeros(n_cells + 1, np.int8), "spin": np.zeros(n_cells, np.int8), "bits": 0}
     values: dict[str, Any] = dict.fromkeys(Line._fields, np.zeros(n_cells + 1)) | node | cell | kinds
-    return Line(**values | {"plane": NO_PLANE, "torsion": NO_TORSION})
+    absent = {"plane": NO_PLANE, "torsion": NO_TORSION, "law": NO_LAW, "law_table": NO_TABLE, "law_at": NO_ADDRESS}
+    return Line(**values | absent | {name: np.zeros(0) for name in TENSION_TORQUE})
 
 
 def no_ends() -> Ends:
@@ -326,4 +365,4 @@ def no_moves() -> Moves:
 def no_work() -> Work:
     """A workspace in which nothing can be solved."""
     z = np.zeros
-    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion())
+    return Work(z((2, 3)), z((2, 5)), z(1), z(1), z(REPORT_SIZE), z(0), z((0, 1)), no_torsion(), z((0, 1)))

@@ -21,6 +21,7 @@ from hybrid.kernels.bodies import (
     start_here,
 )
 from hybrid.kernels.books import RATES, STORED
+from hybrid.kernels.carried_frames import turns
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.configuration import first_bad, measure, update
 from hybrid.kernels.extremes import first_strains, note_extremes
@@ -31,6 +32,7 @@ from hybrid.kernels.junctions import END, START, add_pull, assemble_junctions, c
 from hybrid.kernels.newton import (
     ASSEMBLY,
     CORRECTION,
+    EQUILIBRIUM,
     LARGEST_TURN,
     LOW_TENSION,
     NOT_CONVERGED,
@@ -42,6 +44,7 @@ from hybrid.kernels.newton import (
     TURNED_TOO_FAR,
     WHOLE,
     Task,
+    follow_law,
     has_converged,
     round_off_tension,
 )
@@ -62,11 +65,11 @@ from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_ra
 JUNCTIONS = 5
 call_solver = caller((0, 0, 0.0, 0))
 # Where cv and ca of the task are among the numbers of a job, whose first field it is.
-TASK_CV, TASK_CA = Task._fields.index("cv"), Task._fields.index("ca")
+TASK_CV, TASK_CA, TASK_DT = Task._fields.index("cv"), Task._fields.index("ca"), Task._fields.index("dt")
 
 
 @inner
-def march_lines(solver, tables, joints, fairleads, arms, gaps, given, net, old, new, work):
+def march_lines(solver, tables, joints, fairleads, seats, arms, gaps, given, net, old, new, work):
     """March all lines; net (P, 3): force on each point, N, that on bodies in `work`.
 
     Returns -1 or a line that failed, and its bad node.
@@ -79,14 +82,14 @@ def march_lines(solver, tables, joints, fairleads, arms, gaps, given, net, old, 
     for l in range(tables.shape[0]):
         job = read(tables[l])
         n = job.line.h.shape[0]
-        place_ends(l, job, joints, fairleads, arms, gaps, net.shape[0], old, new, work, given)
+        place_ends(l, job, joints, fairleads, seats, arms, gaps, net.shape[0], old, new, work, given)
         outcome, _, _, where = call_solver(solver, tables[l])
         # the last block is not solved yet
         if outcome != OK and not (outcome == SINGULAR and joints[l, END] >= 0 and where == n):
             return l, where
         for k in range(2):
             if joints[l, k] >= 0:
-                add_pull(joints[l, k], job.work.report, k, arms[l, k], net, work)
+                add_pull(joints[l, k], job.work.report, k, arms[l, k], turns(seats, l, k), net, work)
     return -1, -1
 
 
@@ -110,6 +113,14 @@ def size_up(tables, ca):
         if not mine <= size:
             size = mine
     return shift, turn, size, worst, where
+
+
+@inner
+def follow_laws(tables, s):
+    """Mean tensions of lines whose tensions are no multiples of strains, with the last correction."""
+    for l in range(tables.shape[0]):
+        job = read(tables[l])
+        follow_law(job.line, job.old, job.new, job.work, s.dt, s.cv, s.ca)
 
 
 @inner
@@ -214,8 +225,8 @@ def end_system_step(tables, joints, floors, old, new, work, task, s, t, solved):
 
 @kernel
 def solve_system(
-    task, t, solver, tables, numbers, joints, fairleads, arms, gaps, floors, first, columns, functional, net,
-    bodies, old, new, work, S, G, A,
+    task, t, solver, tables, numbers, joints, fairleads, seats, arms, gaps, floors, first, columns, functional, answers,
+    q, net, bodies, old, new, work, S, G, A,
 ):  # fmt: skip
     """Do a task (kernels.newton: STEP, EQUILIBRIUM, ASSEMBLY, CORRECTION) with all lines of a system.
 
@@ -223,11 +234,13 @@ def solve_system(
 
     t: s, of the new states, for the books; tables: (L, ..) jobs of the lines, their task ASSEMBLY; numbers: the same
     memory as float64; joints: (L, 2) points, then bodies, that start and end are joined to, -1 where they are held;
-    fairleads: (L, 2, 3) m of ends at bodies, in their axes; gaps: (L, 2, 3) m that such ends have still to go, given
-    for a CORRECTION, else worked in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is
-    slack; first: (L,) where columns (3, .., 5) of a line begin whose start is joined; bodies, old, new, work: rows of
-    numbers of each body (kernels.bodies); functional: (3, FUNCTIONAL), net: (P, 3), S: (7, 8), G: (2, 3, 6) and
-    A: (m+3, m+1), m tensions and coordinates, are worked in.  On return `net` is what does not balance at the points, N.
+    fairleads: (L, 2, 3) m of ends at bodies, in their axes; seats: (L, 2, SEAT) frames of ends that turn with bodies
+    (kernels.carried_frames); gaps: (L, 2, 3) m that ends at bodies have still to go, given for a CORRECTION, else worked
+    in as arms (L, 2, 3); floors: (L,) N, tension at or below which a catenary cell is slack; first: (L,) where columns
+    (3, .., 5), or (COLUMNS, .., 5) where an end turns, of a line begin that carries some; bodies, old, new, work: rows of
+    numbers of each body (kernels.bodies); functional: (FUNCTIONAL,), answers: (2, ANSWER), q: (COLUMNS,), net: (P, 3),
+    S: (HANDED - 1, HANDED), G: (2, 6, 6) and A: (m+3, m+1), m tensions and coordinates, are worked in.
+    On return `net` is what does not balance at the points, N.
     Returns outcome, iterations, predicted next correction, line (-1: a body) and cell or node.
     """
     m, most, count, points = A.shape[1] - 1, task.limits.most, tables.shape[0], net.shape[0]
@@ -244,14 +257,14 @@ def solve_system(
         start_here(old, work)
     rubs = 0
     for l in range(count):
-        numbers[l, TASK_CV], numbers[l, TASK_CA] = s.cv, s.ca
+        numbers[l, TASK_CV], numbers[l, TASK_CA], numbers[l, TASK_DT] = s.cv, s.ca, task.dt
         rubs |= read(tables[l]).line.bits & FRICTION
     before, left = math.inf, math.inf
     outcome, it, line, where = NOT_CONVERGED, 0, -1, -1
     while it < most and outcome == NOT_CONVERGED:
         it += 1
         given = task.what == CORRECTION
-        line, where = march_lines(solver, tables, joints, fairleads, arms, gaps, given, net, old, new, work)
+        line, where = march_lines(solver, tables, joints, fairleads, seats, arms, gaps, given, net, old, new, work)
         if line >= 0:
             outcome = SINGULAR
             if not read(tables[line]).work.report[RESIDUAL] < math.inf:
@@ -263,15 +276,16 @@ def solve_system(
             outcome = OK
             break
         assemble_junctions(
-            tables, joints, arms, gaps, first, columns, functional, net, bodies, old, new, work, S, G, A, m, s.cv, s.ca
-        )
+            tables, joints, seats, arms, gaps, first, columns, functional, answers, net, bodies, old, new, work, S, G,
+            A, m, s.cv, s.ca,
+        )  # fmt: skip
         if task.what == JUNCTIONS:
             outcome = OK
             break
         if m > 0 and not solve_dense(A, m):
             outcome = SINGULAR
             break
-        line = correct_all(tables, joints, arms, gaps, first, columns, points, work, A, m)
+        line = correct_all(tables, joints, seats, arms, gaps, first, columns, points, work, A, m, q)
         if line >= 0:
             bad = read(tables[line])
             outcome, where = NOT_FINITE, first_bad(bad.work.x, bad.new.e)
@@ -294,6 +308,8 @@ def solve_system(
         move_bodies(new, work, s.cv, s.ca, part)
         outcome, left = has_converged(size, before, it, part)
         before = size if part == 1.0 else math.inf
+    if task.what == STEP or task.what == EQUILIBRIUM:
+        follow_laws(tables, s)
     if task.what == STEP:
         bad, line_of_bad, cell = end_system_step(tables, joints, floors, old, new, work, task, s, t, outcome == OK)
         if bad != OK:

@@ -13,7 +13,8 @@ from hybrid.kernels.cell import chord
 from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import cross, dot, spin_about, transport
-from hybrid.kernels.zone_torque import FIRST, LAST, TURN, carry, frame_after, frame_before
+from hybrid.kernels.tension_torque import couples
+from hybrid.kernels.zone_torque import FIRST, LAST, TURN, carry, frame_after, frame_before, twist_of_tensions
 
 
 @inner
@@ -34,9 +35,16 @@ def find_twist(line, ends, state, twist):
             b = int(line.torsion[zone, LAST])
             low = line.s[0] if c == 0 else 0.5 * (line.s[c - 1] + line.s[c])
             high = line.s[n] if b == n else 0.5 * (line.s[b] + line.s[b + 1])
+            # the twist by tension is as that is along the zone, the rest spread evenly
+            by_tension = twist_of_tensions(line, state.T, 0, zone)
+            less = line.tension_twist[c - 1] * state.T[c - 1] if couples(line) and c > 0 else 0.0
             for i in range(c, b):
+                if couples(line):
+                    less += line.tension_twist[i] * state.T[i]
                 part = (0.5 * (line.s[i] + line.s[i + 1]) - low) / (high - low)
-                twist[i + 1] = total + part * state.turn[zone, TURN]
+                twist[i + 1] = total + part * (state.turn[zone, TURN] + by_tension) - less
+                if couples(line):
+                    less += line.tension_twist[i] * state.T[i]
             total += state.turn[zone, TURN]
             c, zone = b, zone + 1
             director, d = frame_after(line, ends, state, c)

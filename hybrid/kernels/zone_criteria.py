@@ -41,6 +41,7 @@ from hybrid.kernels.element import relative_rotation
 from hybrid.kernels.forces import SEABED
 from hybrid.kernels.rotations import cross, dot, frame, log_rotation, sub, transport
 from hybrid.kernels.state import Floats
+from hybrid.kernels.tension_torque import rest_strain
 
 # What a ratio is where there is no tension, or no number: large, and finite.
 MOST = 1e6
@@ -80,7 +81,7 @@ def depth(sea, r, i):
 
 
 @inner
-def find_turns(line, tangents, e, a1, torque, turn, twisting):
+def find_turns(line, tangents, e, a1, T, torque, turn, twisting):
     """Turns of the nodes, rad, and torques of the nodes between cells, N m, into `turn` and `twisting`.
 
     tangents: (2, 3) of clamped ends, zero where there is none; torque: N m, of all the line as far as its rods do not
@@ -102,7 +103,7 @@ def find_turns(line, tangents, e, a1, torque, turn, twisting):
         if line.element[i]:
             b, carried = get3(a1, i), transport(get3(a1, i - 1), d0, d1)
             angle = math.atan2(dot(cross(carried, b), d1), dot(carried, b))
-            twisting[i] = line.kb[i, 2] * (angle - line.k0[i, 2])
+            twisting[i] = line.kb[i, 2] * (angle - rest_strain(line, T, i)[2])
     d0 = get3(tangents, 1)
     if dot(d0, d0) > 0.0:
         x = sub(d1, d0)

@@ -34,6 +34,7 @@ from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import dot
 from hybrid.kernels.state import Ends, Floats, Line, Sea, State, blank_line, blank_state, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import advance, freed, length_defect, shares, soften
+from hybrid.kernels.tension_torque import twist_of_line
 from hybrid.kernels.zone_criteria import (
     MOST,
     TWISTED,
@@ -203,7 +204,7 @@ def torque_of_ends(line, ends, state, zones):
         return 0.0
     turn = end_turn(state.e, ends.frame)
     z[TOTAL_TWIST] += (turn - z[TOTAL_TWIST] + math.pi) % (2.0 * math.pi) - math.pi
-    return (z[TOTAL_TWIST] - z[FREE_TWIST]) / z[COMPLIANCE]
+    return (z[TOTAL_TWIST] - z[FREE_TWIST] + twist_of_line(line, state.T)) / z[COMPLIANCE]
 
 
 @inner
@@ -284,7 +285,7 @@ def evaluate(line, sea, ends, state, zones, near, dt):
     for k in range(2):
         for j in range(3):
             zones.tangents[k, j] = ends.frame[k, 2 + 3 * j] * zones.clamped[k]
-    find_turns(line, zones.tangents, state.e, state.a1, z[TORQUE], zones.kinds.turn, zones.kinds.twisting)
+    find_turns(line, zones.tangents, state.e, state.a1, state.T, z[TORQUE], zones.kinds.turn, zones.kinds.twisting)
     find_shares(line, state, zones)
     raise_ratios(line, sea, state, zones.past, ahead, zones.shares, zones.kinds, zones.ratios)
     if flags[LOADED]:
@@ -300,7 +301,7 @@ def evaluate(line, sea, ends, state, zones, near, dt):
 def find_strain(line, ends, state, zones, k):
     """Strains of the elements of a state into zones.strain[k], from what has no stress."""
     strain = zones.strain[k]
-    observe(line, ends, state.e, state.v, state.a1, state.w, zones.moment, strain, zones.energy)
+    observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, zones.moment, strain, zones.energy)
     for i in range(strain.shape[0]):
         for j in range(3):
             strain[i, j] = (strain[i, j] - line.k0[i, j]) * line.element[i]

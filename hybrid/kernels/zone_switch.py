@@ -18,6 +18,7 @@ from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Ends, Floats, Sea, no_ends, no_sea
 from hybrid.kernels.stiffness_ramp import shares, soften
+from hybrid.kernels.tension_torque import stretch_factor, torque_beside
 from hybrid.kernels.zone_step import LETTING_GO, SHARE, Zones, blank_zones
 from hybrid.kernels.zone_torque import twist_energy
 from hybrid.kernels.zone_transfer import Transfer, blank_transfer, old_cell, put3, transfer_state
@@ -52,7 +53,19 @@ read = reader(blank_switch_job())
 @inner
 def energy(line, sea, ends, state, zones):
     """All energy of a state, J; its strains into those of zones."""
-    observe(line, ends, state.e, state.v, state.a1, state.w, zones.moment, zones.strain[1], zones.energy)
+    observe(
+        line,
+        ends,
+        state.e,
+        state.v,
+        state.a1,
+        state.w,
+        state.T,
+        state.turn,
+        zones.moment,
+        zones.strain[1],
+        zones.energy,
+    )
     total = zones.energy[0] + zones.energy[1] + zones.energy[2] + zones.energy[3] + twist_energy(line, state)
     for i in range(state.r.shape[0]):
         total -= dot(get3(line.force, i), get3(state.r, i))
@@ -131,7 +144,8 @@ def growth(job, c, t):
     transfer, zones = job.transfer, job.zones
     rate = lengthening(transfer.state, c)
     if job.numbers[RELAXES] > 0.0:
-        rate += (1.0 + transfer.line.ck[c] * transfer.state.T[c]) * lack_rate(zones, c, t)
+        line, state = transfer.line, transfer.state
+        rate += stretch_factor(line, c, state.T[c], torque_beside(line, state, c)) * lack_rate(zones, c, t)
     return rate
 
 
@@ -149,7 +163,7 @@ def relax_cell(job, c, t):
     for k in range(a, b):
         total += growth(job, k, t)
     part = transfer.match.lengths[c] / (line.s[b] - line.s[a])
-    stretch = 1.0 + target.ck[c] * transfer.out.T[c]
+    stretch = stretch_factor(target, c, transfer.out.T[c], torque_beside(line, transfer.state, of))
     zones.lack[c] = zones.true[c] - transfer.match.lengths[c]
     zones.rate[c] = (total * part - lengthening(transfer.out, c)) / stretch
     zones.since[c] = t

@@ -6,7 +6,7 @@ before it, carried along the chords by the smallest rotations, and counted beyon
     symbol   meaning                                                                  unit
     turn     of the frame after the zone (of its cell, or of an end that holds it)     rad
     C        compliance of the zone, with the halves of the rod cells beside it        rad/(N m)
-    M        torque, (turn - turn without torque + tau rate)/C                         N m
+    M        torque, (turn - turn without torque + twist by tension + tau rate)/C      N m
     c_i      (d_{i-1} x d_i)/(1 + d_{i-1}.d_i) at node i of the zone                    -
 
 It answers to the spins of the cells beside it and to all chords:
@@ -30,6 +30,8 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.report import MOMENT_A, MOMENT_B, STIFFNESS_DAMPING_POWER
 from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.state import Floats, Line, Torsion, no_torsion
+from hybrid.kernels.tension_torque import COUPLES, compliance, couples
+from hybrid.kernels.tension_torque import TORQUE as NODE_TORQUE
 
 # Parts of `pass_torque`.
 BEFORE_MARCH, CORRECT, AFTER_STEP = range(3)
@@ -141,15 +143,31 @@ def turn_rates(line, ends, state, torsion, z):
 
 
 @inner
-def find_torques(line, ends, state, torsion):
+def twist_of_tensions(line, T, first, z):
+    """Twist, rad, of zone z by tensions: T[c + first] of cell c (kernels.tension_torque)."""
+    total, g = 0.0, line.tension_twist
+    if couples(line):
+        a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
+        for c in range(a, b):
+            total += 2.0 * g[c] * T[c + first]
+        if a > 0:
+            total += g[a - 1] * T[a - 1 + first]
+        if b < line.h.shape[0]:
+            total += g[b] * T[b + first]
+    return total
+
+
+@inner
+def find_torques(line, ends, state, work):
     """Turn and torque of every zone, and what rods beside them feel."""
+    torsion = work.torsion
     passed = torsion.passed
     n = line.h.shape[0]
     for z in range(line.torsion.shape[0]):
         a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
         turn, at_start, at_end = find_turn(line, ends, state, torsion.slope, a, b)
         turn += 2.0 * math.pi * math.floor((state.turn[z, TURN] - turn) / (2.0 * math.pi) + 0.5)
-        torque = turn - line.torsion[z, FREE]
+        torque = turn - line.torsion[z, FREE] + twist_of_tensions(line, state.T, 0, z)
         slope = torsion.directions[z]
         for k in range(3):
             slope[0, k], slope[1, k] = at_start[k], at_end[k]
@@ -158,6 +176,11 @@ def find_torques(line, ends, state, torsion):
             torque += line.torsion[z, TAU] * (spun + bent)
         torque /= line.torsion[z, COMPLIANCE]
         state.turn[z, TURN], state.turn[z, TORQUE] = turn, torque
+        if couples(line):
+            for i in range(a, b + 1):
+                for j in range(COUPLES):
+                    work.couple[i, j] = 0.0
+                work.couple[i, NODE_TORQUE] = torque
         if a > 0:  # of a rod of one cell the zone before has written
             beside = z > 0 and int(line.torsion[z - 1, LAST]) == a - 1
             passed[LOAD, a - 1] = torque + (passed[LOAD, a - 1] if beside else 0.0)
@@ -173,7 +196,14 @@ def finish(line, ends, state, torsion):
         spun, bent = turn_rates(line, ends, state, torsion, z)
         state.turn[z, POWER] = state.turn[z, TORQUE] * bent
         if line.bits & STIFFNESS_DAMPING:
-            loss += line.torsion[z, TAU] * (spun + bent) ** 2 / line.torsion[z, COMPLIANCE]
+            drive, soft = spun + bent, line.torsion[z, COMPLIANCE]
+            if couples(line):  # what stretch in its cells has lost by itself is that of a line that turns freely
+                for c in range(int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])):
+                    d, _, _ = chord(get3(state.e, c))
+                    g, hck = 2.0 * line.tension_twist[c], line.h[c] * compliance(line, c)
+                    drive += g * dot(d, sub(get3(state.v, c + 1), get3(state.v, c))) / hck
+                    soft -= g * g / hck
+            loss += line.torsion[z, TAU] * drive * drive / soft
     return loss
 
 
@@ -182,7 +212,7 @@ def twist_energy(line, state):
     """Energy, J, of the twist of zones."""
     total = 0.0
     for z in range(line.torsion.shape[0]):
-        twist = state.turn[z, TURN] - line.torsion[z, FREE]
+        twist = state.turn[z, TURN] - line.torsion[z, FREE] + twist_of_tensions(line, state.T, 0, z)
         total += 0.5 * twist * twist / line.torsion[z, COMPLIANCE]
     return total
 
@@ -218,6 +248,14 @@ def solve_columns(line, work):
                 right[a - 1, 4] = 1.0
             if b < n:
                 right[b, 4] = -1.0
+            if couples(line):
+                g = line.tension_twist
+                for c in range(a, b):
+                    right[c + 1, 0] = 2.0 * g[c]
+                if a > 0:
+                    right[a, 0] = g[a - 1]
+                if b < n:
+                    right[b + 1, 0] = g[b]
         else:
             cell = torsion.floating[j - zones]
             right[cell, 4] = torsion.passed[HOLD, cell]
@@ -226,8 +264,16 @@ def solve_columns(line, work):
 
 
 @inner
-def turn_by(line, torsion, z, x):
-    """Change (rad) of the turn of zone z by a correction x (N+1, 5)."""
+def damped_part(line, z, cv):
+    """By how much damping makes the turn of zone z count more."""
+    if line.bits & STIFFNESS_DAMPING:
+        return 1.0 + cv * line.torsion[z, TAU]
+    return 1.0
+
+
+@inner
+def turn_by(line, torsion, z, x, cv):
+    """Change (rad) by a correction x (N+1, 5) of the turn of zone z, and of the twist by tension as that counts."""
     n = line.h.shape[0]
     a, b = int(line.torsion[z, FIRST]), int(line.torsion[z, LAST])
     total = by_chords(torsion.slope, x, 1, max(a - 1, 0), min(b + 1, n))
@@ -235,15 +281,15 @@ def turn_by(line, torsion, z, x):
         total -= x[a - 1, 4]
     if b < n:
         total += x[b, 4]
-    return total
+    return total + twist_of_tensions(line, x[:, 0], 1, z) / damped_part(line, z, cv)
 
 
 @inner
-def unknown_of(line, torsion, j, x):
+def unknown_of(line, torsion, j, x, cv):
     """What the correction x makes of unknown j: the change of the turn of a zone, or the spin of a cell that is held."""
     zones = line.torsion.shape[0]
     if j < zones:
-        return turn_by(line, torsion, j, x)
+        return turn_by(line, torsion, j, x, cv)
     return x[torsion.floating[j - zones], 4]
 
 
@@ -281,18 +327,16 @@ def correct(line, state, work, cv):
             return
         for j in range(m):
             for k in range(m):
-                torsion.coupling[j, k] = unknown_of(line, torsion, j, torsion.columns[k])
+                torsion.coupling[j, k] = unknown_of(line, torsion, j, torsion.columns[k], cv)
     known[1] += 1.0
     A = torsion.dense
     for j in range(m):
         for k in range(m):
             A[j, k] = torsion.coupling[j, k]
-        A[j, m] = unknown_of(line, torsion, j, x)
+        A[j, m] = unknown_of(line, torsion, j, x, cv)
         size = 1.0
         if j < zones:
-            size = line.torsion[j, COMPLIANCE]
-            if line.bits & STIFFNESS_DAMPING:
-                size /= 1.0 + cv * line.torsion[j, TAU]
+            size = line.torsion[j, COMPLIANCE] / damped_part(line, j, cv)
         A[j, j] += size
     solve_dense(A)
     for j in range(m):
@@ -302,10 +346,8 @@ def correct(line, state, work, cv):
                 x[i, k] -= y * column[i, k]
     for z in range(zones):  # of the configuration that the correction leads to, but for what is not linear
         state.turn[z, TORQUE] += A[z, m]
-        change = A[z, m] * line.torsion[z, COMPLIANCE]
-        if line.bits & STIFFNESS_DAMPING:
-            change /= 1.0 + cv * line.torsion[z, TAU]
-        state.turn[z, TURN] += change
+        change = A[z, m] * line.torsion[z, COMPLIANCE] - twist_of_tensions(line, x[:, 0], 1, z)
+        state.turn[z, TURN] += change / damped_part(line, z, cv)
 
 
 @kernel
@@ -316,12 +358,13 @@ def pass_torque(line, ends, state, work, part, cv):
     CORRECT       its solution work.x with the torques that change with it; the march has kept its factors
     AFTER_STEP    powers of the configuration found, and what it reports: moments of the ends, loss
 
-    A line that is catenary from end to end feels nothing of its torque: that is found after the step.
+    A line that is catenary from end to end feels nothing of its torque, unless that lengthens it: it is found after the
+    step.
     """
-    felt = line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
+    felt = couples(line) or line.torsion[0, FIRST] > 0.0 or line.torsion[0, LAST] < line.h.shape[0]
     if part == AFTER_STEP:
         if not felt:
-            find_torques(line, ends, state, work.torsion)
+            find_torques(line, ends, state, work)
         work.report[STIFFNESS_DAMPING_POWER] += finish(line, ends, state, work.torsion)
         report_end_moments(line, ends, state, work.report)
     elif felt and part == CORRECT:
@@ -329,7 +372,7 @@ def pass_torque(line, ends, state, work, part, cv):
     elif felt:
         known = work.torsion.known
         known[2] = 1.0 if cv == 0.0 or known[0] != cv or known[1] >= SERVES else 0.0
-        find_torques(line, ends, state, work.torsion)
+        find_torques(line, ends, state, work)
     return 0
 
 
@@ -363,6 +406,20 @@ def torsion_of(line: Line, keep: bool) -> Torsion:
     )  # fmt: skip
 
 
-def torsion_energy(line: Line, turn: Floats) -> Floats:
-    """Energy, J, of the twist of zones; turn: (..., K) rad."""
-    return np.asarray(((turn - line.torsion[:, FREE]) ** 2 / (2.0 * line.torsion[:, COMPLIANCE])).sum(axis=-1))
+def torsion_energy(line: Line, turn: Floats, T: Floats) -> Floats:
+    """Energy, J, of the twist of zones; turn: (..., K) rad; T: (..., N) N."""
+    twist = turn - line.torsion[:, FREE]
+    if line.tension_twist.size:
+        by_tension = np.stack([T @ share for share in _shares_of_tensions(line)], axis=-1)
+        twist = twist + by_tension
+    return np.asarray((twist**2 / (2.0 * line.torsion[:, COMPLIANCE])).sum(axis=-1))
+
+
+def _shares_of_tensions(line: Line) -> Floats:
+    """(K, N) rad/N, by which tensions twist zones: as `twist_of_tensions`."""
+    out = np.zeros((len(line.torsion), line.h.size))
+    for row, (a, b) in zip(out, line.torsion[:, [FIRST, LAST]].astype(int), strict=True):
+        row[a:b] = 2.0 * line.tension_twist[a:b]
+        row[max(a - 1, 0) : a] = line.tension_twist[max(a - 1, 0) : a]
+        row[b : b + 1] = line.tension_twist[b : b + 1]
+    return out

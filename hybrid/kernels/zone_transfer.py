@@ -24,6 +24,7 @@ from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import add, cross, dot, scale, spin_about, sub, transport
 from hybrid.kernels.state import Floats, Line, State, blank_line, blank_state
+from hybrid.kernels.tension_torque import stretch_factor, torque_beside
 
 CARRIED, CLAMPED, NOTHING = 2, 1, 0
 
@@ -209,7 +210,8 @@ def carry_cells(job):
         while of + 1 < line.h.shape[0] and line.s[of + 1] <= middle:
             of += 1
         out.T[c] = tension_at(line.s, state.T, match.single, of, middle)
-        match.lengths[c] = math.sqrt(dot(e, e)) / (1.0 + target.ck[c] * out.T[c])
+        torque = torque_beside(line, state, of)
+        match.lengths[c] = math.sqrt(dot(e, e)) / stretch_factor(target, c, out.T[c], torque)
 
 
 @inner

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import NoReturn
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from hybrid.kernels.bodies import (
     ARM,
@@ -116,19 +117,27 @@ class KnownMotion(EndMotion):
 
 
 class FairleadMotion(EndMotion):
-    """The motion of a point of a body whose motion is known; place: (3,) m, in axes of the body."""
+    """The motion of a point of a body whose motion is known, and of the frame of a line that is clamped there."""
 
-    def __init__(self, body: KnownMotion, place: tuple[float, float, float]) -> None:
+    def __init__(self, body: KnownMotion, place: tuple[float, float, float], seat: Floats | None = None) -> None:
+        """place: (3,) m, in axes of the body; seat: (SEAT,) frame of the line in these; None: it turns freely."""
         self._body, self._place = body, np.array(place)
+        self._seat = None if seat is None else seat[:9].reshape(3, 3)
         position, _, _, _ = self.at(0.0)
         super().__init__(None, position)
 
     def at(self, t: float) -> tuple[Floats, Floats, Floats | None, Floats]:
-        """As of `EndMotion`; lines turn freely at the point, so that it has no frame."""
+        """As of `EndMotion`; where the line turns freely there is no frame."""
         origin, velocity, frame, spin = self._body.at(t)
         assert frame is not None
         arm = frame @ self._place
-        return origin + arm, velocity + np.cross(spin, arm), None, np.zeros(3)
+        place, speed = origin + arm, velocity + np.cross(spin, arm)
+        if self._seat is None:
+            return place, speed, None, np.zeros(3)
+        return place, speed, frame @ self._seat, spin
+
+    def turn_from(self, frame: ArrayLike) -> None:
+        """Nothing: the frame is that of the body."""
 
     def terms(self) -> NoReturn:
         """A fairlead is moved by its body: only systems of lines, which ask `at`, have one."""

@@ -15,10 +15,19 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.forces import FRICTION, SEABED, SELF_CONTACT, SELF_FRICTION
-from hybrid.kernels.state import Floats, Line, State, blank_state
+from hybrid.kernels.state import Floats, Line, State, state_for
+from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
 from hybrid.model.ends import EndConditions
-from hybrid.model.initial_shape import corners, ends_and_frames, from_joint, hung, initial_nodes, spare_shapes
+from hybrid.model.initial_shape import (
+    corners,
+    ends_and_frames,
+    from_joint,
+    hung,
+    initial_nodes,
+    spare_shapes,
+    twist_by_tension,
+)
 from hybrid.model.layout import Layout
 from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
@@ -36,6 +45,7 @@ from hybrid.scene.schema import (
     AdaptiveModel,
     CorrectedModel,
     CorrectedZone,
+    Equilibrium,
     Points,
     RodModel,
     RodZone,
@@ -92,13 +102,14 @@ class Model:
     @property
     def nodes(self) -> Floats:
         """(N+1,) m, nodes by which extremes are kept: the fairlead of a line that is paid out is the next one."""
-        return self.line.s if self.payout is None else self.payout.nodes[: self.cells + 1]
+        return self.line.s if self.payout is None else self.payout.along(self.payout.nodes[: self.cells + 1])
 
     @property
     def always(self) -> np.ndarray:
         """Numbers of nodes that there always are: those of base cells, or that cannot be taken in."""
         if self.payout is not None:
-            return np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
+            stays = np.flatnonzero(self.payout.nodes <= self.payout.shortest - self.payout.layer[0])
+            return stays if self.payout.side else self.cells - stays[::-1]
         return np.arange(self.line.s.size) if self.layout is None else self.layout.first
 
     @property
@@ -146,11 +157,13 @@ def corrects(scene: Scene) -> bool:
 
 
 def build(
-    scene: Scene, resolution: Resolution | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None
-) -> Model:
+    scene: Scene, resolution: Resolution | None = None, mesh: Layout | tuple[Floats, tuple[Zone, ...]] | None = None,
+    like: Model | None = None, spare: bool = True,
+) -> Model:  # fmt: skip
     """Make the model that a scene requires; resolution: how finely, None: as it asks for.
 
     mesh: nodes (N+1,) m and zones, or the layout of a line whose zones move, all rod; None: as resolution places them.
+    like: begin with the shape of this model of the same cable; spare: whether other shapes to begin with are made.
 
     Raises SceneError where the scene cannot be meshed (a rod zone of one cell, nodes
     that miss a zone boundary).
@@ -179,10 +192,10 @@ def build(
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
     h, compliance = line.h, line.ck
 
-    start = blank_state(n, len(line.torsion))
+    start = state_for(line)
     start.r[:], shape_name = initial_nodes(scene, s)
     start.T[:] = scale
-    shape = hung(scene, line, sea.values)
+    shape = hung(scene, line, sea.values) if like is None else Hanging(like.start.r, like.start.T)
     if shape is not None:
         start.r[:], start.T[:] = shape
         shape_name = HUNG
@@ -194,9 +207,12 @@ def build(
         start.e[:] = h[:, None] * np.array(scene.initial.direction) / np.linalg.norm(scene.initial.direction)
         start.v[:] = scene.initial.velocity or (0.0, 0.0, 0.0)
     ends, start.a1[:], start.turn[:, 0] = ends_and_frames(scene, start.e, line, sea)
+    if isinstance(scene.initial, Equilibrium):  # what is not at rest begins without tension
+        twist_by_tension(line, cable, start)
     others = [
-        (name, _spare_start(scene, r, line, scale, sea))
+        (name, _spare_start(scene, r, line, cable, scale, sea))
         for name, r in (spare_shapes(scene, s) if shape is not None else from_joint(scene, s))
+        if spare and like is None
     ]
     corrected = corrects(scene)
     follows = (resolution.follow or corrected) and followed(scene, zones, corrected).on
@@ -233,12 +249,14 @@ def _nodes(
     return None, *_placed(scene, cable, zone_plans(scene), cuts, resolution, DEFAULT_CELLS)
 
 
-def _spare_start(scene: Scene, r: Floats, line: Line, scale: float, sea: Surroundings) -> State:
+def _spare_start(scene: Scene, r: Floats, line: Line, cable: Material, scale: float, sea: Surroundings) -> State:
     """Another shape to find the equilibrium from: nodes r (N+1, 3) m, tensions of the scale (N)."""
-    spare = blank_state(r.shape[0] - 1, len(line.torsion))
+    spare = state_for(line)
     spare.r[:], spare.T[:] = r, scale
     spare.e[:] = np.diff(r, axis=0)
     _, spare.a1[:], spare.turn[:, 0] = ends_and_frames(scene, spare.e, line, sea)
+    if isinstance(scene.initial, Equilibrium):
+        twist_by_tension(line, cable, spare)
     return spare
 
 
@@ -276,11 +294,22 @@ def twist_rate(scene: Scene, cable: Material, s: Floats) -> Floats:
     given = [[load.value for load in end.loads if load.what == "moment"] for end in scene.ends.both]
     takes = [end.holds_twist or bool(loads) or resists for end, loads in zip(scene.ends.both, given, strict=True)]
     moments = given[0] * takes[1] + given[1] * takes[0]
+    by_tension = _twist_of_tension(scene, cable)
     if scene.dimension == 2 or cable.swivels.size or not (twisted or moments):
-        return np.zeros(s.size)
+        return np.asarray(by_tension[cable.piece(s)])
     give = 1.0 / cable.B[:, 2]
     torque = twisted / float(give @ np.diff(cable.bounds)) + sum(float(np.linalg.norm(x)) for x in moments)
-    return np.asarray(np.minimum(torque * give, MOST_FOR_TWIST * TWIST / scene.length)[cable.piece(s)])
+    return np.asarray(np.minimum(torque * give + by_tension, MOST_FOR_TWIST * TWIST / scene.length)[cable.piece(s)])
+
+
+def _twist_of_tension(scene: Scene, cable: Material) -> Floats:
+    """The most (K,) rad/m by which a tension of the weight and of the end forces twists the pieces of a cable."""
+    if not cable.tension_torque.size:
+        return np.zeros(cable.mass.size)
+    pulls = [float(np.linalg.norm(load.value)) for end in scene.ends.both for load in end.loads if load.what == "force"]
+    T = float(np.abs(cable.submerged_weight) @ np.diff(cable.bounds) + np.abs(cable.lift).sum()) + sum(pulls)
+    rate = np.abs(cable.tension_torque) * T / np.maximum(cable.B[:, 2], 1e-300)
+    return np.asarray(np.minimum(rate, MOST_FOR_TWIST * TWIST / scene.length))
 
 
 def _resists_spin(scene: Scene, cable: Material) -> bool:

@@ -15,6 +15,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.kernels.hanging import find_force
 from hybrid.kernels.state import Floats
 
 # |t| is rounded off at this part of the largest load, so that a folded or slack line has a minimum too.
@@ -26,6 +27,8 @@ MOST_ITERATIONS = 100
 SLACK = 0.5
 # Rounds of finding out how much of a line lies on the seabed: each changes it by a cell or none, but the first.
 LAYING = 20
+# Where the numbers of a symmetric matrix stand of which six are given.
+SYMMETRIC = np.array([[0, 5, 4], [5, 1, 3], [4, 3, 2]])
 # A slight pull along x where nothing pulls level, as a part of all loads.
 SLIGHT = 1e-3
 # Bisections of the lift of a floating body: to 1e-9 of it.
@@ -65,30 +68,12 @@ def pulls(loads: Floats, h: Floats, ck: Floats, span: Floats) -> Pulls | None:
     eps, soft = ROUNDED * scale, np.maximum(ck, LENT / scale)
     below = np.concatenate([np.zeros((1, 3)), np.cumsum(loads[1:-1], axis=0)])
 
-    def state(F: Floats) -> tuple[Floats, Floats, float]:
-        t = F - below
-        size = np.sqrt(np.einsum("ij,ij->i", t, t) + eps**2)
-        return t, size, float(h @ (size + 0.5 * soft * size**2) - F @ span)
-
-    F = 0.5 * below[-1] + 0.1 * scale * span / max(float(np.linalg.norm(span)), 1e-12)
-    t, size, energy = state(F)
-    for _ in range(MOST_ITERATIONS):
-        e = (h * (1.0 / size + soft))[:, None] * t
-        gradient = e.sum(axis=0) - span
-        d = t / size[:, None]
-        hessian = np.eye(3) * float(h @ (1.0 / size + soft)) - np.einsum("i,ij,ik->jk", h / size, d, d)
-        if np.abs(gradient).max() < 1e-9 * h.sum():
-            break
-        step, part = -np.linalg.solve(hessian, gradient), 1.0
-        slope = float(gradient @ step)
-        while part > 1e-9:
-            t_new, size_new, energy_new = state(F + part * step)
-            if energy_new <= energy + 1e-4 * part * slope + 1e-15 * abs(energy):
-                break
-            part *= 0.5
-        F, t, size, energy = F + part * step, t_new, size_new, energy_new
-    e = (h * (1.0 / size + soft))[:, None] * t
-    return Pulls(t, e, np.linalg.inv(hessian))
+    places, inverse = np.zeros((2, 3)), np.zeros(6)
+    places[0], places[1] = span, 0.5 * below[-1] + 0.1 * scale * span / max(float(np.linalg.norm(span)), 1e-12)
+    find_force(below, h, soft, places, eps, MOST_ITERATIONS, inverse)
+    t = places[1] - below
+    e = (h * (1.0 / np.sqrt(np.einsum("ij,ij->i", t, t) + eps**2) + soft))[:, None] * t
+    return Pulls(t, e, inverse[SYMMETRIC])
 
 
 def trail(loads: Floats, h: Floats, ck: Floats, held: int, place: Floats, on_bed: bool = False) -> Hanging | None:

@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 
 from hybrid.kernels.forces import FRICTION, PLANAR, ROTARY, SEABED
-from hybrid.kernels.state import Floats, Line, State, blank_state
+from hybrid.kernels.state import Floats, Line, State, state_for
 from hybrid.kernels.zone_torque import COMPLIANCE, FREE
 from hybrid.model.build import Model
 from hybrid.model.ends import first_director
@@ -50,7 +50,7 @@ def coarser(model: Model) -> Model | None:
 
 def refined(state: State, coarse: Line, line: Line) -> State:
     """A state of a coarse line on a finer one: its nodes on parabolas, joined, so that a rod begins without kinks."""
-    out = blank_state(line.h.size, len(line.torsion))
+    out = state_for(line)
     out.turn[:, 0] = _turns(coarse, line, state)
     out.r[:] = _smooth(state.r, coarse.s, line.s)
     out.e[:] = np.diff(out.r, axis=0)
@@ -72,7 +72,7 @@ def picked(line: Line, state: State, at: np.ndarray, turns: Floats | None = None
 
     turns: (K,) rad, of zones of the line that a torque passes through.
     """
-    out = blank_state(at.size - 1, len(line.torsion))
+    out = state_for(line)
     if turns is not None:
         out.turn[:, 0] = turns
     out.r[:], out.v[:] = state.r[at], state.v[at]

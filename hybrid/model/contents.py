@@ -59,7 +59,7 @@ def _implausible(scene: Scene) -> Iterator[tuple[str, str]]:
             "environment.seabed.friction is a part of 1",
         )
     for i, x in enumerate(scene.cable.sections):
-        if x.axial_stiffness is not None and x.axial_stiffness < SOFTEST * abs(weight(x, scene)) * scene.length:
+        if x.axial_stiffness and x.axial_stiffness < SOFTEST * abs(weight(x, scene)) * scene.length:
             text = f"cable.sections[{i}].axial_stiffness: is it in N?"
             yield f"a cable that stretches by more than {1 / SOFTEST:.0%} under its own weight", text
 
@@ -133,6 +133,8 @@ def _parts(scene: Scene, line: Line, rods: bool, flat: Entry) -> Iterator[Entry]
     yield Entry("bending that differs in two directions", differ, "sections[].bending_stiffness of two numbers")
     curled = any(x.intrinsic_curvature is not None and any(x.intrinsic_curvature) for x in sections)
     yield Entry("curvature without load", curled, "sections[].intrinsic_curvature")
+    armoured = any(x.tension_torque for x in sections)
+    yield Entry("torque of tension", armoured, "sections[].tension_torque")
     free = swivels(scene)
     if free:
         yield Entry(f"swivels: {len(free)}", True, "cable.attachments of kind swivel: no torque passes")
@@ -165,8 +167,12 @@ def contents_of(
     kinds = {z.kind for z in zones}
     entries = list(_moving(scene.model) if isinstance(scene.model, AdaptiveModel) else _fixed(zones))
     entries += _parts(scene, line, "rod" in kinds, flat)
-    extensible = [x.axial_stiffness is not None for x in scene.cable.sections]
+    extensible = [x.stiffness is not None for x in scene.cable.sections]
     entries.append(Entry("axial compliance", any(extensible), "sections[].axial_stiffness"))
+    if any(x.tension_strain is not None for x in scene.cable.sections):
+        entries.append(Entry("tension over strain by a table", True, "sections[].tension_strain"))
+    if any(x.dynamic_stiffness is not None for x in scene.cable.sections):
+        entries.append(Entry("stiffness that depends on speed and mean tension", True, "sections[].dynamic_stiffness"))
     if "rod" in kinds:
         assumed = [
             i for i, x in enumerate(scene.cable.sections) if x.torsional_stiffness is None and x.bending_stiffness

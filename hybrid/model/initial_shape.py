@@ -9,9 +9,10 @@ import numpy as np
 
 from hybrid.kernels.drag_law import body, half_cell, split
 from hybrid.kernels.forces import BODIES, DRAG, FLOW, SURFACE
-from hybrid.kernels.state import Floats, Line, Sea
+from hybrid.kernels.state import Floats, Line, Sea, State
 from hybrid.model.catenary_guess import Hanging, hang, laid, moored, trail
 from hybrid.model.ends import EndConditions, EndLoad, Motion, end_load, first_director, transported
+from hybrid.model.material import Material
 from hybrid.model.scales import net_weight
 from hybrid.model.sea import Surroundings
 from hybrid.model.sections import swivels
@@ -266,6 +267,32 @@ def ends_and_frames(scene: Scene, e: Floats, line: Line, around: Surroundings) -
         angle = 2.0 * np.pi * (turned - np.round(turned))[:, None]  # so that a full turn is none, to the last digit
         carried = carried * np.cos(angle) + np.cross(t, carried) * np.sin(angle)
     return _end_conditions(scene, (carried[0], carried[-1]), (d[0], d[-1]), around), carried[1:-1], turns
+
+
+def twist_by_tension(line: Line, cable: Material, state: State) -> None:
+    """Turn the directors of a state, and its zones, by what its tensions make of the twist (`tension_torque`).
+
+    Both ends hold the twist: it adds up to nothing between them; else it is that of a line without torque, from the end
+    that holds it, beyond a swivel or a joint from the other one.
+    """
+    if not line.tension_twist.size:
+        return
+    soft = line.h / np.maximum(cable.B[cable.piece(0.5 * (line.s[:-1] + line.s[1:])), 2], 1e-300)
+    turns = -2.0 * line.tension_twist * state.T
+    holds = [held and tangent for held, tangent in zip(cable.held_twist, cable.held_tangent, strict=True)]
+    swivels = [i for i in cable.swivel_nodes(line.s).tolist() if line.element[i]]
+    loose = np.zeros(0, int) if line.torsion.size else np.flatnonzero(line.spin == 0)
+    breaks = sorted([*swivels, *loose.tolist()])
+    if all(holds) and not breaks:
+        turns = turns - soft * turns.sum() / soft.sum()
+    angle = np.cumsum(turns) - 0.5 * turns
+    if breaks or (holds[1] and not holds[0]):
+        angle[breaks[-1] if breaks else 0 :] -= turns.sum()
+    d = state.e / np.linalg.norm(state.e, axis=1)[:, None]
+    state.a1[:] = state.a1 * np.cos(angle)[:, None] + np.cross(d, state.a1) * np.sin(angle)[:, None]
+    edges = np.concatenate([[0.0], angle, [0.0]])
+    for z, (a, b) in enumerate(line.torsion[:, :2].astype(int)):
+        state.turn[z, 0] += edges[b + 1] - edges[a]
 
 
 def _end_conditions(

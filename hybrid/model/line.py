@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from hybrid.kernels.forces import BODIES, ROTARY, STIFFNESS_DAMPING
-from hybrid.kernels.state import NO_TORSION, Floats, Line
+from hybrid.kernels.axial_law import SHIFT, follow_law
+from hybrid.kernels.forces import AXIAL_LAW, BODIES, ROTARY, STIFFNESS_DAMPING
+from hybrid.kernels.state import NO_ADDRESS, NO_LAW, NO_TABLE, NO_TORSION, Floats, Line, blank_line, no_work, state_for
 from hybrid.model.material import Material
 
 
@@ -45,6 +47,8 @@ def line_on(
     kb[material.swivel_nodes(s), 2] = 0.0
     half = 0.5 * h
     torsion = torsion_zones(material, h, rod, of)
+    law, law_table, law_at = axial_law(material, h, of)
+    torque, twist = material.torque_by_tension(h, of)
     return Line(
         s=s, h=h, ck=material.ck[of], mass=_to_nodes(h * material.mass[of]) + point["point_mass"], force=force,
         element=element, spin=rod.astype(np.int8), kb=kb, k0=k0, hn=hn, rotary=rotary, polar=polar,
@@ -52,7 +56,8 @@ def line_on(
         added_n=half * material.added_n[of], added_t=half * material.added_t[of],
         damp=_to_nodes(h * material.damp[of]), tau=material.tau[of],
         buoy=half * material.buoy[of], displaced=half * material.displaced[of], diameter=material.diameter[of],
-        footing=footing, bits=bits, torsion=torsion, **point,
+        footing=footing, bits=bits | (AXIAL_LAW if law_at.size else 0), torsion=torsion,
+        law=law, law_table=law_table, law_at=law_at, tension_torque=torque, tension_twist=twist, **point,
     )  # fmt: skip
 
 
@@ -127,3 +132,24 @@ def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray
         tau = float(soft @ np.nan_to_num(material.tau[of[cells]]) / soft.sum())
         rows.append((a, b, soft.sum(), share @ material.kappa[of[cells], 2], tau))
     return np.array(rows, float).reshape(-1, 5)
+
+
+def axial_law(material: Material, h: Floats, of: np.ndarray) -> tuple[Floats, Floats, NDArray[np.int64]]:
+    """`law`, `law_table` and `law_at` of a line with cells of lengths h (N,) m on pieces `of` (N,)."""
+    if material.curves is None:
+        return NO_LAW, NO_TABLE, NO_ADDRESS
+    law, rows, begin = np.zeros((h.size, NO_LAW.shape[1])), [], 0
+    for k, piece in enumerate(material.curves):
+        cells = of == k
+        if piece is None or not cells.any():
+            continue
+        strain, tension = np.array(piece.rows, float).T
+        energy = np.concatenate([[0.0], np.cumsum(0.5 * np.diff(strain) * (tension[1:] + tension[:-1]))])
+        rows.append(np.column_stack([strain, tension, energy]))
+        law[cells, :SHIFT] = (begin, begin + strain.size, *piece.dynamic)
+        begin += strain.size
+    table = np.concatenate(rows)
+    blank = blank_line(1)._replace(law=law, law_table=table)
+    state = state_for(blank)
+    address = follow_law.address(blank, state, state, no_work(), 0.0, 0.0)
+    return law, table, np.array([address], np.int64)

@@ -6,14 +6,14 @@ import numpy as np
 
 from hybrid.kernels.binding import Packed, Table
 from hybrid.kernels.forces import BODIES, FRICTION, SEABED
-from hybrid.kernels.state import NO_PLANE, NO_TORSION, Floats, Line, blank_line
+from hybrid.kernels.state import NO_PLANE, NO_TORSION, TENSION_TORQUE, Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import NodeKinds, blank_kinds
 from hybrid.kernels.zone_line import Cable, blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.model.layout import Layout
 from hybrid.model.line import spins_freely, torsion_zones
 from hybrid.model.material import LEAST_TENSION, POINT, TENSION_FLOOR, Material
 
-lines = Packed(blank_line, given=("bits", "plane", "torsion"))
+lines = Packed(blank_line, given=("bits", "plane", "torsion", *TENSION_TORQUE))
 kinds_of = Packed(lambda n: blank_kinds(n, 1), given=("free",))
 # What a base cell has per length.
 PER_LENGTH = (
@@ -61,12 +61,12 @@ class LineOnBase:
         """The line on a layout; bits: all forces that are on."""
         if bits != self._bits:
             self._fill_points(bits)
-        torsion = NO_TORSION
+        torsion, of = NO_TORSION, self._of[layout.base_of_cell]
+        lengths = np.diff(layout.nodes)
         if self._passes_torque:
-            torsion = torsion_zones(
-                self._material, np.diff(layout.nodes), layout.rod_cells, self._of[layout.base_of_cell]
-            )
-        line: Line = lines(layout.base_of_cell.size, bits=bits, plane=plane, torsion=torsion)
+            torsion = torsion_zones(self._material, lengths, layout.rod_cells, of)
+        by_tension = dict(zip(TENSION_TORQUE, self._material.torque_by_tension(lengths, of), strict=True))
+        line: Line = lines(layout.base_of_cell.size, bits=bits, plane=plane, torsion=torsion, **by_tension)
         self._line_job.bind(
             cable=self._cable, nodes=layout.nodes, base_of_cell=layout.base_of_cell, rod=layout.rod_cells, line=line
         )

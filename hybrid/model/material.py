@@ -7,6 +7,7 @@ and end bodies sit at points.  `hybrid.model.line` puts a Material on nodes.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import NamedTuple
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from hybrid.model.sections import (
     attachments_at,
     bending_stiffness,
     damping,
+    mean_compliance,
     merged_sections,
     modules_of,
     rotary_inertia,
@@ -31,6 +33,13 @@ TENSION_FLOOR, LEAST_TENSION = 0.2, 1e-6
 
 SMALLEST_BODY = 0.01  # m, over which a body without volume and drag passes through the surface
 POINT = ("point_mass", "point_drag", "point_added", "point_buoy", "point_displaced", "point_height", "point_upright")
+
+
+class StretchLaw(NamedTuple):
+    """How a piece stretches whose tension is no multiple of strain (kernels.axial_law)."""
+
+    rows: tuple[tuple[float, float], ...]  # strain and tension, N, at rest
+    dynamic: tuple[float, float, float]  # dynamic stiffness, N, what it gains by mean tension, relaxation time, s; or 0
 
 
 @dataclass
@@ -64,11 +73,25 @@ class Material:
     lift: Floats  # (P,) N, constant force upwards of each
     footing: Floats  # (P,) m, cable that presses on the seabed as much as each; empty without a seabed
     points: dict[str, Floats] = field(default_factory=dict)  # POINT -> (P,)
+    curves: list[StretchLaw | None] | None = (
+        None  # (K,) of pieces whose tension is no multiple of strain; None: no such
+    )
+    tension_torque: Floats = field(default_factory=lambda: np.zeros(0))  # (K,) N m per N; empty: none anywhere
 
     @property
     def passes_torque(self) -> bool:
         """Whether both ends hold the twist, and nothing between them lets it go."""
         return all(self.held_twist) and all(self.held_tangent) and not self.swivels.size
+
+    def torque_by_tension(self, h: Floats, of: np.ndarray) -> tuple[Floats, Floats]:
+        """Of cells h (N,) m of the pieces `of`: torque by tension, N m per N, and twist of half a cell by it, rad/N.
+
+        Empty where tension makes no torque anywhere.
+        """
+        if not self.tension_torque.size:
+            return np.zeros(0), np.zeros(0)
+        c = self.tension_torque[of]
+        return c, np.where(c != 0.0, 0.5 * h * c / np.where(c != 0.0, self.B[of, 2], 1.0), 0.0)
 
     @property
     def mean_bending(self) -> Floats:
@@ -140,6 +163,13 @@ def material(scene: Scene) -> Material:
     return out
 
 
+def stretch_law(section: Section) -> StretchLaw | None:
+    """The law of a section whose tension is no multiple of strain; None: of one whose tension is."""
+    given = section.dynamic_stiffness
+    dynamic = (given.constant, given.per_tension, given.relaxation_time) if given is not None else (0.0, 0.0, 0.0)
+    return StretchLaw(section.curve, dynamic) if section.curve else None
+
+
 def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
     """The cable without its water and its attachments."""
     k, gravity = len(of), scene.environment.gravity
@@ -149,8 +179,8 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         bounds=bounds,
         mass=np.array([x.mass for x in of], float),
         weight=np.array([x.mass * gravity for x in of], float),
-        ck=np.array([1.0 / x.axial_stiffness if x.axial_stiffness else 0.0 for x in of]),
-        max_strain=np.array([x.max_strain if x.axial_stiffness else np.inf for x in of]),
+        ck=np.array([mean_compliance(x) for x in of]),
+        max_strain=np.array([x.strain_limit if x.stiffness else np.inf for x in of]),
         B=np.array([[*bending_stiffness(x), torsional_stiffness(x)] for x in of], float),
         kappa=np.array([x.intrinsic_curvature or (0.0, 0.0, 0.0) for x in of], float),
         rotary=np.array([rotary_inertia(x)[0] for x in of]),
@@ -163,6 +193,10 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         held_twist=(start.holds_twist, end.holds_twist),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
+    if any(x.curve for x in of):
+        out.curves = [stretch_law(x) for x in of]
+    if any(x.tension_torque for x in of):
+        out.tension_torque = np.array([x.tension_torque or 0.0 for x in of])
     if any(damping(x).mass for x in of):
         out.bits |= MASS_DAMPING
         out.damp = np.array([x.mass * damping(x).mass for x in of])

@@ -23,14 +23,16 @@ class OutputPoints(NamedTuple):
     jumps: Floats
 
 
-def output_points(scene: Scene, longest: float | None = None) -> OutputPoints:
+def output_points(scene: Scene, longest: float | None = None, at_start: bool = False) -> OutputPoints:
     """The points that `output.points` asks for, those of the history, and all jumps.
 
-    longest: m, of a line that is paid out, how much may be out; its points are in material, from the start on.
+    longest: m, of a line that is paid out, how much may be out, and at_start: whether at its start, where s is then
+    negative; its points are in material.
     Of points that round-off alone tells apart there is one: a jump before one of the history, that before another.
     """
     asked, length, jumps = scene.output.points, scene.length, jump_points(scene)
-    usual = np.linspace(0.0, longest or length, asked) if isinstance(asked, int) else np.array(asked, float)
+    ends = (length - (longest or length), length) if at_start else (0.0, longest or length)
+    usual = np.linspace(*ends, asked) if isinstance(asked, int) else np.array(asked, float)
     followed = (x for x in scene.output.history or () if all(abs(x - at) > NEAR * length for at in jumps))
     more = [*jumps, *distinct(followed, length)]
     if more:

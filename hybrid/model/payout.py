@@ -17,7 +17,7 @@ from hybrid.model.line import line_on
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import Scene, Section
+from hybrid.scene.schema import Modules, Scene, Section
 
 # Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
 ENTERS, LEAVES = 0.85, 0.35
@@ -25,13 +25,22 @@ ENTERS, LEAVES = 0.85, 0.35
 FEWEST_CELLS = 4
 # Nodes that ride with the fairlead behind a clamp, where the line bends most, and of other rods.
 RIDE_BEHIND_CLAMP, RIDE = 8, 4
-WHERE = "ends.end.payout"
 
 
 def payout_of(scene: Scene) -> Payout | None:
-    """How a line is paid out at its end, if it is."""
-    found: Payout | None = getattr(scene.ends.end, "payout", None)
-    return found
+    """How a line is paid out at one of its ends, if it is."""
+    found: list[Payout | None] = [getattr(end, "payout", None) for end in scene.ends.both]
+    return found[0] or found[1]
+
+
+def winch_side(scene: Scene) -> int:
+    """Which end of a line that is paid out is at the winch: 0, the start, or 1."""
+    return int(getattr(scene.ends.start, "payout", None) is None)
+
+
+def winch_at(scene: Scene) -> str:
+    """Where a scene says how its line is paid out."""
+    return f"ends.{('start', 'end')[winch_side(scene)]}.payout"
 
 
 class PayoutForecast(NamedTuple):
@@ -49,7 +58,13 @@ class PayoutForecast(NamedTuple):
 
 @dataclass(frozen=True)
 class PayoutPlan:
-    """What a line that is paid out consists of, whatever is out."""
+    """What a line that is paid out consists of, whatever is out.
+
+    Places count from its far end towards the winch; `along` makes arc lengths of them.
+    """
+
+    side: int  # which end is at the winch
+    far: float  # m, arc length of the other end
 
     law: Floats  # (K, 8) as of kernels.payout.Reel
     nodes: Floats  # (M,) m, nodes that there may be; that of the fairlead is none of them
@@ -73,6 +88,10 @@ class PayoutPlan:
         n = int(np.searchsorted(self.nodes, begins))
         return n if begins - self.nodes[n - 1] > LEAVES * self.cell(n - 1) else n - 1
 
+    def cells(self, length: float) -> int:
+        """Cells of a line of that length, m, with those of nodes that ride with the fairlead."""
+        return self.count(length) + self.layer.size - 1
+
     def cell(self, node: int) -> float:
         """Length, m, of the cell after a material node."""
         return float(self.nodes[node + 1] - self.nodes[node])
@@ -86,36 +105,42 @@ class PayoutPlan:
         winch = self.winch[w.TENSION] > 0.0
         if self.from_outside or winch:
             by = f"a winch holds {self.winch[w.TENSION]:.6g} N" if winch else "set from Python"
-            cells = self.count(self.longest)
+            cells = self.cells(self.longest)
             return PayoutForecast(by, self.first, math.nan, self.shortest, self.longest, math.nan, cells, math.nan)
         t = np.linspace(0.0, duration, 2001)
         lengths = np.array([length_at(self.law, x)[:2] for x in t])
         counts = np.searchsorted(self.nodes, lengths[:, 0])
         last, rate = float(lengths[-1, 0]), float(np.abs(lengths[:, 1]).max())
         low, high = _extremes(self.law, self.first, duration)
-        return PayoutForecast("", self.first, last, low, high, rate, self.count(high), float(counts.mean()))
+        return PayoutForecast("", self.first, last, low, high, rate, self.cells(high), float(counts.mean()))
+
+    def along(self, places: Floats) -> Floats:
+        """Arc lengths, m, in order, of places in order."""
+        return places if self.side else np.asarray(self.far - places[::-1])
 
     def line(self, count: int, length: float, like: Line) -> Line:
         """The line of `count` material nodes and a length, m; like: another one, with the same forces."""
-        s = np.concatenate([self.nodes[:count], length - self.layer])
+        s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
         middle = 0.5 * (s[:-1] + s[1:])
         ends = [zone.s_b for zone in self.zones]
         rod = np.array([x.kind == "rod" for x in self.zones])
         rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
         line = line_on(self.cable, s, rods)
-        return line._replace(bits=like.bits, plane=like.plane, footing=_footing(like, s.size))
+        return line._replace(bits=like.bits, plane=like.plane, footing=self._footing(like, s.size))
 
     def zones_of(self, length: float) -> tuple[Zone, ...]:
         """The zones of a line of that length, m."""
-        return (*self.zones[:-1], replace(self.zones[-1], s_b=length))
+        if self.side:
+            return (*self.zones[:-1], replace(self.zones[-1], s_b=length))
+        return (replace(self.zones[0], s_a=self.far - length), *self.zones[1:])
 
-
-def _footing(like: Line, nodes: int) -> Floats:
-    """Bodies that press on the seabed; those of the nodes that come are none."""
-    out = np.full(nodes, 0.0 if np.isfinite(like.footing).all() else np.nan)
-    some = min(nodes, like.footing.size) - 1
-    out[:some] = like.footing[:some]
-    return out
+    def _footing(self, like: Line, nodes: int) -> Floats:
+        """Bodies that press on the seabed; those of the nodes that come are none."""
+        out = np.full(nodes, 0.0 if np.isfinite(like.footing).all() else np.nan)
+        some = min(nodes, like.footing.size) - 1
+        kept = slice(0, some) if self.side else slice(-some, None)
+        out[kept] = like.footing[kept]
+        return out
 
 
 def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan | None:
@@ -124,53 +149,61 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     if payout is None:
         return None
     length, duration = scene.length, scene.time.duration if scene.time is not None else 0.0
-    law = law_of(payout, length, duration)
+    side, where = winch_side(scene), winch_at(scene)
+    law = law_of(payout, length, duration, where)
     low, high = _extremes(law, length, duration)
     longest = max(high, payout.longest or 0.0)
     if payout.longest is not None and high > payout.longest:
-        _refuse("longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
-    sections = list(whole_scene(scene).cable.sections)
-    joint = max((zone.s_a for zone in zones), default=0.0)
-    points = [x for x in material(scene).at.tolist() if x < length]
-    changes = [x for x in np.cumsum([x.length for x in scene.cable.sections]).tolist() if x < length * (1 - 1e-9)]
+        _refuse(f"{where}.longest", f"{payout.longest:g}", f"at least {high:.6g} m, which is paid out", "leave it out")
+    sections = _from_far_end(scene, longest)
+    s = line.s if side else length - line.s[::-1]
+    joint = max((zone.s_a if side else length - zone.s_b for zone in zones), default=0.0)
+    at = material(scene).at
+    points = [x for x in (at if side else length - at).tolist() if x < length]
+    out = scene.cable.sections if side else scene.cable.sections[::-1]
+    changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
     fixed = max([joint, *points, *changes])
-    near = int(np.searchsorted(line.s, fixed * (1 + 1e-12)))
+    near = int(np.searchsorted(s, fixed * (1 + 1e-12)))
     ride = riding_nodes(scene, line)
     fewest = FEWEST_CELLS + ride
-    if near + fewest >= line.s.size:
-        expected = f"{fewest} cells between the last joint, load or change of section, s = {fixed:g} m, and the end"
-        _refuse("", "payout", expected, "more cells, or a longer cable")
-    layer = line.s[-1] - line.s[line.s.size - 1 - ride :]
-    shortest = float(line.s[near + FEWEST_CELLS - 1] + layer[0])
+    if near + fewest >= s.size:
+        place = fixed if side else length - fixed
+        what = "last" if side else "first"
+        expected = f"{fewest} cells between the {what} joint, load or change of section, s = {place:g} m, and the winch"
+        _refuse(where, "payout", expected, "more cells, or a longer cable")
+    layer = s[-1] - s[s.size - 1 - ride :]
+    shortest = float(s[near + FEWEST_CELLS - 1] + layer[0])
     if low < shortest:
         given, fix = f"a length of {low:.6g} m", "take less in, or take more cells"
-        left = f"{fewest} cells must be left behind the last joint, load or change of section"
+        left = f"{fewest} cells must be left behind the {'last' if side else 'first'} joint, load or change of section"
         expected = f"at least {shortest:.6g} m: {left}"
-        _refuse("", given, expected, fix)
-    h = float(line.h[-1 - ride])
-    nodes: list[float] = line.s[: line.s.size - ride].tolist()
+        _refuse(where, given, expected, fix)
+    h = float(s[-1 - ride] - s[-2 - ride])
+    nodes: list[float] = s[: s.size - ride].tolist()
     for end in np.cumsum([x.length for x in sections[:-1]]).tolist():
         if nodes[-1] * (1 + 1e-9) < end:
             nodes += np.linspace(nodes[-1], end, max(round((end - nodes[-1]) / h), 1) + 1)[1:].tolist()
     while nodes[-3 - ride] < longest:
         nodes.append(nodes[-1] + h)
-    cable = material(whole_scene(scene))
-    if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-1]:
-        _refuse("", "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
-    outside, s, winch = payout.from_outside, np.array(nodes), winch_of(payout, length)
+    if any(x.intrinsic_curvature and any(x.intrinsic_curvature) for x in sections) and line.spin[-side]:
+        _refuse(where, "intrinsic_curvature", "straight sections, because a rod is paid out", "take a catenary there")
+    winch = winch_of(payout, length)
     winch[w.LEAST], winch[w.MOST] = shortest, longest
+    cable, far = _whole_material(scene), 0.0 if side else length
     return PayoutPlan(
-        law, s, length, longest, shortest, zones, cable, _pieces(cable), outside, winch, layer, line.s.copy()
-    )
+        side, far, law, np.array(nodes), length, longest, shortest, zones, cable, _pieces(cable, side, far),
+        payout.from_outside, winch, layer, line.s.copy(),
+    )  # fmt: skip
 
 
 def riding_nodes(scene: Scene, line: Line) -> int:
     """Nodes that ride with the fairlead: behind a clamp, and where rods do not stretch."""
-    if line.element[-1]:
+    side = winch_side(scene)
+    if line.element[-side]:
         return RIDE_BEHIND_CLAMP
     payout = payout_of(scene)
-    stretches = bool(line.ck[-1])
-    return 0 if stretches or not line.spin[-1] or (payout is not None and payout.winch is not None) else RIDE
+    stretches = bool(line.ck[-side])
+    return 0 if stretches or not line.spin[-side] or (payout is not None and payout.winch is not None) else RIDE
 
 
 def winch_of(payout: Payout, length: float) -> Floats:
@@ -183,17 +216,21 @@ def winch_of(payout: Payout, length: float) -> Floats:
     return out
 
 
-def _refuse(key: str, given: str, expected: str, fix: str) -> NoReturn:
-    raise SceneError([Complaint(f"{WHERE}.{key}" if key else WHERE, given, expected, fix)])
+def _refuse(where: str, given: str, expected: str, fix: str) -> NoReturn:
+    raise SceneError([Complaint(where, given, expected, fix)])
 
 
-def _sections(scene: Scene, payout: Payout, longest: float) -> list[Section]:
-    """The sections that are out and those on the reel."""
-    out, more = list(scene.cable.sections), longest - scene.length
+def _from_far_end(scene: Scene, longest: float) -> list[Section]:
+    """The sections that are out and those on the reel, from the far end on."""
+    payout, out, more = payout_of(scene), list(scene.cable.sections), longest - scene.length
+    assert payout is not None
+    out = out if winch_side(scene) else out[::-1]
     if payout.reel is not None:
         held = sum(x.length for x in payout.reel)
         if held < more * (1 - 1e-9):
-            _refuse("reel", f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", "a longer last section")
+            fix = "a longer last section"
+            where = f"{winch_at(scene)}.reel"
+            _refuse(where, f"{held:.6g} m", f"at least {more:.6g} m, which leaves the reel", fix)
         return [*out, *payout.reel, payout.reel[-1].model_copy(update={"length": scene.length})]
     return [*out, out[-1].model_copy(update={"length": more + scene.length})]
 
@@ -203,30 +240,46 @@ def longest_out(scene: Scene) -> float:
     payout = payout_of(scene)
     if payout is None or scene.time is None:
         return scene.length
-    law = law_of(payout, scene.length, scene.time.duration)
+    law = law_of(payout, scene.length, scene.time.duration, winch_at(scene))
     high = _extremes(law, scene.length, scene.time.duration)[1]
     return max(high, payout.longest or 0.0)
 
 
-def whole_scene(scene: Scene) -> Scene:
-    """A scene whose cable has also what is on the reel; of a line that is not paid out the scene itself."""
-    payout = payout_of(scene)
-    if payout is None:
-        return scene
-    sections = tuple(_sections(scene, payout, longest_out(scene)))
-    return scene.model_copy(update={"cable": scene.cable.model_copy(update={"sections": sections})})
+def whole_scene(scene: Scene) -> tuple[Scene, float]:
+    """A scene whose cable has also what is on the reel, and the arc length, m, of its start in the scene as it is."""
+    if payout_of(scene) is None:
+        return scene, 0.0
+    sections = _from_far_end(scene, longest_out(scene))
+    if winch_side(scene):
+        return scene.model_copy(update={"cable": scene.cable.model_copy(update={"sections": tuple(sections)})}), 0.0
+    more = sum(x.length for x in sections) - scene.length
+    attached = []
+    for x in scene.cable.attachments:
+        moved = {"range": (x.range[0] + more, x.range[1] + more)} if isinstance(x, Modules) else {"at": x.at + more}
+        attached.append(x.model_copy(update=moved))
+    changed = {"sections": tuple(sections[::-1]), "attachments": tuple(attached)}
+    return scene.model_copy(update={"cable": scene.cable.model_copy(update=changed)}), -more
 
 
-def _pieces(cable: Material) -> Floats:
+def _whole_material(scene: Scene) -> Material:
+    """The cable with what is on the reel, by the arc lengths of the scene."""
+    whole, begin = whole_scene(scene)
+    cable = material(whole)
+    cable.bounds, cable.at, cable.swivels = (x + begin for x in (cable.bounds, cable.at, cable.swivels))
+    return cable
+
+
+def _pieces(cable: Material, side: int, far: float) -> Floats:
     """What every piece of the material has per length; of stiffness one over it."""
     with np.errstate(divide="ignore"):
         soft = 1.0 / cable.B
     columns = [
-        cable.bounds[:-1], cable.mass, cable.weight, cable.damp, cable.ck, cable.tau, cable.drag_n, cable.drag_t,
+        cable.bounds[:-1] if side else far - cable.bounds[1:],
+        cable.mass, cable.weight, cable.damp, cable.ck, cable.tau, cable.drag_n, cable.drag_t,
         cable.added_n, cable.added_t, cable.buoy, cable.displaced, cable.diameter, cable.rotary, cable.polar,
         *soft.T, *cable.kappa.T,
     ]  # fmt: skip
-    pieces = np.ascontiguousarray(np.stack(columns, axis=1))
+    pieces = np.ascontiguousarray(np.stack(columns, axis=1)[:: 1 if side else -1])
     assert pieces.shape[1] == 1 + PER_LENGTH
     return pieces
 
@@ -243,23 +296,23 @@ def _rows(rows: list[tuple[float, list[float]]]) -> Floats:
     return out
 
 
-def law_of(payout: Payout, length: float, duration: float) -> Floats:
+def law_of(payout: Payout, length: float, duration: float, where: str = "payout") -> Floats:
     """The length, m, that is out over time, as polynomials: (K, 8) as of kernels.payout.Reel.
 
-    length: m, at t = 0; duration: s, of the motion.
+    length: m, at t = 0; duration: s, of the motion; where: the key in the scene, for messages.
     """
     if payout.rate is not None:
         return _law_of_rate(payout, length)
     if payout.file is not None:
-        payout = payout.model_copy(update=_rows_of(payout.file))
+        payout = payout.model_copy(update=_rows_of(payout.file, where))
     if payout.rates is not None:
         return _law_of_rates(np.array(payout.rates, float), length, duration)
     if payout.lengths is not None:
-        return _law_of_lengths(np.array(payout.lengths, float), length)
+        return _law_of_lengths(np.array(payout.lengths, float), length, where)
     return _rows([(0.0, [length])])
 
 
-def _rows_of(path: str) -> dict[str, Floats]:
+def _rows_of(path: str, where: str) -> dict[str, Floats]:
     """Rates or lengths over time of a file, by their key in the scene."""
     from hybrid.scene.motion_file import RecordRefused, check_file, read_table
 
@@ -276,17 +329,17 @@ def _rows_of(path: str) -> dict[str, Floats]:
         header, table, lines = read_table(path, checked)
     except RecordRefused as refused:
         found = refused.finding
-        _refuse("file", found.given or name, found.expected, found.fix)
+        _refuse(f"{where}.file", found.given or name, found.expected, found.fix)
     key, rows = ("rates", 2) if "rate" in header else ("lengths", 3)
     t, x = table[:, header.index("t")], table[:, 1 - header.index("t")]
     if len(t) < rows:
-        _refuse("file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
+        _refuse(f"{where}.file", f"{name}, {len(t)} rows", f"at least {rows} rows", "sample more finely")
     for k in np.flatnonzero(np.diff(t) <= 0.0)[:1]:
         given = f"{name}, line {lines[k + 1]}: t = {t[k + 1]:.9g} after t = {t[k]:.9g}"
-        _refuse("file", given, "times that increase strictly", "sort the rows and drop duplicates")
+        _refuse(f"{where}.file", given, "times that increase strictly", "sort the rows and drop duplicates")
     if t[0] != 0.0 or (key == "rates" and x[0] != 0.0):
         expected = "a first row at t = 0" + (" with rate 0, because the line is at rest" if key == "rates" else "")
-        _refuse("file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
+        _refuse(f"{where}.file", f"{name}, line {lines[0]}: t = {t[0]:.9g}, {x[0]:.9g}", expected, "add that row")
     return {key: np.column_stack([t, x])}
 
 
@@ -314,13 +367,14 @@ def _law_of_rates(table: Floats, length: float, duration: float) -> Floats:
     return _rows([*rows, (float(t[-1]), [float(c[-1]), float(way(t[-1])) + length])])
 
 
-def _law_of_lengths(table: Floats, length: float) -> Floats:
+def _law_of_lengths(table: Floats, length: float, where: str) -> Floats:
     """Lengths at times, a spline of fifth degree between them, which begins and ends without rate and acceleration."""
     from scipy.interpolate import PPoly, make_interp_spline
 
     t, out = table.T
     if abs(out[0] - length) > 1e-9 * length:
-        _refuse("lengths", f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable", "the same length")
+        given, expected = f"{out[0]:.9g} m at t = 0", f"{length:.9g} m, the length of the cable"
+        _refuse(f"{where}.lengths", given, expected, "the same length")
     rest = [(1, 0.0), (2, 0.0)]
     spline = PPoly.from_spline(make_interp_spline(t, out, k=5, bc_type=(rest, rest)))
     pieces = [(float(x), a.tolist()) for x, y, a in zip(spline.x[:-1], spline.x[1:], spline.c.T, strict=True) if y > x]
@@ -329,10 +383,13 @@ def _law_of_lengths(table: Floats, length: float) -> Floats:
 
 def length_at(law: Floats, t: float) -> tuple[float, float, float]:
     """Length (m) that is out at t (s), its rate (m/s) and the rate of that (m/s2), just before t where it jumps."""
-    row = law[max(int(np.searchsorted(law[:, 0], t)) - 1, 0)]
-    x, c = max(t - row[0], 0.0), row[1:]
-    first = np.polyder(c)
-    return float(np.polyval(c, x)), float(np.polyval(first, x)), float(np.polyval(np.polyder(first), x))
+    row = law[max(int(np.searchsorted(law[:, 0], t)) - 1, 0)].tolist()
+    x, value, rate, twice = max(t - row[0], 0.0), 0.0, 0.0, 0.0
+    for c in row[1:]:
+        twice = twice * x + 2.0 * rate
+        rate = rate * x + value
+        value = value * x + c
+    return value, rate, twice
 
 
 def _extremes(law: Floats, length: float, duration: float) -> tuple[float, float]:

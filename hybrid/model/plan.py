@@ -35,6 +35,7 @@ class CriticalTorque(NamedTuple):
     stiffness: float  # N m2
     diameter: float  # m; NaN: not given
     min_bend_radius: float  # m; NaN: not given
+    of_tension: float = 0.0  # N m, the torque that the line already has by its tension (tension_torque), not turned
 
 
 @dataclass(frozen=True)
@@ -203,8 +204,17 @@ def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:
         return None
     torque = 2.0 * np.sqrt(EI * T)
     k = int(np.argmin(torque))
+    of_tension = 0.0
+    if line.tension_twist.size:
+        of_tension = float(2.0 * line.tension_twist @ T / np.sum(line.h / cable.B[cable.piece(middle), 2]))
     at = middle[k : k + 1]
     radius = limits_along(scene, at).get("min_bend_radius", np.full(1, np.nan))
     return CriticalTorque(
-        float(torque[k]), float(at[0]), float(T[k]), float(EI[k]), float(outer_diameter(scene, at)[0]), float(radius[0])
+        float(torque[k]),
+        float(at[0]),
+        float(T[k]),
+        float(EI[k]),
+        float(outer_diameter(scene, at)[0]),
+        float(radius[0]),
+        of_tension,
     )

@@ -56,8 +56,8 @@ def tension_scale(scene: Scene, sections: Sequence[Section], bending: bool, fast
                 for x in parts
             ]
     first, last = (end.held_position for end in scene.ends.both)
-    if first and last and all(s.axial_stiffness for s in sections):
-        free = length / sum(s.length / s.axial_stiffness for s in sections if s.axial_stiffness)  # N per unit strain
+    if first and last and all(s.stiffness for s in sections):
+        free = length / sum(s.length / s.stiffness for s in sections if s.stiffness)  # N per unit strain
         candidates.append(free * max(0.0, float(np.linalg.norm(np.subtract(last, first))) / length - 1.0))
     velocity = scene.initial.velocity if isinstance(scene.initial, Straight) else None
     if velocity:

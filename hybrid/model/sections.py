@@ -37,6 +37,13 @@ def torsional_stiffness(section: Section) -> float:
     return float(np.mean(bending_stiffness(section))) / (1.0 + POISSON)
 
 
+def mean_compliance(section: Section) -> float:
+    """1/EA in 1/N, 0 where nothing stretches; of a table on average, up to what it bears."""
+    if section.curve is not None:
+        return section.strain_limit / section.borne
+    return 1.0 / section.axial_stiffness if section.axial_stiffness else 0.0
+
+
 def bending_stiffness(section: Section) -> tuple[float, float]:
     b = section.bending_stiffness
     if b is None:
@@ -69,8 +76,7 @@ def outer_diameter(scene: Scene, s: np.ndarray) -> np.ndarray:
 
 def borne_tension(scene: Scene, s: np.ndarray) -> np.ndarray:
     """Tension (ns,) N at which a section reaches its max_strain, at arc lengths s (m); the smaller one at a seam."""
-    borne = [x.axial_stiffness * x.max_strain if x.axial_stiffness else np.inf for x in scene.cable.sections]
-    return _along(scene, s, borne, np.fmin)
+    return _along(scene, s, [x.borne for x in scene.cable.sections], np.fmin)
 
 
 def _along(scene: Scene, s: np.ndarray, of_section: Sequence[float], choose: np.ufunc) -> np.ndarray:

@@ -2,22 +2,33 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from hybrid.kernels.bodies import FORCE, FRAME, LEVEL, LIFT, NUMBERS, PLACE, STATE, STIFFNESS, V
+from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY, WITH_POINT
 from hybrid.kernels.members import PIECE
 from hybrid.kernels.state import Floats
-from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model
+from hybrid.model.bodies import BodyModel, FairleadMotion, KnownMotion, body_model, frame_of
 from hybrid.model.build import Model, build
 from hybrid.model.catenary_guess import pulls
+from hybrid.model.clamps import (
+    axes_of_point,
+    directions_at_rigid,
+    seat_of,
+    seated,
+    untwisted,
+    with_clamps,
+    with_springs,
+)
 from hybrid.model.initial_shape import dead_loads
 from hybrid.model.sea import surroundings
 from hybrid.scene.bodies import FixedBody
 from hybrid.scene.points import Fairlead
+from hybrid.scene.schema import Scene
 from hybrid.scene.system import System
 
 MOST_ROUNDS = 100  # of Newton's method for the first places of the points
@@ -31,12 +42,14 @@ class SystemModel:
 
     names: tuple[str, ...]  # of the lines
     models: tuple[Model, ...]  # of the lines; a free point is a body at the end of the line that carries it
-    free: tuple[str, ...]  # names of the free points
+    free: tuple[str, ...]  # names of the free points at which lines turn freely
+    rigid: tuple[str, ...]  # names of those to which lines are clamped: bodies without mass, behind the bodies
     joints: tuple[tuple[int, int], ...]  # of each line: number of what moves its start and end, -1: held there
     places: Floats  # (P, 3) m, where the free points are first
     bodies: tuple[BodyModel, ...]  # that are free; they are numbered behind the free points
-    body_places: Floats  # (B, STATE) where they are first
+    body_places: Floats  # (B, STATE) where they, and the points behind them, are first
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
+    seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
@@ -50,13 +63,14 @@ class SystemModel:
 
         since: s, loads that have stopped by then are left out.
         """
-        for body, row in zip(self.bodies, out, strict=True):
+        for body, row in zip(self.bodies, out, strict=False):
             body.load(t, since, row)
 
     def body_numbers(self, t: float) -> Floats:
-        """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first."""
-        out = np.zeros((len(self.bodies), max((x.numbers.size for x in self.bodies), default=NUMBERS)))
-        for row, body in zip(out, self.bodies, strict=True):
+        """(B, NUMBERS or, with pieces of members, more) of the free bodies at t (s), where they are first; behind them
+        those of points, zeros."""
+        out = np.zeros((len(self.body_places), max((x.numbers.size for x in self.bodies), default=NUMBERS)))
+        for row, body in zip(out, self.bodies, strict=False):
             row[: body.numbers.size] = body.numbers
         self.load_bodies(t, out)
         self.stir(t, self.body_places, 0.0, out)
@@ -64,18 +78,22 @@ class SystemModel:
 
     def stir(self, t: float, bodies: Floats, dt: float, out: Floats) -> None:
         """Write the water around members of bodies (B, STATE) at t (s), dt (s) later, into their numbers `out`."""
-        for body, state, row in zip(self.bodies, bodies, out, strict=True):
+        for body, state, row in zip(self.bodies, bodies, out, strict=False):
             if body.members is not None:
                 body.members.stir(t, state, dt, row[NUMBERS : body.numbers.size].reshape(-1, PIECE))
 
 
-def build_system(system: System, places: Floats | None = None, bodies: Floats | None = None) -> SystemModel:
+def build_system(
+    system: System, places: Floats | None = None, bodies: Floats | None = None, seats: Floats | None = None
+) -> SystemModel:
     """Make the model that a system requires.
 
-    places: (P, 3) m of the free points, bodies: (B, STATE) of the free bodies, None: where the scene has them.
+    places: (P, 3) m of the free points, bodies: (B, STATE) of the free bodies and the points behind them, None: where
+    the scene has them; seats: (L, 2, SEAT) of a model that was made before, None: as the first shapes lie.
     Raises SceneError where a line cannot be meshed.
     """
-    free, free_bodies = system.free, list(system.free_bodies)
+    rigid = system.rigid
+    free, free_bodies = tuple(x for x in system.free if x not in rigid), list(system.free_bodies)
     environment = system.environment
     density = environment.fluid.density if environment.fluid is not None else 0.0
     around = None
@@ -87,43 +105,135 @@ def build_system(system: System, places: Floats | None = None, bodies: Floats | 
     if places is None:
         places = np.array([system.first_place(x) for x in free], float).reshape(-1, 3)
     if bodies is None:
-        bodies = np.array([body.start for body in made]).reshape(-1, STATE)
+        points = np.zeros((len(rigid), STATE))
+        points[:, PLACE:FRAME] = np.array([system.first_place(x) for x in rigid]).reshape(-1, 3)
+        points[:, FRAME:V] = np.eye(3).ravel()
+        bodies = np.vstack([np.array([body.start for body in made]).reshape(-1, STATE), points])
+    carriers = [*free_bodies, *rigid]
     at: dict[str, Any] = dict(zip(free, map(tuple, places.tolist()), strict=True))
     joint = {name: k for k, name in enumerate(free)}
     fairleads = {}
     for name, point in system.points.items():
-        if isinstance(point, Fairlead) and point.body in free_bodies:
-            row = bodies[free_bodies.index(point.body)]
-            at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(point.place)).tolist())
-            joint[name], fairleads[name] = len(free) + free_bodies.index(point.body), point.place
-    known: dict[str, KnownMotion] = {}
-    models = [_model_of(system, name, at, known) for name in system.lines]
+        carrier = point.body if isinstance(point, Fairlead) else name
+        if carrier in (free_bodies if isinstance(point, Fairlead) else rigid):
+            row = bodies[carriers.index(carrier)]
+            place = point.place if isinstance(point, Fairlead) else (0.0, 0.0, 0.0)
+            at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(place)).tolist())
+            joint[name], fairleads[name] = len(free) + carriers.index(carrier), place
+    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats)
+    maker.turn_points()
+    models = [maker.model(name) for name in system.lines]
+    known = maker.known
     for name, body in system.bodies.items():
         if isinstance(body, FixedBody) and name not in known:
             known[name] = KnownMotion(body, models[0].sea)
     ends = [(x.start, x.end) for x in system.lines.values()]
     return SystemModel(
-        tuple(system.lines), tuple(models), free, tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends), places,
-        made, bodies, np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]), known,
+        tuple(system.lines), tuple(models), free, rigid, tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends),
+        places, made, maker.bodies, np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
+        maker.seats, known,
     )  # fmt: skip
 
 
-def _model_of(system: System, name: str, at: Mapping[str, Any], known: dict[str, KnownMotion]) -> Model:
-    """The model of a line: its loads with the points that it carries, its first shape between places that are held.
+class _Lines:
+    """Makes the models of lines, with their clamps."""
 
-    known: motions of bodies, which are added when first asked for.
-    """
-    model = build(system.scene_of(name, places=at))
-    carried = system.carried(name)
-    if carried:
-        other = build(system.scene_of(name, carried, at))
-        model = replace(other, start=model.start, start_shape=model.start_shape, other_starts=model.other_starts)
-    for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
-        found, body = system.points[point], system.body_of(point)
-        if isinstance(found, Fairlead) and isinstance(body, FixedBody) and body.motion is not None:
-            motion = known.setdefault(found.body, KnownMotion(body, model.sea))
-            model.ends.motions[k] = FairleadMotion(motion, found.place)
-    return model
+    def __init__(
+        self, system: System, at: Mapping[str, Any], bodies: Floats, rows: Mapping[str, int], seats: Floats | None
+    ) -> None:
+        """at: places of the points that are joined; rows: of `bodies`, of the points that are carried by one."""
+        self._system, self._at, self.bodies, self._rows = system, at, bodies.copy(), rows
+        self._given, self._names = seats, list(system.lines)
+        self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
+        self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
+        self._scenes: dict[str, Scene] = {}  # of lines, with their points where the system has them
+        self.known: dict[str, KnownMotion] = {}  # motions of bodies, which are added when first asked for
+
+    def turn_points(self) -> None:
+        """Turn the free points to which lines are clamped as the lines lie, hung between their places.
+
+        Of points that are left the next is one that a line leads to from where its material axis a1 is known: so the
+        twist that both ends of a line that is cut ask for is less than half a turn, as of the line in one piece.
+        """
+        left, system = list(self._system.rigid), self._system
+        while left:
+            known = {p: [at for at in system.clamped_at(p) if self._leads_from_known(at, left)] for p in left}
+            point = next((p for p in left if known[p]), left[0])
+            here = [*known[point], *(at for at in system.clamped_at(point) if at not in known[point])]
+            models = {name: self._shape(name, self._directions(name, left)) for name, _ in here}
+            far = None
+            if known[point]:
+                name, end = known[point][0]
+                far = self._directions(name, left)["start" if end == "end" else "end"]
+            axes = axes_of_point({end: self._at_rigid[end] for end in here}, models, far)
+            self.bodies[self._rows[point], FRAME:V] = axes.ravel()
+            left.remove(point)
+
+    def _leads_from_known(self, at: tuple[str, str], left: Sequence[str]) -> bool:
+        """Whether the other end of a line is clamped where axes are known, and holds its twist; left: not known yet."""
+        name, end = at
+        other = "start" if end == "end" else "end"
+        held, point = self._system.clamp(name, other), getattr(self._system.lines[name], other)
+        if held is None or held.swivel or point in left:
+            return False
+        return held.normal is not None or point in self._system.rigid
+
+    def _axes(self, point: str) -> Floats | None:
+        """Axes (3, 3) of what carries a point; None: nothing that is free does."""
+        row = self._rows.get(point)
+        return None if row is None else self.bodies[row, FRAME:V].reshape(3, 3)
+
+    def _shape(self, name: str, directions: Mapping[str, Any] | None) -> Model:
+        return build(self._scene(name, (), directions), spare=False)
+
+    def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
+        """The scene of a line between the places of its points; of one that is carried, with the point."""
+        if name not in self._scenes:
+            self._scenes[name] = self._system.scene_of(name)
+        return self._system.scene_of(name, carried, self._at, directions, self._scenes[name])
+
+    def _directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
+        """Inertial directions in which the line is clamped, by end; left: points whose axes are not known yet."""
+        found: dict[str, Any] = {}
+        line = self._system.lines[name]
+        for k, (end, point) in enumerate((("start", line.start), ("end", line.end))):
+            axes = self._axes(point)
+            if point in left:
+                found[end] = None
+            elif axes is not None and self._given is not None and self._given[self._names.index(name), k, TURNS]:
+                found[end] = seated(self._given[self._names.index(name), k], axes)
+            elif axes is not None and (name, end) in self._at_rigid:
+                found[end] = tuple(tuple((axes @ x).tolist()) for x in self._at_rigid[name, end])
+            else:
+                found[end] = self._system.direction(name, end)
+        clamps = [self._system.clamp(name, end) for end in ("start", "end")]
+        if all(x is not None and not x.swivel for x in clamps) and found["start"] and found["end"]:
+            found["start"], found["end"] = untwisted(found["start"], found["end"])
+        return found
+
+    def model(self, name: str) -> Model:
+        """The model of a line: its loads with the points that it carries, its first shape between held places."""
+        system, l = self._system, self._names.index(name)
+        directions = self._directions(name)
+        clamps = [system.clamp(name, end) for end in ("start", "end")]
+        model = with_springs(self._shape(name, directions), [x.bend_stiffness if x else None for x in clamps])
+        carried = system.carried(name)
+        if carried:
+            other = build(self._scene(name, carried, directions), like=model)
+            held = [k for k, end in enumerate(("start", "end")) if clamps[k] is not None]
+            other = with_clamps(other, model.line, held)
+            other.ends.values.frame[held] = model.ends.values.frame[held]
+            model = replace(other, start=model.start, start_shape=model.start_shape)
+        for k, point in enumerate((system.lines[name].start, system.lines[name].end)):
+            found, body, axes = system.points[point], system.body_of(point), self._axes(point)
+            if clamps[k] is not None and axes is not None and self._given is None:
+                kind = WITH_POINT if point in system.rigid else WITH_BODY
+                self.seats[l, k] = seat_of(model.ends.values.frame[k], axes, kind)
+            if isinstance(found, Fairlead) and isinstance(body, FixedBody) and body.motion is not None:
+                motion = self.known.setdefault(found.body, KnownMotion(body, model.sea))
+                seat = seat_of(model.ends.values.frame[k], frame_of(body.rotation)) if clamps[k] is not None else None
+                model.ends.motions[k] = FairleadMotion(motion, found.place, seat)
+        return model
 
 
 def balanced_places(system: System, model: SystemModel) -> tuple[Floats, Floats] | None:
@@ -133,7 +243,7 @@ def balanced_places(system: System, model: SystemModel) -> tuple[Floats, Floats]
     All loads but contact, bending and what the current does; bodies do not turn.  The energy of the lines is convex in
     the places, so that Newton's method with shortened steps finds them from anywhere.
     """
-    points, count = len(model.free), len(model.bodies)
+    points, count = len(model.free), len(model.body_places)
     held = {name: np.array(system.first_place(name)) for name in system.points if not system.is_joined(name)}
     if not points + count or not held:
         return model.places, model.body_places

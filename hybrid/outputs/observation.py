@@ -10,14 +10,24 @@ operation and one product with a sparse matrix (output_grid) serve the batch.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from copy import copy
 from functools import cached_property
+from types import MappingProxyType
 
 import numpy as np
 
 from hybrid.kernels.link import link_of
 from hybrid.kernels.observed_outputs import observed
-from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, LENGTH_OUT, PAYOUT_POWER, SEABED_ENERGY, SELF_CONTACT_ENERGY
+from hybrid.kernels.report import (
+    CONTACT_FORCE,
+    FORCE_A,
+    LENGTH_OUT,
+    PAYOUT_POWER,
+    SEABED_ENERGY,
+    SELF_CONTACT_ENERGY,
+    STRETCH_ENERGY,
+)
 from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside
@@ -56,8 +66,11 @@ def last(x: Floats) -> Floats:
 class Observation:
     """A batch of states looked at, as computed and (`corrected`) with what leaving bending out shifts it by."""
 
-    def __init__(self, line: Line, sea: Sea, grid: Grid, batch: Batch) -> None:
-        self.line, self.sea, self.grid, self.batch = line, sea, grid, batch
+    def __init__(
+        self, line: Line, sea: Sea, grid: Grid, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})
+    ) -> None:
+        """varied: arrays (nb, ...) of the line by name, where it is another one in every output."""
+        self.line, self.sea, self.grid, self.batch, self._varied = line, sea, grid, batch, varied
         self.shift: Shift | None = None
         self._corrects: Observation | None = None  # the observation that this one corrects
 
@@ -81,6 +94,12 @@ class Observation:
     def _plain(self) -> Observation:
         """As computed.  (An attribute that refers to itself would keep a batch until garbage is searched for.)"""
         return self._corrects or self
+
+    def of_line(self, name: str, at: int | slice) -> Floats:
+        """Values of the line at nodes or cells, (..., nb), or (..., 1) where they are the same in all outputs."""
+        if name in self._varied:
+            return np.moveaxis(self._varied[name][:, at], 0, -1)
+        return np.asarray(getattr(self.line, name)[at][..., None])
 
     # ---- what was computed --------------------------------------------------------------------
 
@@ -126,7 +145,7 @@ class Observation:
         """
         if self._corrects is not None:
             return self._corrects._observed
-        M, strain, energy, bend = observed(self.line, self.batch)
+        M, strain, energy, bend = observed(self.line, self.batch, self._varied)
         if len(M) < self.batch.t.size:  # a catenary has neither
             M = strain = np.broadcast_to(np.zeros(1), (self.batch.t.size, *M.shape[1:]))
         return last(M), last(strain), last(energy), bend.T
@@ -146,7 +165,7 @@ class Observation:
             t = 1.5 * self.d[first] - 0.5 * self.d[second] if len(self.d) > 1 else self.d[first]
             if self.line.element[first] or (self.shift is not None and self.shift.clamped[k]):
                 t = self.batch.frame[:, k, 2::3].T  # a clamp or guide knows the tangent
-            if self._loaded(k):
+            if self.loaded(k):
                 ends.append(self._end_tension(k))
             else:
                 force = self.reaction(k) if k else -self.reaction(k)
@@ -250,7 +269,6 @@ class Observation:
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
-        line = self.line
         out = np.zeros((len(self.grid.side_nodes), 2, self.batch.t.size))
         for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
             side = out[o : o + b - a + 1]
@@ -260,11 +278,10 @@ class Observation:
             side[:, 0] = self.bends[a : b + 1]
             if b - a < 2:
                 continue
-            for row, one, two, x, x1, x2 in (
-                (0, 1, 2, line.s[a], line.s[a + 1], line.s[min(a + 2, b)]),
-                (-1, -2, -3, line.s[b], line.s[b - 1], line.s[max(b - 2, a)]),
-            ):
+            first, last = (a, a + 1, min(a + 2, b)), (b, b - 1, max(b - 2, a))
+            for row, one, two, nodes in ((0, 1, 2, first), (-1, -2, -3, last)):
                 if b - a >= 4:
+                    x, x1, x2 = (self.of_line("s", k) for k in nodes)
                     p = (x - x1) / (x2 - x1)
                     side[row, 0] = np.maximum(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
                 else:
@@ -283,25 +300,35 @@ class Observation:
             cell, inner = (node, node + 1) if rod else (node - 1, node - 1)
             if not self.line.element[inner]:
                 continue
-            EI = self.batch.stiffness(inner, self.line).T[:2].mean(axis=0) * self.line.hn[inner]
+            EI = self.batch.stiffness(inner, self.line).T[:2].mean(axis=0) * self.of_line("hn", inner)
             long = self.line.h[cell] ** 2 * self.T[cell] > UNRESOLVED**2 * EI
             mine, its = (first, last) if rod else (last, first)
             strains[mine, 0] = np.where(long, strains[its, 0], strains[mine, 0])
 
     def _strains_of_rod(self, side: Floats, a: int, b: int) -> None:
         """Curvature and twist (b - a + 1, 2, nb) of a rod from node a to node b."""
-        k = self._observed[1][a : b + 1] / self.line.hn[a : b + 1, None, None]
+        k = self._observed[1][a : b + 1] / self.of_line("hn", slice(a, b + 1))[:, None]
         side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
         for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
             if not self.line.element[node]:  # a joint or an end without element: strain of the moment that is given
                 side[row] = self._strain_of_moment(node, cell)
             elif node in self._changes and self.line.element[2 * cell + 1 - node]:
                 side[row] = self._strain_of_moment(node, cell)  # the moment is one, the stiffness is not
+            elif node in (0, self.line.h.size):  # an angular spring at a clamp bends, but does not twist
+                side[row, 1] *= self.line.hn[node] / (0.5 * self.line.h[cell])
+            if self.line.tension_twist.size and b - a > 1:
+                side[row, 1] -= self._twist_to_node(cell, cell + 1 if cell == node else cell - 1)
 
     @cached_property
     def _changes(self) -> set[int]:
         """Nodes where one section ends and the next begins."""
         return {int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes}
+
+    def _twist_to_node(self, cell: int, inner: int) -> Floats:
+        """Twist (nb,) 1/m by which tension turns the middle of a cell more than its end at a node."""
+        h, T = self.line.h, self.batch.T
+        more = (T[:, cell] - T[:, inner]) * h[cell] / (h[cell] + h[inner])
+        return np.asarray(2.0 * self.line.tension_twist[cell] / h[cell] * more)
 
     def _strain_of_moment(self, node: int, cell: int) -> Floats:
         """Curvature and twist (2, nb) at a rod's end that carries the given moment (at a joint that of its zone)."""
@@ -312,10 +339,14 @@ class Observation:
         inner = cell + 1 if cell == node else cell
         if not line.element[inner]:
             return np.zeros((2, self.batch.t.size))
-        B = self.batch.stiffness(inner, line).T * line.hn[inner]
-        k0 = (line.k0[inner] / line.hn[inner])[:, None]
+        hn = self.of_line("hn", inner)
+        B = self.batch.stiffness(inner, line).T * hn
+        k0 = line.k0[inner][:, None] / hn
         a1, d, M = self.batch.a1[:, cell].T[None], self.d[cell : cell + 1], self.node_moment[node : node + 1]
         body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque])
+        if line.tension_twist.size:
+            k0 = k0 + np.zeros_like(body)
+            k0[2] -= 2.0 * line.tension_twist[cell] / line.h[cell] * self.batch.T[:, cell]
         k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
         return np.stack([np.hypot(k[0], k[1]), k[2]])
 
@@ -357,10 +388,10 @@ class Observation:
             force = force - self.shift.resultants[k]
         if held.all():
             return np.asarray(force)
-        given = out * self._end_tension(k) * self.d[first] if self._loaded(k) else b.force[:, k].T
+        given = out * self._end_tension(k) * self.d[first] if self.loaded(k) else b.force[:, k].T
         return np.where(held, force, given)
 
-    def _loaded(self, k: int) -> bool:
+    def loaded(self, k: int) -> bool:
         """Whether there is a point load at end k."""
         s = self.line.s
         return any(abs(x - s[-k]) < 1e-9 * s[-1] for x in self.grid.loads)
@@ -380,7 +411,8 @@ class Observation:
 
     @cached_property
     def touchdown(self) -> Touchdown:
-        return touchdown(self.line, self._depth, self._plain.r)
+        s = self._varied["s"].T if "s" in self._varied else self.line.s[:, None]
+        return touchdown(s, self._depth, self._plain.r)
 
     @property
     def contact(self) -> Floats:
@@ -414,7 +446,9 @@ class Observation:
         """
         kinetic, bending, torsion, stretch, potential = self._observed[2]
         if self.batch.turn.size:
-            torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN])
+            torsion = torsion + torsion_energy(self.line, self.batch.turn[:, :, TURN], self.batch.T)
+        if self.line.law.size:
+            stretch = self.batch.report[:, STRETCH_ENERGY]
         return {
             "kinetic": kinetic, "bending": bending, "torsion": torsion, "stretch": stretch, "potential": potential,
             "contact": self.batch.report[:, SEABED_ENERGY],

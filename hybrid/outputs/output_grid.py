@@ -25,9 +25,16 @@ class Rows(NamedTuple):
     begin: NDArray[np.int64]
     columns: NDArray[np.int64]
     weights: Floats
+    outputs: int = 0  # 0: one matrix for all; else so many, one below the other, each for one output
+    size: int = 0  # columns of each
 
     def __matmul__(self, x: Floats) -> Floats:
-        """The product with x (n, ...), along its first axis."""
+        """The product with x (n, ...), along its first axis; of several matrices with x (n, ..., outputs)."""
+        if self.outputs:
+            one = self._replace(outputs=0)
+            apart = np.ascontiguousarray(np.moveaxis(x, -1, 0)).reshape(self.outputs * self.size, *x.shape[1:-1])
+            found = (one @ apart).reshape(self.outputs, -1, *x.shape[1:-1])
+            return np.ascontiguousarray(np.moveaxis(found, 0, -1))
         out = np.zeros((self.begin.size - 1, math.prod(x.shape[1:])))
         x = np.require(x, float, ("C", "W"))
         add_rows(self.begin, self.columns, self.weights, x.reshape(x.shape[0], out.shape[1]), out)
@@ -89,9 +96,8 @@ class Grid:
 
         and the next begins; after: a point on a cut shows the side after it; kept: those of loads where no force acts.
         """
-        self.s = s = np.require(s, float, ("C", "W"))  # so that kernels have one signature
-        nodes_s = np.require(nodes_s, float, ("C", "W"))
-        self.loads, self.changes = tuple(loads), tuple(changes)
+        nodes_s = np.require(nodes_s, float, ("C", "W"))  # so that kernels have one signature
+        self.loads, self.changes, self.after = tuple(loads), tuple(changes), after
         self.parts = stretches(zones, loads)
         bounds = np.array([self.parts[0].s_a, *(part.s_b for part in self.parts)])
         cuts = np.abs(nodes_s - bounds[:, None]).argmin(axis=1)  # their nodes
@@ -99,9 +105,27 @@ class Grid:
         self.spans = [(a, b, a + i) for i, (a, b) in enumerate(pairwise(cuts.tolist()))]
         self.side_nodes = [node for a, b, _ in self.spans for node in range(a, b + 1)]
 
-        self._x, self._cuts, self._kept = nodes_s, cuts, frozenset(kept)
-        self._stretch = np.searchsorted(bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1], s)
-        self._first, self._last = cuts[self._stretch], cuts[self._stretch + 1]  # nodes of the stretch of each point
+        self._cuts, self._kept = cuts, frozenset(kept)
+        self._joints = bounds[1:-1] + (-1e-12 if after else 1e-12) * nodes_s[-1]
+        self._put(nodes_s, s)
+
+    def _put(self, nodes_s: Floats, s: Floats) -> None:
+        self._x, self.s = nodes_s, np.require(s, float, ("C", "W"))
+        self._stretch = np.searchsorted(self._joints, s)
+        self._first, self._last = self._cuts[self._stretch], self._cuts[self._stretch + 1]  # of each point's stretch
+
+    def moved(self, nodes_s: Floats, s: Floats) -> Grid:
+        """The grid of the same stretches with nodes (N+1,) m elsewhere in them, and points s (ns,) m."""
+        other = Grid.__new__(Grid)
+        for name in ("loads", "changes", "after", "parts", "spans", "side_nodes", "_cuts", "_kept", "_joints"):
+            setattr(other, name, getattr(self, name))
+        other._put(nodes_s, s)
+        return other
+
+    @property
+    def points(self) -> Floats:
+        """(ns, 1) m, or (ns, nb) of a grid that varies: its points, on the line."""
+        return self.s[:, None]
 
     @cached_property
     def _middles(self) -> Floats:

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
+from types import MappingProxyType
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -16,10 +18,14 @@ from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
 from hybrid.outputs.observation import Observation, size
 from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.varying_grid import VaryingGrid
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
 from hybrid.store.records import THERE, there
+
+if TYPE_CHECKING:
+    from hybrid.outputs.quantities import Quantities
 
 
 @dataclass(frozen=True)
@@ -39,7 +45,7 @@ class Probe:
 
 _S, _SX, _X, _E, _EX = ("s",), ("s", "xyz"), ("xyz",), ("edge",), ("edge", "xyz")
 # Of a line that touches nothing; where a section without torsional stiffness becomes catenary.
-MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link")
+MAY_BE_NAN = ("touchdown", "touchdown_position", "turns/twist", "turns/link", "von_mises")
 PROBES: dict[str, Probe] = {
     "position": Probe("m", "position of the centreline", _SX, lambda v: v.grid.nodes @ v.r, frame="inertial"),
     "velocity": Probe("m/s", "velocity of the centreline", _SX, lambda v: v.grid.nodes @ v.v, frame="inertial"),
@@ -121,7 +127,9 @@ WORK = {
 
 
 # Quantities that may have two values at a point: what a point load, a joint or a change of section makes of them.
-SIDED = ("tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear")
+SIDED = (
+    "tension", "theta", "phi", "curvature", "twist", "bending_moment", "torque", "shear", "wall_tension", "von_mises",
+)  # fmt: skip
 # Probes that a corrected catenary has as a rod has them.
 CORRECTED = ("bending_moment", "moment_start", "moment_end", "shear")
 # What leaving bending out makes of each quantity, by name: unit, description, dimensions.
@@ -179,6 +187,7 @@ class Observer:
         finest: Floats | None = None,
         gauges: Sequence[tuple[float, float]] = (),
         payout: bool = False,
+        quantities: Quantities | None = None,
     ) -> None:
         """loads: arc lengths of point loads, m; kinds: of zones that there may be, None: those that there are.
 
@@ -188,7 +197,7 @@ class Observer:
         jumps: arc lengths, m, inside the line and in s where a quantity may have two values; changes: those where one
         section ends and the next begins; finest: m, all nodes that there may be, where cells follow the curvature;
         gauges: places (x, y), m, where the elevation of the sea is recorded.
-        payout: whether the line is paid out.
+        payout: whether the line is paid out; quantities: what the scene asks for beside the usual.
         """
         self._finest = finest
         self._cuts, self._changes = tuple(sorted({*loads, *jumps})), tuple(changes)
@@ -207,12 +216,17 @@ class Observer:
             if (not p.needs or has.intersection(p.needs.split()) or (corrected and name in CORRECTED))
             and (only is None or name in only)
         }
+        self.quantities = quantities
+        may_be_nan: tuple[str, ...] = MAY_BE_NAN
+        if self.quantities is not None:
+            self._probes |= self.quantities.probes()
+            may_be_nan += tuple(self.quantities.wanted)
         self._errors, self._corrected = errors, corrected
         self.first_energy: float | None = None  # J, at the first output
         self._with_work = with_work
         sizes = {"s": s.size, "xyz": 3, "edge": 2}
         fields = [
-            Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in MAY_BE_NAN)
+            Field(name, p.unit, p.description, tuple(sizes[x] for x in p.dims), p.dims, p.frame, name in may_be_nan)
             for name, p in self._probes.items()
         ]
         right = [f for f in fields if f.name in SIDED and (only is None or f"right/{f.name}" in only)]
@@ -263,25 +277,38 @@ class Observer:
 
     def _place(self, line: Line, sea: Sea, zones: Sequence[Zone], s: Floats) -> None:
         self.line, self.sea, self.zones = line, sea, tuple(zones)
-        self.s, jumps, length = s, self.jumps, line.s[-1]
-        if s[-1] > length * (1.0 + NEAR):  # what is on the reel has the values of the fairlead
-            s, jumps = np.minimum(s, length), np.minimum(jumps, length)
+        self.s, jumps, (begin, end) = s, self.jumps, line.s[[0, -1]]
+        if s[-1] > end * (1.0 + NEAR) or s[0] < begin - NEAR * end:  # on the reel: the values of the fairlead
+            s, jumps = np.clip(s, begin, end), np.clip(jumps, begin, end)
         self.grid = Grid(line.s, zones, s, self._cuts, self._changes, kept=self._unloaded)
         self._after = Grid(line.s, zones, jumps, self._cuts, self._changes, True, self._unloaded)
 
+    def on_varied(self, line: Line, sea: Sea, zones: Sequence[Zone], nodes: Floats) -> Observer:
+        """The same fields of a line whose nodes (nb, N+1) m are elsewhere in every output; zones: of the first."""
+        other, ends = copy(self), (nodes[:, :1], nodes[:, -1:])
+        other.line, other.sea, other.zones = line, sea, tuple(zones)
+        s, jumps = np.clip(self.s, *ends), np.clip(self.jumps, *ends)  # on the reel: the values of the fairlead
+        other.grid = VaryingGrid(nodes, zones, s, self._cuts, self._changes, kept=self._unloaded)
+        other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded)
+        return other
+
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:
+        return self.rows_of(self.zones)
+
+    def rows_of(self, zones: Sequence[Zone]) -> list[tuple[str, float, float]]:
+        """Zones as they stand in the file."""
         names = {"catenary": "corrected"} if self._corrected else {}
-        return [(names.get(z.kind, z.kind), z.s_a, z.s_b) for z in self.zones]
+        return [(names.get(z.kind, z.kind), z.s_a, z.s_b) for z in zones]
 
     @property
     def writes_criteria(self) -> bool:
         """Whether criteria are among the fields."""
         return bool(self._criteria)
 
-    def look(self, batch: Batch) -> Observation:
-        """Outputs as computed, for `values_of`."""
-        return Observation(self.line, self.sea, self.grid, batch)
+    def look(self, batch: Batch, varied: Mapping[str, Floats] = MappingProxyType({})) -> Observation:
+        """Outputs as computed, for `values_of`; varied: arrays (nb, ...) of the line, where it is another in each."""
+        return Observation(self.line, self.sea, self.grid, batch, varied)
 
     def values_of(
         self, plain: Observation, ratios: Floats | None = None, shift: Shift | None = None

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from hybrid.kernels.bed import planes_under
-from hybrid.kernels.state import Floats, Line, Sea
+from hybrid.kernels.state import Floats, Sea
 
 
 class Touchdown(NamedTuple):
@@ -45,17 +45,18 @@ def sum_down(x: Floats) -> Floats:
     return np.asarray(np.add.accumulate(x, axis=0)[-1])
 
 
-def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
+def touchdown(s: Floats, p: Floats, r: Floats) -> Touchdown:
     """First and last contact, exact for the chords that the contact force is integrated over.
 
-    p: (N+1, nb) m, as of `penetration`; r: (N+1, 3, nb) m, of the nodes.
+    s: (N+1, 1) m, or (N+1, nb) where it differs; p: (N+1, nb) m, as of `penetration`; r: (N+1, 3, nb) m, of the nodes.
     """
     below = np.flatnonzero(p.max(axis=1) > 0.0)  # nodes that touch in any output
     if not below.size:
         nb = p.shape[1]
         return Touchdown(np.full((2, nb), np.nan), np.full((2, 3, nb), np.nan), np.zeros(nb))
-    low, high = max(int(below[0]) - 1, 0), min(int(below[-1]) + 1, line.h.size)
-    a, b, s, r = p[low:high], p[low + 1 : high + 1], line.s[low : high + 1], r[low : high + 1]
+    low, high = max(int(below[0]) - 1, 0), min(int(below[-1]) + 1, len(s) - 1)
+    a, b, r = p[low:high], p[low + 1 : high + 1], r[low : high + 1]
+    s = np.broadcast_to(s[low : high + 1], (len(r), p.shape[1]))
     touching = np.maximum(a, b) > 0.0
     # the part x0 .. x1 of every touching cell that is in contact
     change = np.where(b == a, 1.0, b - a)
@@ -65,12 +66,12 @@ def touchdown(line: Line, p: Floats, r: Floats) -> Touchdown:
     outputs = np.arange(p.shape[1])
     cells = np.stack([touching.argmax(axis=0), len(a) - 1 - touching[::-1].argmax(axis=0)])
     x = np.stack([x0[cells[0], outputs], x1[cells[1], outputs]])
-    h = np.diff(s)
-    edges = s[cells] + x * h[cells]
+    h = np.diff(s, axis=0)
+    edges = s[cells, outputs] + x * h[cells, outputs]
     # (2, nb, 3), because numpy puts what is indexed by arrays first
     near, far = r[cells, :, outputs], r[cells + 1, :, outputs]
     places = np.moveaxis(near + x[:, :, None] * (far - near), -1, 1)
-    grounded = sum_down(h[:, None] * np.where(touching, x1 - x0, 0.0))
+    grounded = sum_down(h * np.where(touching, x1 - x0, 0.0))
     lies = touching.any(axis=0)
     return Touchdown(np.where(lies, edges, np.nan), np.where(lies, places, np.nan), grounded)
 

@@ -28,6 +28,7 @@ from hybrid.scene.base import (
     refuse,
     unwrap,
 )
+from hybrid.scene.quantities import Quantities
 
 _RATIO = "length of the last cell over the length of the first, geometric grading; absent: 1 [-]"
 
@@ -278,7 +279,8 @@ def usual_model(cable: Any) -> RodModel | CatenaryModel | AdaptiveModel:
     sections = getattr(cable, "sections", ())
     if not any(x.bending_stiffness is not None for x in sections):
         return CatenaryModel()
-    return RodModel() if any(x.anisotropic or x.turns for x in sections) else AdaptiveModel()
+    stays = any(x.anisotropic or x.turns or x.curve is not None for x in sections)
+    return RodModel() if stays else AdaptiveModel()
 
 
 Model = Annotated[
@@ -401,6 +403,10 @@ class Output(Table):
 
     elevation: tuple[Pair, ...] | None = Field(
         default=None, min_length=1, description="places [x, y] at which the elevation of the sea is recorded [m]"
+    )
+    quantities: Quantities = Field(
+        default={},
+        description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
     )
     exact: Truth = Field(
         default=False,

@@ -78,6 +78,7 @@ class Table(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False, field_title_generator=_title)
 
     former: ClassVar[Mapping[str, str]] = {}  # of each former name, the key of today
+    instead: ClassVar[Mapping[str, str]] = {}  # of keys that other tables have and this one cannot: what to do
 
     @classmethod
     def __pydantic_init_subclass__(cls, **kwargs: Any) -> None:

@@ -91,6 +91,11 @@ def no_pivot(matrix: Matrix, least: float) -> bool:
     return False
 
 
+def without_turns(motion: Motion) -> Motion | None:
+    """A motion that is given by tables without its rotations; None: there is nothing else."""
+    return motion.model_copy(update={"roll": None, "pitch": None, "yaw": None}) if motion.shifts() else None
+
+
 class Member(Table):
     """A cylinder of a body that water flows around: drag, added mass and the force of waves after Morison."""
 
@@ -137,10 +142,7 @@ class FixedBody(Table):
     @property
     def shift(self) -> Motion | None:
         """The motion of the body without its rotations, as far as tables give it."""
-        motion = self.motion
-        if motion is None or motion.file is not None or not motion.shifts():
-            return None
-        return motion.model_copy(update={"roll": None, "pitch": None, "yaw": None})
+        return None if self.motion is None or self.motion.file is not None else without_turns(self.motion)
 
     @model_validator(mode="after")
     def _fairleads_are_points(self) -> FixedBody:

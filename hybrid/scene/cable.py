@@ -21,6 +21,16 @@ from hybrid.scene.base import (
     refuse,
 )
 from hybrid.scene.sea import Current, CurrentPoint, CurrentProfile, PowerLawCurrent, Seabed, UniformCurrent, Waves
+from hybrid.scene.stretch import (
+    Curve,
+    CurveFile,
+    DynamicStiffness,
+    TensionStrain,
+    interpolated,
+    refuse_rows,
+    rows_of,
+    slopes,
+)
 
 
 class Fluid(Table):
@@ -158,6 +168,37 @@ class Contact(Table):
     )
 
 
+# Strain that a section bears which says nothing: beyond that of steel, chain and most ropes.
+USUAL_STRAIN = 0.05
+
+
+# Young's modulus of steel, Pa.
+STEEL = 2.07e11
+
+
+class Pipe(Table):
+    """A round pipe that carries all of a section: for wall tension and von Mises stress; changes no other result."""
+
+    wall: Positive = Field(description="wall thickness [m]")
+    outer_diameter: Positive | None = Field(
+        default=None, description="outer diameter of the pipe, without coatings; absent: diameter of the section [m]"
+    )
+    modulus: Positive = Field(default=STEEL, description="Young's modulus of the wall; absent: that of steel [Pa]")
+    pressure: NonNegative = Field(
+        default=0.0, description="pressure inside over that of the air, at the height pressure_z [Pa]"
+    )
+    pressure_z: Number | None = Field(
+        default=None, description="height at which pressure is given; absent: the surface of the water, else 0 [m]"
+    )
+    content_density: NonNegative = Field(
+        default=0.0, description="density of the content, whose weight is part of the section's mass [kg/m^3]"
+    )
+    max_stress: Positive | None = Field(
+        default=None,
+        description="largest von Mises stress allowed; changes nothing that is computed; absent: none [Pa]",
+    )
+
+
 class Section(Table):
     """A stretch of cable with constant properties, per metre of unstretched length."""
 
@@ -169,10 +210,20 @@ class Section(Table):
     axial_stiffness: Positive | None = Field(
         default=None, description="axial stiffness EA (modulus E x area); absent: inextensible [N]"
     )
-    max_strain: Positive = Field(
-        default=0.05,
-        description="strain that the section bears; a computation that exceeds it stops; an inextensible section has "
-        "none [-]",
+    tension_strain: TensionStrain | None = Field(
+        default=None,
+        description="instead of axial_stiffness: rows [strain, tension in N] from [0, 0] on, both rising, straight "
+        "between them; in compression the first piece goes on; or {file: rope.csv} [-, N]",
+    )
+    dynamic_stiffness: DynamicStiffness | None = Field(
+        default=None,
+        description="of a fibre rope, whose axial_stiffness or tension_strain is the static one; absent: the same, "
+        "however fast",
+    )
+    max_strain: Positive | None = Field(
+        default=None,
+        description="strain that the section bears; a computation that exceeds it stops; absent: 0.05, or the last of "
+        "tension_strain; an inextensible section has none [-]",
     )
     bending_stiffness: OneOrTwo | None = Field(
         default=None,
@@ -181,6 +232,12 @@ class Section(Table):
     )
     torsional_stiffness: NonNegative | None = Field(
         default=None, description="torsional stiffness GJ; absent: bending stiffness / 1.3 [N m^2]"
+    )
+    tension_torque: Number | None = Field(
+        default=None,
+        description="torque that a tension makes in a section held against turning, of a helical armour; its sign is "
+        "that of the lay: a free end turns by minus tension_torque over torsional_stiffness per metre and N; absent: "
+        "none [N m per N]",
     )
     min_bend_radius: Positive | None = Field(
         default=None,
@@ -205,6 +262,9 @@ class Section(Table):
     intrinsic_curvature: Vector | None = Field(
         default=None, description="curvatures about a1 and a2 and twist of the unloaded cable, material axes [1/m]"
     )
+    pipe: Pipe | None = Field(
+        default=None, description="the wall of a pipe, for wall_tension and von_mises in the result; absent: neither"
+    )
     drag: Drag | None = Field(default=None, description="drag coefficients Cd; need a fluid and a diameter")
     added_mass: AddedMass | None = Field(
         default=None, description="added mass coefficients Ca; need a fluid and a diameter"
@@ -219,6 +279,42 @@ class Section(Table):
         return isinstance(self.bending_stiffness, tuple) and self.bending_stiffness[0] != self.bending_stiffness[1]
 
     @property
+    def curve(self) -> Curve | None:
+        """Rows of strain and tension [N], of a section that is stretched by no constant stiffness; else None."""
+        if self.tension_strain is not None:
+            return rows_of(self.tension_strain)
+        if self.dynamic_stiffness is None or self.axial_stiffness is None:
+            return None
+        return (0.0, 0.0), (1.0, self.axial_stiffness)
+
+    @property
+    def stiffness(self) -> float | None:
+        """Axial stiffness [N]; of a table its stiffest piece, of a rope the dynamic one without mean tension."""
+        if self.dynamic_stiffness is not None:
+            return self.dynamic_stiffness.constant
+        return max(slopes(rows_of(self.tension_strain))) if self.tension_strain is not None else self.axial_stiffness
+
+    @property
+    def strain_limit(self) -> float:
+        """Strain that is borne, where the section stretches: max_strain, or without one the last of a table."""
+        if self.max_strain is not None:
+            return self.max_strain
+        return USUAL_STRAIN if self.tension_strain is None else rows_of(self.tension_strain)[-1][0]
+
+    @property
+    def borne(self) -> float:
+        """Tension at that strain, at rest [N]; infinite where nothing stretches."""
+        if self.stiffness is None:
+            return math.inf
+        return interpolated(self.curve, self.strain_limit) if self.curve else self.stiffness * self.strain_limit
+
+    def strain(self, tension: float) -> float:
+        """Strain at rest under a tension [N]."""
+        if self.stiffness is None:
+            return 0.0
+        return interpolated(self.curve, tension, over_tension=True) if self.curve else tension / self.stiffness
+
+    @property
     def turns(self) -> bool:
         """Whether its cross-sections are given an inertia of their own."""
         return self.rotary_inertia is not None and self.rotary_inertia not in (0, (0, 0))
@@ -227,6 +323,26 @@ class Section(Table):
     def weakest_bending(self) -> float | None:
         """The smaller bending stiffness [N m^2], None if none is given."""
         return min(self.bending_stiffness) if isinstance(self.bending_stiffness, tuple) else self.bending_stiffness
+
+    @model_validator(mode="after")
+    def _tension_twists(self) -> Section:
+        if not self.tension_torque:
+            return self
+        missing = [
+            Finding((key,), f"a number > 0, in {unit}, because tension_torque {why}", f"add `{key}: ...` ({unit})")
+            for key, unit, why in (
+                ("axial_stiffness", "N", "lengthens a cable that turns"),
+                ("torsional_stiffness", "N m^2", "turns it"),
+            )
+            if not getattr(self, key)
+        ]
+        most = math.inf if self.diameter is None else self.diameter
+        if abs(self.tension_torque) > most:
+            expected = f"at most the diameter, {most:g} m in size: the armour lies within it, and 0.1 of it is much"
+            missing.append(Finding(("tension_torque",), expected, "is it in N mm per N? then divide it by 1000"))
+        if missing:
+            refuse(missing)
+        return self
 
     @model_validator(mode="after")
     def _density_is_possible(self) -> Section:
@@ -243,10 +359,52 @@ class Section(Table):
         return self
 
     @model_validator(mode="after")
+    def _one_law_of_stretch(self) -> Section:
+        table, dynamic = self.tension_strain, self.dynamic_stiffness
+        if table is not None and self.axial_stiffness is not None:
+            fix = "leave one of the two out"
+            refuse([Finding(("axial_stiffness",), "nothing, because tension_strain says how it stretches", fix)])
+        if table is not None:
+            refuse_rows(table, "tension_strain")
+        if dynamic is None:
+            return self
+        if self.curve is None:
+            expected = "an axial_stiffness or tension_strain beside it, the static one"
+            refuse([Finding(("dynamic_stiffness",), expected, "add `axial_stiffness: ...` (N)")])
+        else:
+            stiffest = max(slopes(self.curve))
+            if not dynamic.constant > stiffest:
+                expected = f"more than the largest static stiffness, {stiffest:.6g} N"
+                fix = "a rope answers stiffer to what is fast; are the two exchanged?"
+                refuse([Finding(("dynamic_stiffness", "constant"), expected, fix)])
+        return self
+
+    @model_validator(mode="after")
     def _limits_leave_room(self) -> Section:
         if self.min_tension is not None and self.max_tension is not None and self.min_tension >= self.max_tension:
             expected = f"a tension below max_tension, {self.max_tension:g} N"
             refuse([Finding(("min_tension",), expected, "are the two exchanged?")])
+        return self
+
+    @model_validator(mode="after")
+    def _pipe_fits(self) -> Section:
+        if self.pipe is None:
+            return self
+        given = self.pipe.outer_diameter
+        outer = given if given is not None else self.diameter
+        if outer is None:
+            fix = "add `outer_diameter: ...` (m), or a diameter of the section"
+            refuse([Finding(("pipe", "outer_diameter"), "a number, in m", fix, "nothing")])
+        assert outer is not None
+        if given is not None and self.diameter is not None and given > self.diameter * (1.0 + 1e-9):
+            expected = f"at most the diameter of the section, {self.diameter:g} m, coatings included"
+            refuse([Finding(("pipe", "outer_diameter"), expected, "check both diameters (m)")])
+        if 2.0 * self.pipe.wall >= outer:
+            expected = f"less than half the outer diameter, {0.5 * outer:g} m"
+            refuse([Finding(("pipe", "wall"), expected, "wall is in m, one wall alone")])
+        if self.intrinsic_curvature is not None and any(self.intrinsic_curvature):
+            expected = "nothing, because the stress of a pipe is that of its curvature from straight (pipe)"
+            refuse([Finding(("intrinsic_curvature",), expected, "leave it out, or leave pipe out")])
         return self
 
     @model_validator(mode="after")
@@ -278,11 +436,14 @@ class Cable(Table):
     @property
     def reach(self) -> float:
         """Length at which the first of its sections bears no more, pulled straight [m]."""
-        elastic = [x for x in self.sections if x.axial_stiffness is not None]
-        most = min((x.axial_stiffness * x.max_strain for x in elastic if x.axial_stiffness), default=0.0)  # N
-        return self.length + sum(x.length * most / x.axial_stiffness for x in elastic if x.axial_stiffness)
+        most = min(x.borne for x in self.sections)  # N
+        return self.length + (sum(x.length * x.strain(most) for x in self.sections) if math.isfinite(most) else 0.0)
 
     @property
     def inextensible(self) -> bool:
         """Whether no section can stretch."""
-        return all(section.axial_stiffness is None for section in self.sections)
+        return all(section.stiffness is None for section in self.sections)
+
+    def files(self) -> list[str]:
+        """Paths of the files that are read."""
+        return [x.tension_strain.file for x in self.sections if isinstance(x.tension_strain, CurveFile)]

@@ -8,9 +8,10 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Callable, Iterator, Mapping
+from functools import cache
 from typing import Any
 
-from hybrid.scene import attachment_checks, payout_checks, sea_checks, start_checks
+from hybrid.scene import attachment_checks, payout_checks, sea_checks, start_checks, torque_checks
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
     AdaptiveModel,
@@ -29,9 +30,10 @@ from hybrid.scene.analysis import (
     ZonesModel,
 )
 from hybrid.scene.base import Finding, Place
-from hybrid.scene.cable import Cable, Contact, Environment
-from hybrid.scene.ends import Ends
+from hybrid.scene.cable import Cable, Contact, Environment, Section
+from hybrid.scene.ends import Clamped, Ends, Free, Pinned
 from hybrid.scene.plane import TYPED, plane_of
+from hybrid.scene.quantities import of_one_line
 from hybrid.scene.start_checks import SAME_LENGTH
 
 # Error of a step, as a part of the length, that positions of 16 digits can still tell from their own round-off.
@@ -42,10 +44,16 @@ def contradictions(tables: Mapping[str, Any]) -> list[Finding]:
     """All contradictions among `tables` (name -> table); checks that lack a table are skipped."""
     found: list[Finding] = []
     for check in CHECKS:
-        needs = list(inspect.signature(check).parameters)
+        needs = _needs(check)
         if all(name in tables for name in needs):
             found += check(**{name: tables[name] for name in needs})
     return found
+
+
+@cache
+def _needs(check: Callable[..., Iterator[Finding]]) -> tuple[str, ...]:
+    """Names of the tables that a check looks at."""
+    return tuple(inspect.signature(check).parameters)
 
 
 def _fluid_and_diameter(environment: Environment, cable: Cable) -> Iterator[Finding]:
@@ -158,6 +166,27 @@ def _zones_that_move(model: Model, solver: str) -> Iterator[Finding]:
         yield Finding(("solver",), "elimination, because the arbiter corrects nothing (model)", "or leave solver out")
 
 
+def _stretch_by_a_law(cable: Cable, model: Model, ends: Ends, solver: str) -> Iterator[Finding]:
+    """Sections whose tension is no multiple of strain, where that cannot be computed."""
+    places: list[tuple[Place, Section]] = [(("cable", "sections", i), x) for i, x in enumerate(cable.sections)]
+    paid = [name for name, x in ends.named().items() if isinstance(x, Pinned | Clamped) and x.payout is not None]
+    for name in paid:
+        reel = getattr(ends, name).payout.reel or ()
+        places += [(("ends", name, "payout", "reel", i), x) for i, x in enumerate(reel)]
+    for here, section in places:
+        if section.curve is None:
+            continue
+        key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
+        if isinstance(model, AdaptiveModel):
+            fix = "write `model: rod`, `model: catenary`, or zones of both"
+            yield Finding((*here, key), "nothing, because zones move (model: adaptive)", fix)
+        for name in paid:
+            fix = "give axial_stiffness (N), at the tension you expect"
+            yield Finding((*here, key), f"nothing, because line is paid out (ends.{name}.payout)", fix)
+        if solver == "shooting":
+            yield Finding(("solver",), f"elimination, because of {key} of a section", "leave solver out")
+
+
 def _arbiter_steps(time: Time | None, solver: str, accuracy: Accuracy | None) -> Iterator[Finding]:
     if solver == "shooting" and accuracy is not None:
         yield Finding(
@@ -241,6 +270,23 @@ def _elevation_has_waves(output: Output, environment: Environment) -> Iterator[F
     if output.elevation and (environment.fluid is None or environment.fluid.waves is None):
         expected = "nothing, because the sea has no waves (environment.fluid.waves)"
         yield Finding(("output", "elevation"), expected, "leave it out, or give waves")
+
+
+def _quantities(output: Output, cable: Cable, ends: Ends, environment: Environment, solver: str) -> Iterator[Finding]:
+    free = [name for name in ("start", "end") if isinstance(getattr(ends, name), Free)]
+    yield from of_one_line(output.quantities, cable.length, free, environment.seabed is not None)
+    if output.quantities and solver == "shooting":
+        yield Finding(("output", "quantities"), "nothing, because shooting records none (solver)", "leave it out")
+
+
+def _pressure_of_pipes(cable: Cable, environment: Environment, solver: str) -> Iterator[Finding]:
+    for i, section in enumerate(cable.sections):
+        here: Place = ("cable", "sections", i, "pipe")
+        if section.pipe is not None and environment.fluid is not None and environment.fluid.surface is None:
+            expected = "nothing, because the fluid has no surface, on which the pressure outside depends"
+            yield Finding(here, expected, "add `surface: 0` (m) to environment.fluid, or leave pipe out")
+        if section.pipe is not None and solver == "shooting":
+            yield Finding(here, "nothing, because shooting records no stress (solver)", "leave it out")
 
 
 def _moment_is_there(accuracy: Accuracy | None, model: Model) -> Iterator[Finding]:
@@ -356,11 +402,14 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _corrections_know_the_bending,
     _stretches_on_cable,
     _zones_that_move,
+    _stretch_by_a_law,
     _arbiter_steps,
     _releases,
     _tolerance_is_felt,
     _accuracy_has_errors,
     _elevation_has_waves,
+    _quantities,
+    _pressure_of_pipes,
     _moment_is_there,
     _sections_that_come_and_go,
     _in_a_plane,
@@ -369,7 +418,8 @@ CHECKS: tuple[Callable[..., Iterator[Finding]], ...] = (
     _mesh_spans,
     _layers_are_meshed,
     _output_on_cable,
-    payout_checks.payout_at_the_end,
+    payout_checks.payout_at_an_end,
     payout_checks.payout_stands_alone,
     payout_checks.payout_has_fixed_steps,
+    torque_checks.tension_twists,
 )

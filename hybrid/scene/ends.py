@@ -56,7 +56,7 @@ class Release(Table):
         return self
 
 
-_PAYOUT = "line is paid out here, or taken in, by a winch; at `end` alone; absent: its length stays"
+_PAYOUT = "line is paid out here, or taken in, by a winch; at one end alone; absent: its length stays"
 _RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
 
 

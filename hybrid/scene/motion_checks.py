@@ -145,8 +145,8 @@ def _too_fast(cable: Cable, motion: Motion, record: Record | None) -> Iterator[F
     An end that is pulled at v sends a wave of tension along the cable, which stretches it by v/c behind its front,
     c = sqrt(EA/m); with acceleration a, no more than the whole cable of length L does by its inertia, a L/c^2.
     """
-    waves = [(math.sqrt(s.axial_stiffness / s.mass) if s.axial_stiffness else STEEL_WAVES, s) for s in cable.sections]
-    c, most = max(((c, s.max_strain) for c, s in waves), key=lambda pair: pair[0] * pair[1])
+    waves = [(math.sqrt(s.stiffness / s.mass) if s.stiffness else STEEL_WAVES, s) for s in cable.sections]
+    c, most = max(((c, s.strain_limit) for c, s in waves), key=lambda pair: pair[0] * pair[1])
     limit = f"at most {100 * most:g} % of stretch (max_strain)"
 
     def stretch(speed: float, acceleration: float) -> float:

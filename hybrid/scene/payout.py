@@ -1,4 +1,4 @@
-"""A line that is paid out from a reel or taken in, at its end: how its length changes with time."""
+"""A line that is paid out from a reel or taken in, at one of its ends: how its length changes with time."""
 
 from __future__ import annotations
 
@@ -79,8 +79,8 @@ class Payout(Table):
     reel: tuple[Section, ...] | None = Field(
         default=None,
         min_length=1,
-        description="sections on the reel at t = 0, in the order in which they leave it; absent: as much of the last "
-        "section of the cable as is needed",
+        description="sections on the reel at t = 0, in the order in which they leave it; absent: as much of the "
+        "section of the cable at this end as is needed",
     )
     longest: Positive | None = Field(
         default=None,

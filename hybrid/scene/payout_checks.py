@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
 
 from hybrid.scene.accuracy import Accuracy
 from hybrid.scene.analysis import (
@@ -19,34 +18,44 @@ from hybrid.scene.analysis import (
 from hybrid.scene.base import Finding, Place
 from hybrid.scene.cable import Cable, Contact, Section
 from hybrid.scene.ends import Clamped, Ends, Pinned
+from hybrid.scene.payout import Payout
 
-AT: tuple[str, ...] = ("ends", "end", "payout")
-LEAVE_OUT = "leave it out, or ends.end.payout"
-
-
-def _payout(end: Any) -> bool:
-    return isinstance(end, Pinned | Clamped) and end.payout is not None
+LEAVE_OUT = "leave it out, or ends.{0}.payout"
 
 
-def payout_at_the_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
-    """Line is paid out at the end alone, of straight undamped sections, and the end is not let go."""
-    if _payout(ends.start):
-        fix = "exchange start and end, with the order of the sections: s counts from the end that is not at the winch"
-        yield Finding(("ends", "start", "payout"), "nothing, because line is paid out at ends.end", fix)
-    end = ends.end
-    if not isinstance(end, Pinned | Clamped) or end.payout is None:
+def _winch(ends: Ends) -> tuple[str, Pinned | Clamped, Payout] | None:
+    """The end at which line is paid out, by name, and how; the last one of two."""
+    found = None
+    for name, end in ends.named().items():
+        if isinstance(end, Pinned | Clamped) and end.payout is not None:
+            found = name, end, end.payout
+    return found
+
+
+def payout_at_an_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
+    """Line is paid out at one end alone, of straight undamped sections, and that end is not let go."""
+    found = _winch(ends)
+    if found is None:
         return
-    if isinstance(end, Clamped) and end.payout.winch is not None:
+    name, end, payout = found
+    at: Place = ("ends", name, "payout")
+    if name == "end" and getattr(ends.start, "payout", None) is not None:
+        yield Finding(("ends", "start", "payout"), "nothing, because line is paid out at ends.end", "leave one out")
+    if payout.winch is not None and name == "start":
+        fix = "exchange start and end, with the order of the sections, or give the rate"
+        yield Finding((*at, "winch"), "nothing, because a winch holds a tension at ends.end alone", fix)
+    if payout.winch is not None and isinstance(end, Clamped):
         fix = "write kind: pinned, or give the rate"
-        yield Finding((*AT, "winch"), "nothing, because a winch holds a tension at a pinned end alone", fix)
+        yield Finding((*at, "winch"), "nothing, because a winch holds a tension at a pinned end alone", fix)
     if end.release_at is not None:
-        yield Finding(("ends", "end", "release_at"), "nothing, because line is paid out there", LEAVE_OUT)
+        expected = "nothing, because line is paid out there"
+        yield Finding(("ends", name, "release_at"), expected, LEAVE_OUT.format(name))
     places: list[tuple[Place, Section]] = [(("cable", "sections", i), x) for i, x in enumerate(cable.sections)]
-    places += [((*AT, "reel", i), x) for i, x in enumerate(end.payout.reel or ())]
+    places += [((*at, "reel", i), x) for i, x in enumerate(payout.reel or ())]
     for at, section in places:
         if section.damping is not None and section.damping.stiffness:
             expected = (
-                "nothing, because a line that is paid out (ends.end.payout) has no stiffness-proportional damping"
+                f"nothing, because a line that is paid out (ends.{name}.payout) has no stiffness-proportional damping"
             )
             yield Finding((*at, "damping", "stiffness"), expected, "leave it out; damping.mass can stay")
 
@@ -55,22 +64,24 @@ def payout_stands_alone(
     ends: Ends, cable: Cable, model: Model, contact: Contact, solver: str, resolution: Resolution | None
 ) -> Iterator[Finding]:
     """Of zones that stay, without contact with itself, by elimination."""
-    if not _payout(ends.end):
+    found = _winch(ends)
+    if found is None:
         return
+    name, because = found[0], f"because line is paid out (ends.{found[0]}.payout)"
     moving = isinstance(model, AdaptiveModel | CorrectedModel)
     if moving or (isinstance(model, ZonesModel) and any(isinstance(x, CorrectedZone) for x in model.zones)):
-        expected = "catenary, rod, or zones of both that stay, because line is paid out (ends.end.payout)"
+        expected = f"catenary, rod, or zones of both that stay, {because}"
         yield Finding(("model",), expected, "write `model: catenary`, or `model: rod`", f"kind: {model.kind}")
     for i, item in enumerate(cable.attachments):
         if item.kind == "swivel":
-            expected = "no swivel, because line is paid out (ends.end.payout)"
+            expected = f"no swivel, {because}"
             yield Finding(("cable", "attachments", i, "kind"), expected, "leave it out: a pinned end turns freely")
     if contact.self:
-        yield Finding(("contact", "self"), "false, because line is paid out (ends.end.payout)", LEAVE_OUT)
+        yield Finding(("contact", "self"), f"false, {because}", LEAVE_OUT.format(name))
     if solver == "shooting":
-        yield Finding(("solver",), "elimination, because line is paid out (ends.end.payout)", "leave solver out")
+        yield Finding(("solver",), f"elimination, {because}", "leave solver out")
     if resolution is not None:
-        expected = "nothing, because line is paid out (ends.end.payout), and its cells are given"
+        expected = f"nothing, {because}, and its cells are given"
         yield Finding(("resolution",), expected, "place cells by `mesh`")
 
 
@@ -78,9 +89,10 @@ def payout_has_fixed_steps(
     ends: Ends, time: Time | None, accuracy: Accuracy | None, output: Output
 ) -> Iterator[Finding]:
     """With steps that are given, and no run to compare with."""
-    if not _payout(ends.end) or time is None:
+    found = _winch(ends)
+    if found is None or time is None:
         return
-    because = "because line is paid out (ends.end.payout), of which no error is estimated"
+    because = f"because line is paid out (ends.{found[0]}.payout), of which no error is estimated"
     if time.controlled:
         fix = "add `step: ...` (s)" if time.step is None else "leave tolerance out"
         yield Finding(("time", "step" if time.step is None else "tolerance"), f"a fixed step, in s, {because}", fix)

@@ -123,6 +123,11 @@ def _leaves(
 def _sections(cable: Cable, ends: Ends, plane: Plane) -> Iterator[Finding]:
     """Sections whose own axes would take the cable out of the plane."""
     for i, x in enumerate(cable.sections):
+        if x.tension_torque:
+            expected = "nothing or 0, because dimension is 2 and there is no torsion"
+            yield Finding(
+                ("cable", "sections", i, "tension_torque"), expected, "write `dimension: 3`, or leave dimension out"
+            )
         kappa = x.intrinsic_curvature if x.intrinsic_curvature is not None and any(x.intrinsic_curvature) else None
         if not x.anisotropic and kappa is None:
             continue

@@ -9,7 +9,7 @@ from pydantic import AfterValidator, Discriminator, Field, Tag, model_validator
 from hybrid.scene.attachments import ADDED_MASS, DRAG_AREA, HEIGHT, SHAPE, Shape
 from hybrid.scene.base import Finding, Kinds, NonNegative, Positive, Table, Text, Vector, by_kind, refuse
 from hybrid.scene.ends import Body, Free, Loading
-from hybrid.scene.motion_tables import TURNS, Motion
+from hybrid.scene.motion_tables import Motion
 
 _BREAK = (
     "when what holds the point fails, at a time or after the first step with so large a force of its lines: they hang "
@@ -51,17 +51,9 @@ class FixedPoint(Table):
     motion: Motion | None = Field(default=None, description="how the point moves; absent: not at all")
     break_at: Failure | None = Field(default=None, description=_BREAK)
 
-    @model_validator(mode="after")
-    def _does_not_turn(self) -> FixedPoint:
-        if self.motion is not None:
-            turns = [name for name in self.motion.harmonics() if name in TURNS]
-            expected = "no rotation, because lines turn freely at a point"
-            refuse(Finding(("motion", name), expected, "leave it out") for name in turns)
-        return self
-
 
 class FreePoint(Table):
-    """A point that lines alone hold: a knot, a buoy, a clump.  It turns freely and has no moment of inertia."""
+    """A point that lines alone hold: a knot, a buoy, a clump.  It has no moment of inertia."""
 
     kind: Literal["free"] = Field(default="free", description="moves with the lines that meet there")
     initial_guess: Vector = Field(
@@ -98,7 +90,7 @@ class FreePoint(Table):
 
 
 class Fairlead(Table):
-    """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body, and lines turn freely there."""
+    """A point of a body: a fairlead, a padeye, a hang-off.  It moves with the body."""
 
     kind: Literal["fairlead"] = Field(default="fairlead", description="a point of a body, and moves with it")
     body: Name = Field(description="name of the body")

@@ -186,8 +186,16 @@ def parse_either(text: str, file: str = "", overrides: Sequence[str] = ()) -> tu
 def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) -> SceneError:
     """The same refusal with line and column of what was found only after reading (cells, steps, motions)."""
     try:
-        root, _ = from_text(text_of(path))
-    except (SceneError, Unreadable):
+        return located_in(error, text_of(path), str(path), overrides)
+    except SceneError:
+        return error
+
+
+def located_in(error: SceneError, text: str, file: str = "", overrides: Sequence[str] = ()) -> SceneError:
+    """The same of a scene whose text is at hand."""
+    try:
+        root, _ = from_text(text)
+    except Unreadable:
         return error
     if isinstance(root.value, dict):
         for each in overrides:
@@ -199,7 +207,7 @@ def located(error: SceneError, path: str | Path, overrides: Sequence[str] = ()) 
         if complaint.line is None and place is not None:
             complaint = replace(complaint, line=place[0], column=place[1])
         complaints.append(complaint)
-    return SceneError(in_order(complaints), error.file or str(path))
+    return SceneError(in_order(complaints), error.file or file)
 
 
 def validate_scene(data: Any) -> Scene:
@@ -248,15 +256,30 @@ def _resolve_motion_files(data: Any, folder: Path) -> None:
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
     files.append(("environment", "seabed", "depths"))
     for path in files:
-        here = data
-        for key in path:
-            here = here.get(key) if isinstance(here, dict) else None
-        carried = here.get("vessel") if isinstance(here, dict) else None
+        _make_absolute(_at(data, path), folder)
+    lines = data.get("lines") if isinstance(data, dict) else None
+    for cable in (("cable",), *(("lines", name) for name in (lines if isinstance(lines, dict) else ()))):
+        sections = _at(data, (*cable, "sections"))
+        for section in sections if isinstance(sections, list) else ():
+            _make_absolute(_at(section, ("tension_strain",)), folder)
+
+
+def _at(data: Any, path: Iterable[str]) -> Any:
+    """What is at a path of keys; None: nothing."""
+    for key in path:
+        data = data.get(key) if isinstance(data, dict) else None
+    return data
+
+
+def _make_absolute(here: Any, folder: Path) -> None:
+    """Make the paths of files that a table names absolute."""
+    if isinstance(here, dict):
+        carried = here.get("vessel")
         rao = carried.get("rao") if isinstance(carried, dict) else None
         if isinstance(carried, dict) and isinstance(rao, str) and rao and "\0" not in rao:
             carried["rao"] = str((folder / rao).absolute())
-        name = here.get("file") if isinstance(here, dict) else None
-        if isinstance(here, dict) and isinstance(name, str) and name and "\0" not in name:
+        name = here.get("file")
+        if isinstance(name, str) and name and "\0" not in name:
             here["file"] = str((folder / name).absolute())
 
 

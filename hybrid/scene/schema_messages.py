@@ -109,7 +109,9 @@ def _unknown_key(root: type[Table], path: Place, spot: Spot) -> Finding:
     kinds = [kind for kind, other in spot.beside.items() if key in other.model_fields or key in other.former]
     own = {name: f for name, f in owner.model_fields.items() if name != "kind"}
     known = {name: f.description or "" for name, f in own.items()}
-    if key in owner.former:
+    if key in owner.instead:
+        fix = owner.instead[key]
+    elif key in owner.former:
         fix = f"leave one of them out: {key} is the former name of {owner.former[key]}"
     elif kinds and "kind" in owner.model_fields and not any(speaks_of(text, key) for text in known.values()):
         fix = f"use kind: {' or '.join(kinds)}, which takes {key}"

@@ -15,10 +15,10 @@ from hybrid.scene.read import complaint_of, in_order, text_of
 from hybrid.scene.schema_messages import explain
 from hybrid.scene.yaml_source import Node, Unreadable, from_data, from_text
 
-# Runs of a study: a million scenes are planned in a minute, and nobody computes more of them.
+# Cases of a study: each is a row in memory.
 MOST_CASES = 1_000_000
 # Columns of the table of cases that a variable must not be called.
-TAKEN = ("case", "status", "reason", "events", "cpu", "steps", "position", "time")
+TAKEN = ("case", "status", "reason", "events", "cpu", "steps", "s")
 
 _NAME = re.compile(r"[A-Za-z_]\w*")
 
@@ -129,6 +129,9 @@ class Kept(Table):
     """What is kept of one quantity of each run."""
 
     quantity: Text = Field(description="a quantity of the result, such as tension or end_force_end")
+    line: Text | None = Field(
+        default=None, description="of which line, in a scene of several lines; absent: of what stands beside its lines"
+    )
     at: (
         Annotated[
             Annotated[Number, Tag("<table>")] | Annotated[tuple[Number, ...], Field(min_length=1), Tag("<list>")],

@@ -8,7 +8,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import chain
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field, ValidationError, model_validator
 
@@ -16,11 +16,13 @@ from hybrid.errors import SceneError
 from hybrid.scene.analysis import CatenaryModel, Equilibrium, Mesh, Model, RodModel, Time, ZonesModel
 from hybrid.scene.attachments import Attachment
 from hybrid.scene.base import Finding, Place, Positive, Table, Text, Truth, Whole, refuse
-from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody
+from hybrid.scene.bodies import FixedBody, FreeBody, RigidBody, turned, without_turns
 from hybrid.scene.cable import Cable, Environment, Section
+from hybrid.scene.connections import ClampedConnection, Connections, connection_findings
 from hybrid.scene.ends import Clamped, End, Ends, Free, Pinned, Triple
 from hybrid.scene.motion_checks import motion_findings
 from hybrid.scene.points import Failure, Fairlead, FixedPoint, FreePoint, Name, Point
+from hybrid.scene.quantities import Quantities, of_several_lines
 from hybrid.scene.schema import Scene, missing_time
 from hybrid.scene.suggestions import nearest
 
@@ -35,10 +37,13 @@ class LineFailure(Failure):
 
 
 class JoinedLine(Table):
-    """A line from one point to another, with s = 0 at `start`; its ends turn freely."""
+    """A line from one point to another, with s = 0 at `start`."""
 
     start: Name = Field(description="name of the point at s = 0")
     end: Name = Field(description="name of the point at s = length")
+    connections: Connections = Field(
+        default=Connections(), description="how its ends are connected to the points; absent: they turn freely"
+    )
     sections: tuple[Section, ...] = Field(min_length=1, description="sections in order from s = 0 on")
     attachments: tuple[Attachment, ...] = Field(
         default=(), description="floats, clumps and modules on the line, in any order"
@@ -71,6 +76,11 @@ class JoinedLine(Table):
         if self.model is not None and not isinstance(self.model, RodModel | CatenaryModel | ZonesModel):
             expected = "rod, catenary, or zones that stay, because several lines are computed together"
             refuse([Finding(("model",), expected, "write `model: rod`", f"kind: {self.model.kind}")])
+        for i, section in enumerate(self.sections):
+            if section.tension_torque:
+                expected = "nothing or 0, because several lines are computed together, which know no torque of tension"
+                fix = "leave it out, or compute this line alone, with `cable` and `ends`"
+                refuse([Finding(("sections", i, "tension_torque"), expected, fix)])
         if self.start == self.end:
             refuse([Finding(("end",), f"a point other than {self.start}, where the line starts", "name another point")])
         return self
@@ -85,6 +95,10 @@ class SystemOutput(Table):
     points: Annotated[Whole, Field(ge=2)] = Field(
         default=101, description="points along each line, evenly over its length, its ends included [-]"
     )
+    quantities: Quantities = Field(
+        default={},
+        description="further quantities over time by name: forces and angles at ends, touchdown, layback, clearance",
+    )
     errors: Truth | None = Field(
         default=None,
         description="estimate how wrong a motion is, by mesh and time step, by two coarser runs; absent: not",
@@ -93,6 +107,19 @@ class SystemOutput(Table):
 
 class System(Table):
     """Several lines, the points where they meet, what acts on them, and what is asked."""
+
+    instead: ClassVar[Mapping[str, str]] = {
+        "accuracy": "several lines are not refined by themselves: `output: {errors: true}` says how wrong the result "
+        "is; then a finer `mesh` of the lines, or a smaller time.step",
+        "ends": "a scene of several lines has points, at which its lines end",
+        "initial": "several lines start in equilibrium, found from initial_guess of points and bodies",
+        "model": "each line has its own: lines.NAME.model",
+        "mesh": "each line has its own: lines.NAME.mesh",
+        "resolution": "cells of several lines are given: lines.NAME.mesh",
+        "contact": "lines of a system do not touch each other or themselves",
+        "solver": "leave it out: several lines are solved by elimination",
+        "dimension": "leave it out: several lines are computed in space",
+    }
 
     title: Text = Field(default="", description="a line for people; it heads plots and reports")
     environment: Environment = Field(default=Environment(), description="what acts on the lines from outside")
@@ -148,6 +175,35 @@ class System(Table):
         failure = self.lines[name].break_at
         return failure is not None and failure.end == end
 
+    def clamp(self, name: str, end: str) -> ClampedConnection | None:
+        """How a line is clamped at an end; None: it turns freely."""
+        found = getattr(self.lines[name].connections, end)
+        return found if isinstance(found, ClampedConnection) else None
+
+    def clamped_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
+        """Names of the lines that are clamped at a point, each with the end that is."""
+        return [at for at in self.lines_at(point) if self.clamp(*at) is not None]
+
+    @property
+    def rigid(self) -> tuple[str, ...]:
+        """Names of the free points to which lines are clamped."""
+        return tuple(name for name in self.free if self.clamped_at(name))
+
+    def direction(self, name: str, end: str) -> tuple[Triple, Triple | None] | None:
+        """Inertial directions in which a line is clamped at rest, or first: its tangent and its material axis a1.
+
+        None: it turns freely, or is clamped to a free point, whose axes are not known here.
+        """
+        held = self.clamp(name, end)
+        point = getattr(self.lines[name], end)
+        if held is None or held.tangent is None or isinstance(self.points[point], FreePoint):
+            return None
+        body = self.body_of(point)
+        if body is None:
+            return held.tangent, held.normal
+        turn = body.rotation if isinstance(body, FixedBody) else body.initial_rotation
+        return turned(turn, held.tangent), None if held.normal is None else turned(turn, held.normal)
+
     def carried(self, name: str) -> tuple[str, ...]:
         """Ends (`start`, `end`) at which a line carries the free point, its mass and loads: the first line does."""
         line = self.lines[name]
@@ -157,28 +213,41 @@ class System(Table):
             if getattr(line, key) in self.free and self.lines_at(getattr(line, key))[0] == (name, key)
         )
 
-    def scene_of(self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None) -> Scene:
+    def scene_of(
+        self, name: str, carrying: Sequence[str] = (), places: Mapping[str, Triple] | None = None,
+        directions: Mapping[str, tuple[Triple, Triple | None]] | None = None, scene: Scene | None = None,
+    ) -> Scene:  # fmt: skip
         """A line between the places where its points are, or are first looked for, as a scene of its own.
 
         carrying: ends at which the free point is a body of the line, not a place that is held.  places: of the points
         that are joined [m], wherever they are; None: where the scene has them, and what is wrong with the line is a
-        ValidationError of pydantic.
+        ValidationError of pydantic.  directions: as of `direction` by end, in place of those.  scene: of the line with
+        its points where the scene has them, if it is known.
         """
         line = self.lines[name]
         first = self._places(line)
         ends: dict[str, End] = {}
         for key in ("start", "end"):
             point, body = self.points[getattr(line, key)], self.body_of(getattr(line, key))
+            held = self.direction(name, key) if directions is None else directions.get(key)
+            place, motion = first[key], None
             if isinstance(point, FixedPoint):
-                ends[key] = Pinned(position=point.position, motion=point.motion)
+                place, motion = point.position, point.motion
+                if held is None and motion is not None and self.clamped_at(getattr(line, key)):
+                    motion = motion if motion.file is not None else without_turns(motion)
             elif isinstance(body, FixedBody):  # that it turns as well is for the model
-                ends[key] = Pinned(position=first[key], motion=body.shift)
-            elif key in carrying and isinstance(point, FreePoint):
+                motion = body.shift
+            elif places is not None:
+                place = places[getattr(line, key)]
+            if key in carrying and isinstance(point, FreePoint):
                 ends[key] = point.end.model_copy(update={"initial_guess": first[key]} if point.is_body else {})
+            elif held is None:
+                ends[key] = Pinned(position=place, motion=motion)
             else:
-                ends[key] = Pinned(position=first[key] if places is None else places[getattr(line, key)])
+                swivel = getattr(line.connections, key).swivel
+                ends[key] = Clamped(position=place, tangent=held[0], normal=held[1], swivel=swivel, motion=motion)
         if places is not None:
-            return self.scene_of(name).model_copy(update={"ends": Ends(**ends)})
+            return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends)})
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": Equilibrium(), "model": line.chosen_model,
@@ -221,8 +290,10 @@ class System(Table):
     def _lines_join_points(self) -> System:
         refuse(self._unknown_names())
         refuse(chain(self._lonely_points(), self._floating_groups()))
+        refuse(connection_findings(self))
         refuse(chain.from_iterable(self._body_findings(name) for name in self.bodies))
         refuse(chain.from_iterable(self._line_findings(name) for name in self.lines))
+        refuse(of_several_lines(self.output.quantities, self.lines, self.environment.seabed is not None))
         return self
 
     def _unknown_names(self) -> Iterator[Finding]:

@@ -32,7 +32,8 @@ MOST_VALUES = 500_000
 # Characters beyond which ruamel.yaml would take longer than all the rest of reading a scene, a tenth of a second.
 LONG = 10_000
 
-_PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.[A-Za-z_]\w*(\[\d+\])*)*")
+# Names of points, bodies and lines are keys too: they may begin with a digit, and have hyphens and blanks in them.
+_PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.\w[\w -]*(\[\d+\])*)*")
 _WRITE_OUT = "begin anew from an example; every scene is a few tables within tables"
 _QUOTE = "write one word before the colon; close brackets and braces"
 _EXAMPLE = "key=value, such as time.step=0.005 or cable.sections[0].mass=2"
@@ -280,7 +281,8 @@ def override(root: Node, text: str, schema: type[Table]) -> Complaint | None:
     name = name.strip()
     if not equals or not _PATH.fullmatch(name):
         return Complaint("override", text or "nothing", _EXAMPLE, "name the key as `hybrid plan` and docs/scene.md do")
-    path: Place = tuple(int(p) if p.isdigit() else p for p in re.findall(r"\w+", name))
+    parts = re.findall(r"\[\d+|[^.\[\]]+", name)
+    path: Place = tuple(int(p[1:]) if p[0] == "[" else p for p in parts)
     try:
         value, complaints = from_text(value_text) if value_text.strip() else (Node(None), [])
     except Unreadable as error:

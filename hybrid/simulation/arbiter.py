@@ -26,7 +26,7 @@ from hybrid.store.format import Field
 from hybrid.store.reader import Result, open_result
 from hybrid.store.writer import Recorder
 
-_RECORDED = ("position", "velocity", "tension", "theta", "phi", "bending_moment", "torque")
+RECORDED = ("position", "velocity", "tension", "theta", "phi", "bending_moment", "torque")
 _STEP_FIELDS = (
     Field("t", "s", "time at the end of the step"),
     Field("iterations", "", "Newton iterations", dtype="int64"),
@@ -95,7 +95,7 @@ def _recorder(scene: Scene, target: Path | io.BytesIO, overwrite: bool, steps: t
     size = {"s": s.size, "xyz": 3}
     fields = [
         Field(name, p.unit, p.description, tuple(size[x] for x in p.dims), p.dims, p.frame)
-        for name, p in ((name, PROBES[name]) for name in _RECORDED)
+        for name, p in ((name, PROBES[name]) for name in RECORDED)
     ]
     return Recorder(
         target, grid_s=s, fields=fields, step_fields=steps, attributes={"title": scene.title, "solver": "shooting"},

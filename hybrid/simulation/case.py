@@ -19,12 +19,13 @@ from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model, build
 from hybrid.model.output_points import OutputPoints, output_points
-from hybrid.model.payout import longest_out
+from hybrid.model.payout import longest_out, winch_side
 from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
+from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
@@ -90,7 +91,7 @@ class Case:
         points: of the result that is continued; None: those of the scene.
         """
         self.scene, self.criterion, self.changes = scene, criterion, tuple(changes)
-        self.points = points if points is not None else output_points(scene, longest_out(scene))
+        self.points = points if points is not None else output_points(scene, longest_out(scene), not winch_side(scene))
         self.progress = ProgressReporter(None, 1.0)
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
@@ -213,7 +214,7 @@ class Case:
         paths = {
             path
             for x in (self.scene, *(x.scene for x in self.changes))
-            for path in (*x.ends.files(), *x.environment.files())
+            for path in (*x.ends.files(), *x.environment.files(), *x.cable.files())
         }
         return {path: digest_of(Path(path)) for path in sorted(paths)}
 
@@ -358,11 +359,12 @@ class Case:
         run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times], target is not None)
         if points is None:
             points = self.points.s
-        observer = self._observer(model, switching is not None, points, None if target is not None else COMPARED)
+        observer = self.observer(model, switching is not None, points, None if target is not None else COMPARED)
         interrupted = self.interrupted if target is not None else lambda: self._unwanted.is_set() or self.interrupted()
         return TimeLoop(run, observer, target, self._report, interrupted)
 
-    def _observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
+    def observer(self, model: Model, zones_move: bool, s: Floats, only: Sequence[str] | None) -> Observer:
+        """What records outputs at points s (m); only: names of quantities, None: all."""
         kinds = {"rod", "catenary"} if zones_move else None
         criteria = (
             [(x.name, x.ratio) for x in CRITERIA] if self.scene.output.criteria and zones_move and not only else ()
@@ -373,7 +375,7 @@ class Case:
             model.corrected, self.points.jumps, section_changes(self.scene),
             model.layout.finest.nodes if follows_curvature(self.scene) and model.layout and not only else None,
             () if only else self.scene.output.elevation or (),
-            model.payout is not None,
+            model.payout is not None, None if only else quantities_of(self.scene),
         )  # fmt: skip
 
     def _report(self, run: Transient, finished: bool) -> None:

@@ -32,7 +32,7 @@ from hybrid.kernels.forces import PLANAR
 from hybrid.kernels.newton import ASSEMBLY, RUN, Task
 from hybrid.kernels.run import blank_job
 from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import NO_TORSION, Floats, Line, Sea, State, Work
+from hybrid.kernels.state import NO_TENSION_TORQUE, NO_TORSION, TENSION_TORQUE, Floats, Line, Sea, State, Work
 from hybrid.kernels.zone_line import blank_kinds_job, blank_line_job, fill_kinds, fill_line
 from hybrid.kernels.zone_step import Zones, blank_zone_job
 from hybrid.kernels.zone_switch import AFTER, BEFORE, NUMBERS, RELAXES, TIME, begin_switch, blank_switch_job, end_switch
@@ -106,7 +106,11 @@ class CellChanges:
         switching, model, run = owner.switching, owner.model, owner.run
         if switching is None or not (switching.compiled and switching.zones.clock[z.SHARE] > 0.0):
             return False
-        plain = owner.correction is None and run.contact is None and not model.line.torsion.size
+        plain = (
+            owner.correction is None
+            and run.contact is None
+            and not (model.line.torsion.size or model.line.tension_twist.size)
+        )
         watches = owner.envelope is not None and owner.envelope.itself.watching
         return plain and not watches and bool(model.line.bits & PLANAR or not switching.manager.twisted)
 
@@ -127,6 +131,7 @@ class CellChanges:
     def _line(self, k: int, cells: int) -> Line:
         line = self._owner.model.line
         given = {"bits": line.bits, "plane": line.plane, "torsion": NO_TORSION}
+        given |= dict.fromkeys(TENSION_TORQUE, NO_TENSION_TORQUE)
         found: Line = self._view(self._sides[k].line, cells, lambda: given)
         return found
 

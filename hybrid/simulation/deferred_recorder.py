@@ -27,10 +27,11 @@ class DeferredRecorder:
     # --- what a TimeLoop gives it ---------------------------------------------------------------
 
     def save_batch(
-        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]]
-    ) -> None:
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
+        later: Sequence[Sequence[tuple[str, float, float]]] = (),
+    ) -> None:  # fmt: skip
         """Outputs, as of `Recorder.save_batch`."""
-        self._waiting.append(("save_batch", (times, values, zones), {}))
+        self._waiting.append(("save_batch", (times, values, zones, later), {}))
         self.last = float(times[-1])
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:

@@ -83,7 +83,7 @@ class Envelope:
         layout = model.layout if moves else None
         nodes = model.line.s.copy() if layout is None else layout.finest.nodes
         if moves and model.payout is not None:
-            nodes = model.payout.nodes
+            nodes = model.payout.along(model.payout.nodes)
         marked = model.line.s[np.flatnonzero(marks_of(scene, model))]
         self._nodes, self._marked = nodes, marked
         self.s = _doubled(nodes, marked)
@@ -100,14 +100,16 @@ class Envelope:
         beside = self.s.copy()
         beside[first] -= side
         beside[second] += side
-        self._limits = limits_along(whole_scene(scene), beside)
+        whole, begin = whole_scene(scene)
+        self._limits = limits_along(whole, beside - begin)
+        self._grows = model.payout is not None
         self.itself = SelfWatch(model)
 
     # --- what is kept -------------------------------------------------------------------------------
 
     def count_from(self, model: Model, r: Floats) -> None:
         """Displacements count from the positions r (N+1, 3) m of the nodes of a model."""
-        s, at = model.line.s, np.minimum(self._nodes, model.line.s[-1])
+        s, at = model.line.s, np.clip(self._nodes, model.line.s[0], model.line.s[-1])
         self.start[:] = Grid(s, model.zones, at, model.attached).nodes @ r
 
     def start_of(self, nodes: Floats) -> Floats:
@@ -124,11 +126,12 @@ class Envelope:
         out, places = self.bounds.copy(), _doubled(nodes, self._marked)
         columns = np.arange(places.size) - np.cumsum(second := np.append(False, places[1:] == places[:-1]))
         columns[second] = nodes.size + np.arange(self._marked.size)
-        if places.size < self.s.size and places[-1] == self.s[-1]:
+        if places.size < self.s.size and not self._grows:
             fold_extremes(places, self.s, columns, extremes, out)
             return out
         now = extremes[:, :, columns]
-        some = out[:, :, : places.size]  # of a line that is paid out there may be more
+        first = int(np.searchsorted(self.s, places[0]))
+        some = out[:, :, first : first + places.size]  # of a line that is paid out there may be more
         for row in self._rows:
             if np.isfinite(now[:, row]).all():  # else no state was computed yet
                 for bound, better in ((0, np.less), (1, np.greater)):

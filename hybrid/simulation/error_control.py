@@ -35,6 +35,7 @@ from hybrid.simulation.error_statistics import (
     STATISTICS,
     StatisticEstimate,
     estimates,
+    is_chance,
     snaps,
     statistics_of,
     windows_uncertain,
@@ -327,8 +328,10 @@ class ErrorController:
         left = (IRREGULAR_REFINEMENTS if self.irregular else most) + 1 - self._judged
         stalls = falls > STALLED or (left > 0 and verdict.ratio * falls**left > 1.0)
         hopeless = left <= 0 or (stalls if self.moves else sum(self.runs) > CPU_AT_REST)
-        met = verdict.ratio <= 1.0 and not (run.unresolved and self.free.mesh)
-        if met or hopeless or sum(self.runs) > MOST_CPU:
+        along = any(x is not None for x in (self.asked.of_curvature, self.asked.of_moment))
+        sharp = run.unresolved and self.free.mesh and (along or not self.irregular)  # else at the instant of a snap
+        met = verdict.ratio <= 1.0 and not sharp
+        if met or hopeless or sum(self.runs) > MOST_CPU or self._by_chance(verdict):
             return None
         if self.irregular:  # what neglected bending does to it is known as a bound alone, which moves no zones
             found = refined(run.resolution, verdict, self.free._replace(zones=False), IRREGULAR_FINER)
@@ -348,7 +351,9 @@ class ErrorController:
         estimate = self.statistics[LARGEST] if self.irregular else self.estimate
         assert estimate is not None
         name = {of: raw for raw, of in END_FORCES.items()}.get(verdict.name, verdict.name)
-        if not (falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES):
+        of_largest = self.irregular and verdict.statistic == LARGEST
+        diverges = falls > STALLED or estimate.falls.get(name, np.nan) > DIVERGES
+        if not (diverges or (of_largest and is_chance(self.statistics, LARGEST, name))):
             return False
         if not self.irregular:
             assert self.estimate is not None
@@ -361,6 +366,14 @@ class ErrorController:
         self.scattered = [name for raw, name in END_FORCES.items() if raw in estimate.order]  # a snap pulls at both
         return True
 
+    def _by_chance(self, verdict: Verdict) -> bool:
+        """Whether what misses is an end force that another run would differ in as much, however fine."""
+        name = {of: raw for raw, of in END_FORCES.items()}.get(verdict.name, "")
+        if not self.irregular or not name or verdict.statistic not in self.statistics:
+            return False
+        diverges = self.statistics[verdict.statistic].falls.get(name, np.nan) > DIVERGES
+        return bool(diverges) or is_chance(self.statistics, verdict.statistic, name)
+
     def _note_missed(self, verdict: Verdict) -> None:
         """Say that what was asked is not met, whose doing it is, and what to try."""
         main = max((verdict.mesh, "mesh"), (verdict.time, "time step"), (verdict.model, "model"))[1]
@@ -372,7 +385,11 @@ class ErrorController:
             try_ += ", or compare with model: rod" * (verdict.model > 0.0)
         if main == "model" and not free:
             try_ = "model: adaptive, or rod"
-        text = f"{verdict.text}; most of it is of the {main}, {len(self.runs)} runs; try: {try_}"
+        whose = f"most of it is of the {main}"
+        if self._by_chance(verdict):
+            whose = "the line snaps at other instants in every run, and finer ones differ as much"
+            try_ = f"a longer run, several seeds, or accuracy: {{{verdict.reached}}}, which this run meets"
+        text = f"{verdict.text}; {whose}, {len(self.runs)} runs; try: {try_}"
         self._notes.append(("accuracy missed", text))
 
     def checkpoint(self) -> Tree:

@@ -28,6 +28,8 @@ STATISTICS = {
     LARGEST: "largest value", "deviation": "standard deviation", "windows_largest": "mean of the windows' largest",
     "windows_smallest": "mean of the windows' smallest",
 }  # fmt: skip
+# Windows from which on their scatter is known.
+MANY = 10
 # Part of its largest force to which an end comes back where a line snaps.
 SLACKENS = 0.1
 
@@ -107,6 +109,22 @@ def _chance(after: RunSample, before: RunSample) -> np.ndarray:
         return np.zeros(2)
     differences = after.forces[:, 1:] - before.forces[:, 1:]
     return np.asarray(2.0 * np.std(differences, axis=0) / np.sqrt(len(differences)))
+
+
+def is_chance(found: Mapping[str, StatisticEstimate], statistic: str, quantity: str) -> bool:
+    """Whether a statistic of an end force differs from that of the run before by no more than chance makes it differ.
+
+    quantity: of END_FORCES, as runs call it.  Means over windows do where they differ by less than twice the standard
+    error of that difference; then the largest force of the run does where it differs by no more than single windows do.
+    """
+    means = "windows_largest" if statistic == LARGEST else statistic
+    windows, of = found.get(means), list(END_FORCES)
+    if windows is None or quantity not in of or not windows.chance.any():
+        return False
+    count, error = len(windows.run.forces), float(windows.chance[of.index(quantity)])
+    by = {x: np.sqrt(3.0) * found[x].changes.get(quantity, (np.nan,))[0] for x in (means, LARGEST)}
+    same = bool(count >= MANY and by[means] <= error)
+    return same and (statistic != LARGEST or bool(by[LARGEST] <= error * np.sqrt(count)))
 
 
 def _of_windows(forces: np.ndarray, windows: int, f: np.ufunc) -> np.ndarray:

@@ -32,7 +32,9 @@ def explanation(run: Transient, tried: Tried, dt: float) -> str:
     elif tried.outcome == Outcome.WINCH_AT_END:
         assert run.payout is not None
         least, most = run.payout.plan.shortest, run.payout.plan.longest
-        detail = f"{run.model.line.s[-1]:.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
+        detail = (
+            f"{np.ptp(run.model.line.s):.6g} m are out, of {least:.6g} m at least and {most:.6g} m (longest) at most"
+        )
     elif tried.outcome == Outcome.GAINS_ENERGY:
         detail = "the fastest point is at this place"
     elif tried.outcome == Outcome.TWISTED_TOO_FAR:

@@ -24,6 +24,8 @@ def change_loads(run: Transient, scene: Scene) -> None:
     model.line.h[:], model.line.kb[:] = old.line.h, old.line.kb  # what is on its way goes on
     model.ends.go_on_from(old.ends, run.t)
     run.scene, run.changes = scene, run.changes + 1
+    if not same_plane(monitor.home, model.plane):
+        monitor.home = None
     leaves = bool(monitor.speed) and not same_plane(old.plane, model.plane)
     if old.plane is not None and not leaves:
         model = replace(model, line=planar(model.line, old.plane), plane=old.plane)

@@ -2,24 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from hybrid.adapt.payout_cells import Flow, enter, lack_at, leave
+from hybrid.adapt.payout_cells import Flow, enter, from_far_end, leave, line_from_far_end
 from hybrid.kernels import books as b
 from hybrid.kernels import reel as p
 from hybrid.kernels import winch as w
 from hybrid.kernels.binding import Table
+from hybrid.kernels.books import CLOCK_SIZE
 from hybrid.kernels.energies import observe
-from hybrid.kernels.payout import iterate, lengthen, pay_out, stand_still
+from hybrid.kernels.payout import fit_line, iterate, lengthen, pay_out, stand_still
 from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state import Batch, Ends, Floats, Line, State
 from hybrid.model.build import Model
-from hybrid.model.payout import PayoutPlan, length_at, payout_of
+from hybrid.model.mesh import Zone
+from hybrid.model.payout import PayoutPlan, length_at, payout_of, winch_at
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.payout import SOURCES
@@ -29,6 +30,12 @@ from hybrid.solve.stepper import Stepper
 from hybrid.store.named_arrays import matched
 
 ROUND_OFF = 1e-9  # of a length
+# Arrays of a line that its length changes, and those that outputs ask for.
+CHANGES = (
+    "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar", "drag_n", "drag_t", "added_n", "added_t", "damp",
+    "tau", "buoy", "displaced", "diameter",
+)  # fmt: skip
+VARIES = ("s", "h", "ck", "mass", "force", "kb", "k0", "hn", "rotary", "polar")
 # What a checkpoint keeps of a reel.
 KEPT = ("numbers", "lack", "rate", "since", "span", "winch")
 
@@ -42,7 +49,7 @@ class PayingOut:
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out
         self.reel = self._blank(self.count)
-        self.table = Table(blank_reel_job())
+        self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
 
     def _blank(self, count: int) -> Reel:
         """Arrays of a line of so many material nodes, none of whose cells lacks anything."""
@@ -50,6 +57,7 @@ class PayingOut:
         reel = blank_reel(count + self.rides, self.law, plan.pieces, self.winch, plan.layer)
         place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
+        numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
         numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
         numbers[p.LONGEST], numbers[p.SHORTEST] = plan.limits(count)
         reel.rest[:-1], reel.rest[-1] = amount_between(plan.pieces, before, place), place - before
@@ -93,7 +101,11 @@ class PayingOut:
         """(N,) m/s2, second rates of the lengths of cells."""
         out = np.zeros(self.count + self.rides)
         out[self.count - 1] = self.reel.numbers[p.ACCELERATION]
-        return out
+        return self._ordered(out)
+
+    def _ordered(self, x: Floats) -> Floats:
+        """Values of cells, given from the far end on, in the order of the line; and back."""
+        return x if self.plan.side else x[::-1]
 
     @property
     def due(self) -> bool:
@@ -115,17 +127,26 @@ class PayingOut:
         self.count += 1 if enters else -1
         length = float(numbers[p.LENGTH])
         changed = self.on(model, length)
-        reel = self._blank(self.count)
+        reel, side = self._blank(self.count), plan.side
+        line, target = line_from_far_end(model.line, side, plan.far), line_from_far_end(changed.line, side, plan.far)
+        seen = from_far_end(state, side)
         if enters:
-            out = enter(model.line, changed.line, state, old, reel, flow, float(plan.nodes[self.count - 1]))
+            out = enter(line, target, seen, old, reel, flow, float(plan.nodes[self.count - 1]))
         else:
-            out = leave(model.line, changed.line, state, old, reel, flow)
+            out = leave(line, target, seen, old, reel, flow)
+        out = from_far_end(out, side)
         reel.numbers[p.FADING] = (reel.since + reel.span).max()
         reel.true[self.count - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
-        changed.line.h[:] = reel.true - lack_at(reel, flow.t)[0]
         self.reel = reel
+        self._fit(changed.line, reel, length, flow.t)
         ends = model.ends.at(run.t)
         return changed, out, energy(changed.line, ends, out) - energy(model.line, ends, state)
+
+    def _fit(self, line: Line, reel: Reel, length: float, t: float) -> None:
+        """Let a line have a length, m, at t (s): cells that grow hold the sections that come off the reel."""
+        reel.numbers[p.LENGTH], self._clock[b.NOW] = length, t
+        self._fitting.bind(line=line, reel=reel, clock=self._clock)
+        fit_line(self._fitting.numbers)
 
     def _flow(self, run: CompiledRun) -> Flow:
         t, dt = run.t, float(run.clock[b.LAST_DT])
@@ -137,21 +158,30 @@ class PayingOut:
             _, rate, acceleration, then = self.winch[w.LENGTH_NOW : w.ALGORITHMIC_NOW + 1].tolist()
             later = rate + (am - af) * dt * acceleration, then
         cell = self.plan.cell(self.count - 1)
-        return Flow(t, dt, rate, acceleration, (later[0], later[1]), cell, run.books.tension[0].copy())
+        return Flow(t, dt, rate, acceleration, (later[0], later[1]), cell, self._ordered(run.books.tension[0]).copy())
 
-    def looks(self, observer: Observer, model: Model, batch: Batch) -> Iterator[tuple[Observer, Observation]]:
-        """The outputs of a batch one by one, each of a line as long as it was then."""
-        for k in range(batch.t.size):
-            t = float(batch.t[k])
+    def look(
+        self, observer: Observer, model: Model, batch: Batch
+    ) -> tuple[Observer, Observation, list[tuple[Zone, ...]]]:
+        """The outputs of a batch, each of a line as long as it was then, and the zones of all but the first."""
+        line = model.line._replace(**{name: getattr(model.line, name).copy() for name in ("s", *CHANGES)})
+        line.force[:, :2] = 0.0  # but for what rounding leaves of the forces on nodes that ride
+        reel = self.reel._replace(numbers=self.reel.numbers.copy(), true=self.reel.true.copy(), stage=np.zeros(1))
+        reel.numbers[p.FADING] = 0.0
+        count = batch.t.size
+        varied = {name: np.empty((count, *getattr(line, name).shape)) for name in VARIES}
+        zones = []
+        for k, t in enumerate(batch.t.tolist()):
             if t >= self.law[0, 0] and not self.holds_tension:  # exactly, where samples interpolate
                 batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
             length = float(batch.report[k, LENGTH_OUT])
-            line = self.plan.line(self.count, length, model.line)
-            line.h[:] -= lack_at(self.reel, t)[0]
-            there = observer.on(line, model.sea.values, self.plan.zones_of(length))
-            there.first_energy = observer.first_energy
-            one = {name: x[k : k + 1] for name, x in batch._asdict().items() if x.size}
-            yield there, there.look(batch._replace(**one))
+            self._fit(line, reel, length, t)
+            zones.append(self.plan.zones_of(length))
+            for name, x in varied.items():
+                x[k] = getattr(line, name)
+        there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
+        there.first_energy = observer.first_energy
+        return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]
 
     # --- checkpoints ------------------------------------------------------------------------------
 
@@ -176,6 +206,9 @@ class PayingOut:
             raise ValueError(f"{count} nodes, of a line that has {self.plan.nodes.size} at most")
         self.count, self.law = count, law
         self.reel = self._blank(count)
+        numbers = np.asarray(given.get("numbers", np.zeros(0)))
+        if numbers.shape == (p.SIDE,):  # of a file from before there were winches at the start
+            given["numbers"] = np.concatenate([numbers, self.reel.numbers[p.SIDE :]])
         kept = matched({"winch": self.winch} | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
         if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
             raise ValueError("a length that no line has")
@@ -224,9 +257,9 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
     """Length (m; None: what the rate leads to) and rate (m/s) that are asked of a line; ValueError: they cannot be."""
     payout = payout_of(scene)
     if payout is None or paying is None:
-        raise ValueError("the scene has no ends.end.payout: the length of its line stays")
+        raise ValueError("the scene has no ends.end.payout (nor ends.start.payout): the length of its line stays")
     if not payout.from_outside:
-        raise ValueError(f"ends.end.payout gives the length: leave {', '.join(SOURCES)} out to set it")
+        raise ValueError(f"{winch_at(scene)} gives the length: leave {', '.join(SOURCES)} out to set it")
     for name, x in (("rate", rate), ("length", 0.0 if length is None else length)):
         if isinstance(x, bool) or not isinstance(x, int | float | np.integer | np.floating) or not np.isfinite(x):
             raise ValueError(f"{name}: expected a finite number, found {x!r:.60}")
@@ -235,14 +268,26 @@ def length_asked(scene: Scene, paying: PayingOut | None, length: Any, rate: Any)
     plan = paying.plan
     if not plan.shortest <= length <= plan.longest * (1.0 + ROUND_OFF):
         between = f"{plan.shortest:.6g} and {plan.longest:.6g} m"
-        raise ValueError(f"length = {length:.9g} m, expected between {between} (ends.end.payout.longest)")
+        raise ValueError(f"length = {length:.9g} m, expected between {between} ({winch_at(scene)}.longest)")
     return float(length), float(rate)
 
 
 def energy(line: Line, ends: Ends, state: State) -> float:
     """Kinetic, elastic and potential energy, J."""
     n, found = line.h.size, np.zeros(4)
-    observe(line, ends, state.e, state.v, state.a1, state.w, np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), found)
+    observe(
+        line,
+        ends,
+        state.e,
+        state.v,
+        state.a1,
+        state.w,
+        state.T,
+        state.turn,
+        np.zeros((n + 1, 3)),
+        np.zeros((n + 1, 3)),
+        found,
+    )
     return float(found.sum() - (line.force * state.r).sum())
 
 

@@ -2,7 +2,8 @@
 
 Everything in a plane that could leave it does so by itself in space, if something pushes it; in a plane nothing can.
 So a small push is carried along with the motion (kernels.out_of_plane).  When it grows, an event says so, and a motion
-that nobody wants in a plane whatever comes goes on in space, with that push.
+that nobody wants in a plane whatever comes goes on in space, with that push.  A line that has come back goes on in the
+plane, and what it is still off it becomes the push.
 """
 
 from __future__ import annotations
@@ -13,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from hybrid.kernels.books import PUSH_GROWN, PUSH_START
+from hybrid.kernels.accept import GROWN
+from hybrid.kernels.books import NEAR_PLANE, PUSH_GROWN, PUSH_START
 from hybrid.kernels.entry import NO_PUSH
 from hybrid.kernels.state import Floats, Line, State
 from hybrid.model.build import Model
@@ -25,6 +27,12 @@ from hybrid.solve.run import CompiledRun
 # Of the length: how far the push displaces a cable that goes on in space: a hundred times what an equilibrium may be
 # out of the plane, and nothing that anybody would see.
 HANDED_ON = 1e-6
+# Of the length: how far from its plane a line in space is back in it.
+BACK = 1e-7
+# Of the length: a push that was real and is larger is given its size anew: linear equations no longer hold.
+FARTHEST = 1e-4
+# Angle, rad, through which sections of rods may then be turned against those of a line without twist.
+UNTWISTED = 1e-2
 
 NO_NODES: Floats = np.zeros(0)
 Note = Callable[[int, str, str], None]
@@ -36,7 +44,11 @@ class PlaneMonitor:
     def __init__(self, scene: Scene) -> None:
         self.insists = scene.dimension == 2
         self.speed = 0.0  # m/s, of a push when it is given; 0: none is carried along
+        self.real = False  # whether the push is what a line that has come back was off its plane
         self._s: Floats = NO_NODES  # m, nodes that it is carried on
+        self._across: Floats = np.zeros((0, 4))  # of a line that comes back, m, s
+        self.comes_back = False  # whether a line that has left its plane may go on in it later
+        self.home: Floats | None = None  # (3, 3) plane that has been left once
 
     def begin(self, model: Model, state: State, note: Note) -> Model:
         """The model that the motion begins with, in the plane if it is in one; what leaves the plane is noted."""
@@ -58,6 +70,8 @@ class PlaneMonitor:
 
     def attach(self, run: CompiledRun, line: Line) -> None:
         """Carry the push along with a (new) line of a run, in proportion to s."""
+        away = self.comes_back and self.home is not None and not self.speed
+        run.clock[NEAR_PLANE] = BACK * line.s[-1] if away else 0.0
         if not self.speed:
             run.carry((NO_PUSH, NO_PUSH))
         elif not np.array_equal(line.s, self._s):
@@ -77,7 +91,7 @@ class PlaneMonitor:
     def renew(self, run: CompiledRun) -> None:
         """Give the push anew: it has died."""
         run.push[:] = seed(self._s, self.speed)
-        run.clock[PUSH_START] = 0.0
+        run.clock[PUSH_START], self.real = 0.0, False
 
     def must_leave(self, run: CompiledRun, note: Note) -> bool:
         """Whether the motion has to go on in space, after a step in which the push had grown too large."""
@@ -90,13 +104,17 @@ class PlaneMonitor:
             self.speed = 0.0
             run.carry((NO_PUSH, NO_PUSH))
             return False
-        note(where, "out of plane", f"{text}; it goes on in space, pushed by {HANDED_ON:g} of its length")
+        if self.home is None:
+            back = f"; in the plane again where it is within {BACK:g} of its length" if self.comes_back else ""
+            note(where, "out of plane", f"{text}; it goes on in space, pushed by {HANDED_ON:g} of its length{back}")
         return True
 
     def leave(self, model: Model, run: CompiledRun, state: State) -> Model:
         """The model in space; the state gets the push."""
         assert self.speed and model.plane is not None
-        n, x = model.plane[2], scaled(run.push, HANDED_ON * model.length, self._s)
+        known = self.real and bool(np.abs(run.push[:, 0]).max() < FARTHEST * model.length)
+        x = run.push.copy() if known else scaled(run.push, HANDED_ON * model.length, self._s)
+        n = model.plane[2]
         held = np.flatnonzero(model.ends.values.held) * (model.line.s.size - 1)
         x[held] = 0.0
         for array, column in ((state.r, 0), (state.v, 1), (state.a, 2), (state.vd, 3)):
@@ -106,21 +124,58 @@ class PlaneMonitor:
         a = state.a1 - np.einsum("ij,ij->i", state.a1, d)[:, None] * d
         size = np.linalg.norm(a, axis=1)[:, None]
         state.a1[:] = np.where(size > 0.0, a / np.where(size > 0.0, size, 1.0), state.a1)
-        self.speed, self._s = 0.0, NO_NODES
+        self.speed, self._s, self.home, self.real = 0.0, NO_NODES, model.plane, False
         return replace(model, line=in_space(model.line), plane=None)
 
+    def come_back(self, model: Model, run: CompiledRun, state: State) -> Model | None:
+        """The model in the plane, and the state projected on it; None: its rods are twisted.
+
+        What was across the plane becomes the push when the run has the model (`push_on`).
+        """
+        assert self.home is not None
+        n, line = self.home[2], planar(model.line, self.home)
+        twisted = state.a1.copy()
+        flat = replace(model, line=line, plane=self.home)
+        across = [(state.r - state.r[0]) @ n, state.v @ n, state.a @ n, state.vd @ n]
+        state.r[:] -= np.outer(across[0], n)
+        for x in (state.e, state.v, state.a, state.vd):
+            x -= np.outer(x @ n, n)
+        untwist(line, model.ends.values, model.cable.held_tangent, state)
+        if self._is_twisted(model, np.linalg.norm(state.a1 - twisted, axis=1)):
+            return None
+        for spins in (state.w, state.wa, state.wd):
+            spins[:] = 0.0
+        self.speed, self.real, self._across = model.length / model.time_scale, True, np.column_stack(across)
+        return flat
+
+    @staticmethod
+    def _is_twisted(model: Model, angle: Floats) -> bool:
+        """Whether turns of sections by these angles (N,) rad matter: M Theta/(2 T) is beyond BACK of the length."""
+        line = model.line
+        between = line.element * np.abs(np.diff(angle, prepend=0.0, append=0.0))
+        torque = float((line.kb[:, 2] * between).max())
+        return bool(angle.max() > UNTWISTED or torque * np.pi > 2.0 * model.tension_scale * BACK * model.length)
+
+    def push_on(self, run: CompiledRun, model: Model) -> None:
+        """Carry along what was across the plane; about where that comes to HANDED_ON of the length it leaves again."""
+        self._give(run, self._across, model.line.s)
+        least = BACK * model.length / model.time_scale
+        speeds = np.maximum(np.abs(self._across[:, 1]), least)
+        begun = BACK * GROWN / HANDED_ON  # by how much a push that was given at the start would have grown by now
+        run.clock[PUSH_START] = 0.5 * float(model.line.mass @ speeds**2) / begun**2
+
     def checkpoint(self, run: CompiledRun) -> dict[str, Any] | None:
-        """The push, and its energy when it was given."""
+        """The push, its energy when it was given, and whether it is of a line that has come back."""
         if not self.speed:
             return None
-        pair = np.array([run.push, run.push])
-        return {"pair": pair, "unit": self.speed, "energy": float(run.clock[PUSH_START]), "led": True}
+        pair, energy = np.array([run.push, run.push]), float(run.clock[PUSH_START])
+        return {"pair": pair, "unit": self.speed, "energy": energy, "led": True, "real": self.real}
 
     def restore(self, saved: Mapping[str, Any], run: CompiledRun) -> None:
         """Go on as `checkpoint` has written; ValueError where that cannot be."""
         if not saved["unit"] > 0.0:
             raise ValueError("a push of no size")
-        self.speed = saved["unit"]
+        self.speed, self.real = saved["unit"], saved["real"]
         run.push[:] = saved["pair"][int(saved["led"])]
         run.clock[PUSH_START] = saved["energy"]
 

@@ -49,7 +49,7 @@ def elastic(model: Model, t: float, state: State) -> float:
     """Energy of bending and torsion, J, at t (s)."""
     cells, energy = model.cells, np.zeros(4)
     vectors = np.zeros((2, cells + 1, 3))
-    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, *vectors, energy)
+    observe(model.line, model.ends.at(t), state.e, state.v, state.a1, state.w, state.T, state.turn, *vectors, energy)
     return float(energy[1] + energy[2])
 
 

@@ -15,7 +15,7 @@ from hybrid.errors import Complaint, ResultError, SceneError
 from hybrid.model.build import build
 from hybrid.model.ends import EndConditions
 from hybrid.model.output_points import OutputPoints
-from hybrid.model.payout import longest_out, payout_of
+from hybrid.model.payout import longest_out, payout_of, winch_at, winch_side
 from hybrid.model.plan import output_interval
 from hybrid.model.resolution import Resolution
 from hybrid.scene.motion_checks import check_motions
@@ -142,7 +142,7 @@ def _found(path: Path) -> tuple[Scene, tuple[LoadChange, ...], str, Tree, Checkp
             scene = parse_scene(result.scene_text)
             status = result.status
             with refused(path):
-                points = restored_points(result, longest_out(scene))
+                points = restored_points(result, longest_out(scene), scene.length if not winch_side(scene) else None)
             try:
                 told = json.loads(result.changes_text or "[]")
                 changes = tuple(LoadChange(float(x["t"]), parse_scene(x["scene"])) for x in told)
@@ -174,7 +174,7 @@ def _longer(
     out, longest = other(scene), longest_out(scene)
     if longest_out(out) > longest * (1.0 + SAME_PLACE):
         expected = f"a time up to which at most {longest:.6g} m are out, for which the result has points"
-        fix = "run the scene again with ends.end.payout.longest"
+        fix = f"run the scene again with {winch_at(scene)}.longest"
         raise _refused("until", f"{until:g} s, when {longest_out(out):.6g} m are out", expected, fix)
     return out, tuple(LoadChange(x.t, other(x.scene)) for x in changes)
 

@@ -104,16 +104,19 @@ def resolution_from(tree: Any, scene: Scene) -> Resolution:
     return Resolution(**saved | {"grading": grading})
 
 
-def restored_points(result: Result, length: float) -> OutputPoints:
+def restored_points(result: Result, length: float, far: float | None = None) -> OutputPoints:
     """The output points of a result, which whoever continues it keeps; one of 0.6 has no jumps.
 
+    far: m, arc length of the end of a line that is paid out at its start.
     ValueError: none of a cable of that length (m).
     """
     s = np.asarray(result["s"], float)
     jumps = np.asarray(result["right/s"], float) if "right/s" in result else np.zeros(0)
     ordered = s.ndim == 1 and s.size > 0 and bool((np.diff(s) > 0.0).all())
-    if not (ordered and s[0] >= 0.0 and s[-1] <= length * (1 + 1e-9)):
-        raise ValueError(f"s: output points that increase from 0 to {length:g} m at most were expected")
+    begin, end = (0.0, length) if far is None else (far - length, far)
+    near = 1e-9 * length if far is not None else 0.0
+    if not (ordered and s[0] >= begin - near and s[-1] <= end + 1e-9 * length):
+        raise ValueError(f"s: output points that increase from {begin:g} to {end:g} m at most were expected")
     if jumps.ndim != 1 or not np.isin(jumps, s).all():
         raise ValueError("right/s: places among the output points s were expected")
     return OutputPoints(s, jumps)

@@ -94,9 +94,9 @@ def jolts(scene: Scene) -> list[tuple[float, float, float]]:
     """
     travel = 0.0
     for section in scene.cable.sections:
-        if not isinstance(section.axial_stiffness, float):
+        if section.stiffness is None:
             return []
-        travel += section.length * float(np.sqrt(section.mass / section.axial_stiffness))
+        travel += section.length * float(np.sqrt(section.mass / section.stiffness))
     found = []
     for load in (load for end in scene.ends.both for load in end.loads if load.what == "force"):
         rows = np.array(load.rows)

@@ -26,6 +26,7 @@ from hybrid.store.named_arrays import Tree
 from hybrid.store.writer import Recorder
 
 if TYPE_CHECKING:
+    from hybrid.scene.quantities import Quantity
     from hybrid.solve.system_statics import SystemEquilibrium
 
 STEP_FIELDS = (
@@ -74,6 +75,7 @@ def result_recorder(
     if len(observer.gauges):
         text = "x and y, inertial, of the places at which `elevation` is recorded"
         fixed.append((Field("elevation_at", "m", text, observer.gauges.shape, ("gauge", "xy")), observer.gauges))
+    fixed += _limits_of_quantities(observer)
     if observer.jumps.size:
         text = "arc lengths of point loads, joints and changes of section; right/* has the values just after them"
         fixed.append((Field("right/s", "m", text, observer.jumps.shape, ("right/s",)), observer.jumps))
@@ -132,8 +134,8 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
     beside = 3.0 * NEAR * scene.length
     jumps = observer.jumps
     left = observer.s - beside * np.isin(observer.s, jumps)
-    scene = whole_scene(scene)
-    places = [("s", "", left), ("right/s", "right/", jumps + beside)][: 1 + bool(jumps.size)]
+    scene, begin = whole_scene(scene)
+    places = [("s", "", left - begin), ("right/s", "right/", jumps + beside - begin)][: 1 + bool(jumps.size)]
     out: list[tuple[Field, np.ndarray]] = []
     for dim, prefix, s in places:
         for name, values in limits_along(scene, s).items():
@@ -148,6 +150,32 @@ def _limits(scene: Scene, observer: Observer) -> list[tuple[Field, np.ndarray]]:
     return out
 
 
+def limits_of(wanted: Mapping[str, Quantity]) -> list[tuple[Field, np.ndarray]]:
+    """Limits of quantities by name."""
+    out = []
+    for name, q in wanted.items():
+        if q.smallest is not None or q.largest is not None:
+            bounds = np.array([np.nan if x is None else x for x in (q.smallest, q.largest)])
+            text = f"smallest and largest {name} allowed; NaN: none"
+            out.append((Field(f"limits/{name}", q.unit, text, (2,), ("bounds",), nan_ok=True), bounds))
+    return out
+
+
+def _limits_of_quantities(observer: Observer) -> list[tuple[Field, np.ndarray]]:
+    """Limits of what the scene asks for, and the largest stress of pipes."""
+    if observer.quantities is None:
+        return []
+    out, pipes, text = limits_of(observer.quantities.wanted), observer.quantities.pipes, "largest von Mises stress"
+    if pipes is None or np.isnan(pipes.limits).all():
+        return out
+    for name, s in (("", observer.s), ("right/", observer.jumps)):
+        if s.size:
+            allowed = pipes.largest_allowed(s, bool(name))
+            field = Field(f"{name}max_stress", "Pa", f"{text} allowed; NaN: none", s.shape, (f"{name}s",), nan_ok=True)
+            out.append((field, allowed))
+    return out
+
+
 def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
     """All nodes that the mesh may have, and which are there in rods alone: with the zones, the mesh of any time."""
     nodes, always = model.line.s, np.ones(model.line.s.size, np.int64)
@@ -155,8 +183,9 @@ def mesh_fields(model: Model) -> list[tuple[Field, np.ndarray]]:
         nodes = model.layout.finest.nodes
         always = np.isin(nodes, model.layout.base).astype(np.int64)
     if model.payout is not None:
-        nodes = model.payout.nodes[model.payout.nodes < model.payout.longest]
-        always = (nodes <= model.payout.shortest).astype(np.int64)
+        places = model.payout.nodes[model.payout.nodes < model.payout.longest]
+        nodes = model.payout.along(places)
+        always = (places <= model.payout.shortest).astype(np.int64)[:: 1 if model.payout.side else -1]
     text = "1 where the node is always there, 0 where only while it lies in a rod zone"
     return [
         (Field("mesh/s", "m", "arc lengths of all nodes that there may be", nodes.shape, ("mesh/s",)), nodes),

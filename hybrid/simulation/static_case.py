@@ -19,6 +19,7 @@ from hybrid.model.output_points import output_points
 from hybrid.model.resolution import Resolution, wants_errors
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
+from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
@@ -45,7 +46,7 @@ class StaticCase:
         """Compute the result into a file, or memory; what is to be compared of it."""
         begin = clock.process_time()
         model, found, switching = self._equilibrium(resolution)
-        observer = self._observer(model)
+        observer = self.observer(model)
         texts = {"scene": scene_text(self.scene)}
         if model.line.bits & SELF_CONTACT:
             refuse_contact(self.scene, model, found)
@@ -82,7 +83,7 @@ class StaticCase:
         """Compute for comparison only."""
         begin = clock.process_time()
         model, found, _ = self._equilibrium(resolution)
-        values = _values(model, found, self._observer(model, COMPARED))
+        values = _values(model, found, self.observer(model, COMPARED))
         return _sample(resolution, model, values, clock.process_time() - begin)
 
     def survey(self, resolution: Resolution) -> Survey | None:
@@ -98,7 +99,7 @@ class StaticCase:
             if self.scene.resolution is not None:
                 raise
             return None
-        values = _values(model, found, self._observer(model, COMPARED, s))
+        values = _values(model, found, self.observer(model, COMPARED, s))
         run = {name: np.asarray(values[name])[None] for name in ("curvature", "tension")}
         return Survey.of(self.scene, resolution, model, s, run)
 
@@ -110,7 +111,7 @@ class StaticCase:
         assert found is not None
         return model, found, switching
 
-    def _observer(self, model: Model, only: Sequence[str] | None = None, at: Floats | None = None) -> Observer:
+    def observer(self, model: Model, only: Sequence[str] | None = None, at: Floats | None = None) -> Observer:
         """at: places, m, instead of the output points."""
         points, jumps = output_points(self.scene)
         s = points if at is None else at
@@ -119,6 +120,7 @@ class StaticCase:
             model.line, model.sea.values, model.zones, s, False, model.attached, only=only, errors=errors,
             corrected=model.corrected, jumps=jumps, changes=section_changes(self.scene),
             gauges=() if only else self.scene.output.elevation or (),
+            quantities=None if only else quantities_of(self.scene),
         )  # fmt: skip
 
 

@@ -32,9 +32,10 @@ def note_slack(moving: Transient) -> None:
 def note_iterations(moving: Transient) -> None:
     """A step was taken in all the Newton iterations that it may take though these had not converged: the first."""
     clock, most = moving.run.clock, int(moving.run.count[b.MOST_ITERATIONS])
+    left = "though the next would still have" if most > 1 else "which"  # from one alone the next is not known
     text = (
-        f"a step was taken after {most} Newton iterations though the next would still have changed it by "
-        f"{float(clock[b.CORRECTION]):.2g} (relative), and so are others like it: most_iterations bounds their cost; "
+        f"a step was taken after {most} Newton iterations, {left} changed it by {float(clock[b.CORRECTION]):.2g} "
+        f"(relative), and so are others like it: most_iterations bounds their cost; "
         f"steps/correction has what each left out; a shorter time.step or more iterations leave less"
     )
     moving.events.event(moving.t, 0.0, moving.model.length, "iterations cut", text, threshold=float(most))

@@ -111,7 +111,7 @@ def tension_now(loop: TimeLoop) -> Floats:
     books, observer = run.run.books, loop.observer.on(model.line, model.sea.values, model.zones)
     batch = batch_of_one(run.t, model.ends.at(run.t), run.state, books.report[0], books.work[0], model.sea.at(run.t))
     if run.payout is not None:
-        _, seen = next(iter(run.payout.looks(observer, model, batch)))
+        _, seen, _ = run.payout.look(observer, model, batch)
     else:
         seen = observer.look(batch)
     return np.array(seen.tension[:, 0])

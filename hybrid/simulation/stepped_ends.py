@@ -86,14 +86,14 @@ class SteppedEnds:
     @property
     def length(self) -> float:
         """Unstretched length that is out now, m."""
-        return float(self._loop.run.model.line.s[-1])
+        return float(np.ptp(self._loop.run.model.line.s))
 
     @one_thread
     def set_length(self, length: float, rate: float = 0.0) -> None:
         """How long the line is to be at the end of the next `step` or `advance`, m, and its rate there, m/s.
 
         It reaches that smoothly, and keeps the rate until it is set again.  ValueError: the scene has no
-        ``ends.end.payout``, or that gives the length itself; a length that cannot be.
+        ``payout``, or that gives the length itself; a length that cannot be.
         """
         self._check_open()
         self._wound = length_asked(self.scene, self._loop.run.payout, math.nan if length is None else length, rate)

@@ -9,9 +9,11 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from hybrid.errors import ResultError
+from hybrid.kernels.report import REPORT_SIZE
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.system import System
 from hybrid.simulation.restore import program
+from hybrid.simulation.transient_checkpoint import FIRST_REPORT
 from hybrid.store.checkpoint import Checkpoint, digest_of
 from hybrid.store.named_arrays import matched
 
@@ -40,6 +42,7 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
         run.failures.again(saved["broken"])
     saved = {"broken": [], "rest": run.rest, **saved}  # an earlier program took members as at the first guess
     template = checkpoint(run) | {"dry": None, "broken": None}
+    saved["lines"] = of_today(saved.get("lines"), template["lines"])
     for line in template["lines"].values():
         line["report"] = np.full_like(line["report"], np.inf)  # it may have numbers that are not finite
     found = matched(dict(saved), template)
@@ -50,6 +53,21 @@ def restore(run: SystemRun, saved: Mapping[str, Any]) -> None:
     run.start_from(found["rest"])
     run.make_solver()
     set_state(run, found)
+
+
+def of_today(lines: Any, template: Mapping[str, Any]) -> Any:
+    """Lines of a checkpoint with what earlier programs did not have: mean tensions, and the end of a report."""
+    if not (isinstance(lines, dict) and all(isinstance(x, dict) for x in lines.values())):
+        return lines
+    found = {}
+    for name, line in lines.items():
+        mine, state, report = template.get(name), line.get("state"), line.get("report")
+        if mine is not None and isinstance(state, dict) and not mine["state"]["slow"].size:
+            line = line | {"state": {"slow": mine["state"]["slow"], **state}}
+        if isinstance(report, np.ndarray) and report.ndim == 1 and FIRST_REPORT <= report.size < REPORT_SIZE:
+            line = line | {"report": np.pad(report, (0, REPORT_SIZE - report.size))}
+        found[name] = line
+    return found
 
 
 def set_state(run: SystemRun, found: Mapping[str, Any]) -> None:
@@ -73,7 +91,7 @@ def files_of(system: System) -> dict[str, str]:
     """Digests of the files that motions and loads are read from, by path."""
     scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in system.lines]
     found = {path for scene in scenes for path in scene.ends.files()}
-    found |= set(system.environment.files())
+    found |= {path for scene in scenes for path in scene.cable.files()} | set(system.environment.files())
     for body in system.bodies.values():
         if isinstance(body, FixedBody) and body.motion is not None:
             vessel = body.motion.vessel

@@ -18,6 +18,7 @@ from hybrid.model.build import Model
 from hybrid.model.output_points import output_points
 from hybrid.model.sections import section_changes
 from hybrid.outputs.probes import Observer
+from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
 from hybrid.scene.schema import Scene
 from hybrid.simulation.deferred_recorder import DeferredRecorder
@@ -36,6 +37,15 @@ WAITING = 64
 SAME_PLACE = 1e-9
 
 
+def observer_of(scene: Scene, model: Model, moves: bool) -> Observer:
+    """What records the outputs of a line; moves: whether it does, or is in equilibrium."""
+    s, jumps = output_points(scene)
+    return Observer(
+        model.line, model.sea.values, model.zones, s, moves, model.attached, jumps=jumps,
+        changes=section_changes(scene), quantities=quantities_of(scene),
+    )  # fmt: skip
+
+
 class LineResult:
     """What is recorded of one line."""
 
@@ -51,11 +61,7 @@ class LineResult:
         self.events = EventLog()
         self.diagnostics = Diagnostics(model, self.events)
         self._moves = outputs > 0
-        s, jumps = output_points(scene)
-        self.observer = Observer(
-            model.line, model.sea.values, model.zones, s, self._moves, model.attached, jumps=jumps,
-            changes=section_changes(scene),
-        )  # fmt: skip
+        self.observer = observer_of(scene, model, self._moves)
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
         self.recorder: Recorder | DeferredRecorder = result_recorder(
@@ -118,12 +124,16 @@ class LineResult:
         error = float(work.report[LOCAL_ERROR])
         self._log.append((t, dt, taken.iterations, taken.correction, taken.residual, repeats, error, *pulls, cpu))
 
-    def output(self, t: float, ends: Ends, state: State, work: Work) -> None:
-        """Record a state at t (s); both ends count as held, by their points."""
+    def state_for_output(self, t: float, ends: Ends, state: State, work: Work) -> Batch:
+        """A state at t (s) as outputs are made of it; both ends count as held, by their points."""
         held = ends._replace(held=np.ones(2, np.int8), position=state.r[[0, -1]])
         report = work.report.copy()
         report[FORCE_A : FORCE_A + 6] = self.end_forces(state, report)
-        self._waiting.append(batch_of_one(t, held, state, report, self.books.work[0], self.model.sea.values))
+        return batch_of_one(t, held, state, report, self.books.work[0], self.model.sea.values)
+
+    def output(self, batch: Batch) -> None:
+        """Record a state."""
+        self._waiting.append(batch)
         if len(self._waiting) >= WAITING or not self._moves:
             self.write_down()
 

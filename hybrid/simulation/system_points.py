@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.kernels.bodies import DONE, FRAME, KINETIC, LINES, PLACE, POTENTIAL, V, W
-from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of
 from hybrid.model.system import SystemModel
@@ -35,6 +35,12 @@ def fields_of(system: System) -> list[Field]:
         if not isinstance(point, FreePoint):
             bears = "its body" if system.body_of(name) is not None else "its support"
             fields.append(vector(f"{at}/force", "N", f"force of the lines on point {name}, which {bears} bears"))
+            if system.clamped_at(name):
+                what = f"moment of the lines that are clamped at point {name}, about it, which {bears} bears"
+                fields.append(vector(f"{at}/moment", "N m", what))
+        elif system.clamped_at(name):
+            turns = f"rotation of point {name}: roll, pitch and yaw of its axes, about x, then y, then z"
+            fields.append(Field(f"{at}/rotation", "deg", turns, (3,), ("xyz",), "inertial"))
     for name, body in system.bodies.items():
         at = f"bodies/{name}"
         fields.append(vector(f"{at}/position", "m", f"position of the origin of body {name}"))
@@ -59,25 +65,31 @@ def values_of(
 ) -> dict[str, Any]:  # fmt: skip
     """The values of all fields for a state at t (s) and the forces that the solver has found for it."""
     values: dict[str, Any] = {}
-    pulls: dict[str, list[tuple[Floats, Floats]]] = {name: [] for name in system.bodies}
+    pulls: dict[str, list[tuple[Floats, Floats, Floats]]] = {name: [] for name in system.bodies}
     for name, point in system.points.items():
         at = [(model.names.index(line), -(end == "end")) for line, end in system.lines_at(name)]
         here = [(line, node) for line, node in at if (line, -node) not in model.loose]
         position, velocity = _place(model, state, point, at[0], here)
         values[f"points/{name}/position"], values[f"points/{name}/velocity"] = position, velocity
         if isinstance(point, FreePoint):
+            if name in model.rigid:
+                row = state.bodies[len(model.bodies) + model.rigid.index(name)]
+                values[f"points/{name}/rotation"] = angles_of(row[FRAME:V].reshape(3, 3))
             continue
         reports = [(solver.work[k].report, FORCE_A - 3 * node) for k, node in here]
         values[f"points/{name}/force"] = force = sum((r[f : f + 3] for r, f in reports), np.zeros(3))
+        moment = clamp_moment(system, model, solver, name)
+        if moment is not None:
+            values[f"points/{name}/moment"] = moment
         if system.body_of(name) is not None:
-            pulls[point.body].append((position, force))  # type: ignore[union-attr]
+            pulls[point.body].append((position, force, np.zeros(3) if moment is None else moment))  # type: ignore[union-attr]
     for name, known in model.known.items():
         position, velocity, frame, spin = known.at(t)
         assert frame is not None
-        force = sum((f for _, f in pulls[name]), np.zeros(3))
-        moment = sum((np.cross(place - position, f) for place, f in pulls[name]), np.zeros(3))
+        force = sum((f for _, f, _ in pulls[name]), np.zeros(3))
+        moment = sum((np.cross(place - position, f) + m for place, f, m in pulls[name]), np.zeros(3))
         values |= _of_body(name, position, frame, velocity, spin, force, moment)
-    for body, row, work in zip(model.bodies, state.bodies, solver.body_work, strict=True):
+    for body, row, work in zip(model.bodies, state.bodies, solver.body_work, strict=False):
         R, at_body = row[FRAME:V].reshape(3, 3), f"bodies/{body.name}"
         force, moment = work[LINES : LINES + 3].copy(), work[LINES + 3 : LINES + 6].copy()
         values |= _of_body(
@@ -88,6 +100,18 @@ def values_of(
     return values
 
 
+def clamp_moment(system: System, model: SystemModel, solver: SystemSolver, point: str) -> Floats | None:
+    """Moment (3,) N m of the lines that are clamped at a point, about it; None: there are none."""
+    here = system.clamped_at(point)
+    if not here:
+        return None
+    moment = np.zeros(3)
+    for line, end in here:
+        report = solver.work[model.names.index(line)].report
+        moment += report[MOMENT_A : MOMENT_A + 3] if end == "start" else -report[MOMENT_A + 3 : MOMENT_A + 6]
+    return moment
+
+
 def _place(
     model: SystemModel, state: SystemState, point: Point, first: tuple[int, int], here: Sequence[tuple[int, int]]
 ) -> tuple[Floats, Floats]:
@@ -95,7 +119,7 @@ def _place(
     if here:
         line, node = here[0]
         return state.lines[line].r[node].copy(), state.lines[line].v[node].copy()
-    for body, row in zip(model.bodies, state.bodies, strict=True):
+    for body, row in zip(model.bodies, state.bodies, strict=False):
         if isinstance(point, Fairlead) and point.body == body.name:
             R = row[FRAME:V].reshape(3, 3)
             arm = R @ np.array(point.place)

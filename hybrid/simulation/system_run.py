@@ -15,7 +15,7 @@ from hybrid.errors import OTHER_PROGRAM, ComputationError, Outcome, ResultError
 from hybrid.kernels.bodies import FRAME, PLACE, V
 from hybrid.kernels.cache import cache_folder
 from hybrid.kernels.report import BEND, TWIST_NODE
-from hybrid.kernels.state import Floats, blank_state
+from hybrid.kernels.state import Floats, state_for
 from hybrid.model.plan import output_times, parts
 from hybrid.model.resolution import first_resolution
 from hybrid.model.system import build_system
@@ -28,6 +28,7 @@ from hybrid.simulation.system_checkpoint import check_files, content, files_of, 
 from hybrid.simulation.system_failures import Failures
 from hybrid.simulation.system_lines import LineResult
 from hybrid.simulation.system_points import fields_of, values_of
+from hybrid.simulation.system_quantities import SystemQuantities
 from hybrid.simulation.system_start import equilibrium_of_system, joined_lines, named
 from hybrid.simulation.time_loop import SAME_STOP, WORK, apart
 from hybrid.solve.system import SystemSolver, SystemState, SystemTaken
@@ -65,7 +66,7 @@ class SystemRun:
             self.state: SystemState = self.found.state.copy()
             self.start_from(self.found.state.bodies)
         else:
-            blank = [blank_state(x.cells, len(x.line.torsion)) for x in self.model.models]
+            blank = [state_for(x.line) for x in self.model.models]
             self.state = SystemState(blank, np.zeros_like(self.model.body_places))
             self.start_from(self.model.body_places)
         self.lines = [
@@ -74,6 +75,7 @@ class SystemRun:
                 zip(names, self.scenes, self.model.models, self.state.lines, strict=True)
             )
         ]
+        self.quantities = SystemQuantities(system, dict(zip(names, self.scenes, strict=True)))
         self.t, self.steps, self.last_step, self.cpu = 0.0, 0, 0.0, 0.0
         self.leg = (0.0, 0)  # where equal steps to a stop began (s), and how many are done
         self.dry: set[str] = set()  # bodies that have been said to be out of the water
@@ -105,7 +107,8 @@ class SystemRun:
         if on_bodies:
             attributes["fairleads"] = json.dumps(on_bodies)
         recorder = Recorder(
-            self.target, grid_s=np.zeros(1), fields=fields_of(self.system), step_fields=(), attributes=attributes,
+            self.target, grid_s=np.zeros(1), fields=[*fields_of(self.system), *self.quantities.fields],
+            step_fields=(), attributes=attributes, fixed=self.quantities.limits,
             texts={"scene": text}, outputs=len(self.times) + 1, overwrite=True, before={} if self.kept else None,
             templates=cache_folder().parent, parts=self._parts,
         )  # fmt: skip
@@ -126,7 +129,7 @@ class SystemRun:
                     raise ValueError(f"t = {self.t:g} s after an output at {point.t:g} s")
             self.model.load_bodies(self.t, self.solver.bodies, self.loaded)
             self._other, self._between = self.state.copy(), True
-            fields = fields_of(self.system)
+            fields = [*fields_of(self.system), *self.quantities.fields]
             recorder = Recorder.again(file, self.target, fields, (), point, {"scene": text}, {}, (), self._parts)
         recorder.files = files_of(self.system)
         if why := other_program(point):
@@ -159,17 +162,22 @@ class SystemRun:
     def _output(self, solver: SystemSolver) -> None:
         """Record points, bodies and lines as they are."""
         values = values_of(self.system, self.model, solver, self.state, self.t)
+        seen = {
+            line.name: line.state_for_output(self.t, x.ends, state, work)
+            for line, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True)
+        }
+        values |= self.quantities.values(seen, {line.name: line for line in self.lines})
         self.recorder.save(self.t, values, [("lines", 0.0, 0.0)])
         self._look_for_dry_bodies()
-        for line_, x, state, work in zip(self.lines, solver.lines, self.state.lines, solver.work, strict=True):
-            line_.output(self.t, x.ends, state, work)
+        for line in self.lines:
+            line.output(seen[line.name])
 
     def _look_for_dry_bodies(self) -> None:
         """An event where a body that counts as submerged has risen out of the water."""
         fluid = self.system.environment.fluid
         if fluid is None or fluid.surface is None:
             return
-        for body, row in zip(self.model.bodies, self.state.bodies, strict=True):
+        for body, row in zip(self.model.bodies, self.state.bodies, strict=False):
             given = self.system.free_bodies[body.name]
             centre = row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(given.centre_of_buoyancy)
             above = float(centre[2]) - fluid.surface
@@ -228,7 +236,7 @@ class SystemRun:
     def start_from(self, bodies: Floats) -> None:
         """Take the added mass of members of bodies that were at rest (B, STATE) when the motion began."""
         self.rest = bodies.copy()
-        for body, row in zip(self.model.bodies, bodies, strict=True):
+        for body, row in zip(self.model.bodies, bodies, strict=False):
             body.take_added_mass(row)
 
     def make_solver(self) -> None:

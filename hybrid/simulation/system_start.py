@@ -60,18 +60,18 @@ def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     """Shapes from which the equilibrium is looked for."""
     yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
     places = balanced_places(system, model)
-    if places is not None and (model.free or model.bodies):
-        models = build_system(system, *places).models
-        yield "lines hung between places that balance", SystemState([x.start for x in models], places[1])
+    if places is not None and len(model.places) + len(model.body_places):
+        there = build_system(system, *places, model.seats)
+        yield "lines hung between places that balance", SystemState([x.start for x in there.models], there.body_places)
 
 
 def joined_lines(model: SystemModel, t: float) -> list[JoinedLine]:
     """The lines with their ends and their sea at t (s), whose arrays `ends.at` and `sea.at` overwrite."""
     lines = []
-    for x, joints, fairleads in zip(model.models, model.joints, model.fairleads, strict=True):
+    for x, joints, fairleads, seats in zip(model.models, model.joints, model.fairleads, model.seats, strict=True):
         floor = x.slack_floor if x.slack == "stop" else -np.inf
         ends = joined_ends(x.ends.at(t), joints)
-        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads))
+        lines.append(JoinedLine(x.line, x.sea.at(t), ends, x.length, x.tension_scale, floor, joints, fairleads, seats))
     return lines
 
 

@@ -135,6 +135,8 @@ class SystemSimulation:
             if self._stops and self._stops[0] <= until + sliver:
                 self._stops.pop(0)
             self._run.go_to(until)
+            if before is None:  # after a `save` nothing is final
+                self._run.keep()
         except LineFailed as failed:
             raise (self._fail(failed) if before is None else self._undo(failed, before)) from None
         return self.t

@@ -10,9 +10,10 @@ import numpy as np
 from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
-from hybrid.kernels.report import FORCE_A
+from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
+from hybrid.model.clamps import seat_of
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.points import Fairlead, FixedPoint
@@ -71,9 +72,13 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
     found = equilibrium_of_system(system, model, np.inf)
     solver, state, first = found.solver, found.state, 0
     size = 6 if kind == "body" else 3
-    free = [*model.free], [body.name for body in model.bodies]
+    free = [*model.free], [*(body.name for body in model.bodies), *model.rigid]
     if kind == "point" and name in free[0]:
         first, position, rotation = 3 * free[0].index(name), _place(system, model, found, name), None
+        own = np.zeros((3, 3))
+    elif kind == "point" and name in model.rigid:  # whose turns follow
+        row = state.bodies[free[1].index(name)]
+        first, position, rotation = 3 * len(free[0]) + 6 * free[1].index(name), row[PLACE:FRAME].copy(), None
         own = np.zeros((3, 3))
     elif kind == "body" and name in free[1]:
         b = free[1].index(name)
@@ -104,6 +109,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     """
     system = _system(scene)
     kind, name = _target(system, at)
+    if kind == "point" and name in system.rigid:
+        expected = f"a point at which lines turn freely, or a body: lines are clamped at point {name}"
+        raise SceneError([Complaint("offsets", at, expected, "make a small body of the point, with a fairlead")])
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -147,6 +155,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
                     f = report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3]
                     force += f
                     moment += np.cross(here.state.lines[l].r[-k] - place - distance * along, f)
+                    if moved.clamp(there.names[l], ("start", "end")[k]) is not None:
+                        m = report[MOMENT_A + 3 * k : MOMENT_A + 3 * k + 3]
+                        moment += -m if k else m
         forces.append(force)
         moments.append(moment)
         tensions.append([float(x.T.max()) for x in here.state.lines])
@@ -227,7 +238,7 @@ def _let_go(
     for x, ends in zip(found.solver.lines, _ends(system), strict=True):
         # a point that is let go is numbered between the free points and the bodies
         joints = [j + 1 if kind == "point" and j >= points else j for j in x.joints]
-        held, fairleads = x.ends.held.copy(), x.fairleads.copy()
+        held, fairleads, seats = x.ends.held.copy(), x.fairleads.copy(), x.seats.copy()
         for k, point in enumerate(ends):
             if point in which:
                 joints[k] = points if kind == "point" else points + len(bodies)
@@ -235,8 +246,10 @@ def _let_go(
                 found_point = system.points[point]
                 if isinstance(found_point, Fairlead):
                     fairleads[k] = found_point.place
+                    if x.line.element[-k]:
+                        seats[k] = seat_of(x.ends.frame[k], rows[-1, FRAME:V].reshape(3, 3))
         ends_now = x.ends._replace(held=held, position=x.ends.position.copy())
-        lines.append(x._replace(joints=(joints[0], joints[1]), ends=ends_now, fairleads=fairleads))
+        lines.append(x._replace(joints=(joints[0], joints[1]), ends=ends_now, fairleads=fairleads, seats=seats))
     return SystemSolver(lines, points + (kind == "point"), numbers), SystemState(found.state.lines, rows)
 
 

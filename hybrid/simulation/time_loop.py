@@ -13,6 +13,7 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
+from hybrid.model.mesh import Zone
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -246,17 +247,20 @@ class TimeLoop:
             self._keep_ratios(count)
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
         if run.payout is not None:
-            for there, seen in run.payout.looks(observer, model, batch):
-                self._save(there, seen, there.values_of(seen))
-                observer.first_energy = there.first_energy
+            there, seen, zones = run.payout.look(observer, model, batch)
+            self._save(there, seen, there.values_of(seen), zones)
+            observer.first_energy = there.first_energy
             return
         shift = run.correction.corrector.shift(errors, batch) if run.correction is not None else None
         seen = observer.look(batch)
         self._save(observer, seen, observer.values_of(seen, ratios, shift))
 
-    def _save(self, observer: Observer, seen: Observation, values: dict[str, np.ndarray]) -> None:
-        """Record the values of outputs, and look at them."""
-        self.recorder.save_batch(seen.batch.t.copy(), values, observer.zone_rows)
+    def _save(
+        self, observer: Observer, seen: Observation, values: dict[str, np.ndarray], later: Sequence[Sequence[Zone]] = ()
+    ) -> None:
+        """Record the values of outputs, and look at them; later: zones of all but the first, where they differ."""
+        more = [observer.rows_of(zones) for zones in later]
+        self.recorder.save_batch(seen.batch.t.copy(), values, observer.zone_rows, more)
         if self.target is None:
             return
         run, diagnostics = self.run, self.diagnostics
@@ -356,11 +360,17 @@ class TimeLoop:
         return checkpoint(self.run) | {
             "watch": self.diagnostics.checkpoint(self.run.run), "cpu": clock.process_time() - self._cpu,
             "first_energy": self.observer.first_energy or 0.0,
-        }  # fmt: skip
+        } | self._first_places()  # fmt: skip
+
+    def _first_places(self) -> dict[str, np.ndarray]:
+        """Places from which excursions count (n, 2), m, if there are any; NaN: none yet."""
+        found = self.observer.quantities
+        return {"first_places": found.first.copy()} if found is not None and found.first.size else {}
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Continue as `checkpoint` has said; ValueError or ResultError where that cannot be."""
         mine = {"watch": self.diagnostics.checkpoint(self.run.run), "cpu": 0.0, "first_energy": 0.0}
+        mine |= {name: np.full_like(x, np.nan) for name, x in self._first_places().items()}
         restore(self.run, {name: x for name, x in saved.items() if name not in mine})
         older = {name: saved[name] for name in mine}
         if isinstance(older["watch"], dict):
@@ -368,4 +378,6 @@ class TimeLoop:
         found = matched(older, mine, "state")
         self._cpu, self._logged = clock.process_time() - found["cpu"], found["cpu"]
         self.observer.first_energy = found["first_energy"]
+        if self.observer.quantities is not None and "first_places" in found:
+            self.observer.quantities.first[:] = found["first_places"]
         self.diagnostics.restore(found["watch"], self.run.run)

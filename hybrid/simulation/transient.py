@@ -1,8 +1,8 @@
 """A cable in motion: its state, the steps that advance it, and the work done on it.
 
 `begin` gives the first state; `advance` lets the compiled run go on (solve.run) and yields where there is something to
-write down or to look at.  Zones change and planes are left between two steps.  Nothing is written here, and nothing
-decides that a healthy step was the last: simulation.time_loop.
+write down or to look at.  Between two steps zones change, and planes are left and come back to.  Nothing is written
+here, and nothing decides that a healthy step was the last: simulation.time_loop.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from hybrid.errors import Outcome
 from hybrid.kernels import books as b
 from hybrid.kernels.forces import SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY
-from hybrid.kernels.state import State, Work, blank_state
+from hybrid.kernels.state import State, Work, state_for
 from hybrid.kernels.step_law import FIRST
 from hybrid.model.build import Model
 from hybrid.model.plan import parts
@@ -86,17 +86,19 @@ class Transient:
             model = self.payout.on(model, model.length)
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
+        self.plane_monitor.comes_back = switching is None and correction is None and self.payout is None
         self.changes = 0  # of the scene, so far
         self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
         self._cells: CellChanges | None = None  # of cells that change without Python
         self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
-        self._leaves, self._rescues = False, (0, 0)  # the step before, and repetitions with more rod since
+        self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
+        self._rescues = 0, 0  # the step before, and repetitions with more rod since
         self.run.books.loaded[:] = model.loaded_ends
         self.run.clock[b.FLOOR] = model.slack_floor if model.slack == "stop" else -np.inf
         self.run.count[b.STIFF] = model.inextensible
-        self.set_model(model, blank_state(model.cells, len(model.line.torsion)))  # until `begin` or `restore`
+        self.set_model(model, state_for(model.line))  # until `begin` or `restore`
 
     def _set_control(self, resolution: Resolution) -> None:
         """How long steps may be."""
@@ -154,7 +156,8 @@ class Transient:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
         joints = self.switching is not None and self.switching.joints is not None
         paid = self.payout is not None and self.payout.due
-        return not (self._pending is not None or self._leaves or self._overloaded or joints or paid)
+        leaves = self._leaves or self._returns
+        return not (self._pending is not None or leaves or self._overloaded or joints or paid)
 
     # --- the start ------------------------------------------------------------------------------
 
@@ -307,7 +310,7 @@ class Transient:
         count, switching, asks = self.run.count, self.switching, 0
         if self._leaves:
             asks |= b.ASK_STEPS
-        changes = self._leaves or self._overloaded or self._pending is not None
+        changes = self._leaves or self._returns or self._overloaded or self._pending is not None
         if changes or self.asks_samples or (self.payout is not None and self.payout.due):
             asks |= b.ASK_SAMPLES
         if switching is not None and not switching.compiled:
@@ -355,12 +358,13 @@ class Transient:
             self.plane_monitor.renew(run)
         if flags & b.LEAVES_PLANE:
             self._leaves = self.plane_monitor.must_leave(run, self._note)
+        self._returns = bool(flags & b.NEARS_PLANE)
         if flags & b.LETS_GO:
             self._overloaded = overloaded(run)
         if self.switching is not None:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
-        changes = self._pending is not None or self._leaves or bool(self._overloaded)
+        changes = self._pending is not None or self._leaves or self._returns or bool(self._overloaded)
         changes |= self.payout is not None and self.payout.due
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
@@ -384,9 +388,21 @@ class Transient:
             state = self.state.copy()
             self.set_model(self.plane_monitor.leave(self.model, self.run, state), state)
             self.evaluate_forces()
+        if self._returns:
+            self._returns = False
+            self._come_back()
         released, self._overloaded = self._overloaded, {}
         for k, why in released.items():
             self.release(k, why, new_leg=False)
+
+    def _come_back(self) -> None:
+        """Go on in the plane that was left."""
+        monitor, state = self.plane_monitor, self.state.copy()
+        model = monitor.come_back(self.model, self.run, state)
+        if model is not None:
+            self.set_model(model, state)
+            monitor.push_on(self.run, model)
+            self.evaluate_forces()
 
     def evaluate_forces(self) -> None:
         """The forces and the powers of a state that has changed between two steps."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -11,7 +12,7 @@ from hybrid.kernels import books as b
 from hybrid.kernels.cell_errors import CURVATURE, QUANTITIES
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import SAME_TIME
-from hybrid.kernels.state import blank_state
+from hybrid.kernels.state import state_for
 from hybrid.kernels.step_law import WARY
 from hybrid.simulation.restore import mesh_tree
 from hybrid.simulation.transient import Transient
@@ -39,7 +40,7 @@ def checkpoint(run: Transient) -> dict[str, Any]:
         "report": books.report[:2].copy(), "tension": books.tension[0].copy(),
         "last": float(clock[b.NOW] - clock[b.PREVIOUS]), "control": control if run.controlled else None,
         "state": run.state._asdict(), "mesh": mesh_tree(model), "plane": model.plane,
-        "push": run.plane_monitor.checkpoint(run.run),
+        "push": run.plane_monitor.checkpoint(run.run), "home": run.plane_monitor.home,
         "self_contact": run.run.contact and run.run.contact.checkpoint(run.t),
         "envelope": run.envelope and run.envelope.checkpoint(books.extremes),
     }  # fmt: skip
@@ -53,23 +54,30 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     model, monitor, compiled = run.model, run.plane_monitor, run.run
     if saved["push"] is not None and model.plane is not None:
         monitor.speed = model.length / model.time_scale
+    if saved.get("home") is not None:  # not in a checkpoint of 0.6
+        monitor.home = matched(saved["home"], np.zeros((3, 3)), "home")
+        model = replace(model, line=model.line._replace(plane=monitor.home))
     if run.payout is not None:
         model = run.payout.restore(saved["payout"], model)
-    state = blank_state(model.cells, len(model.line.torsion))
+    state = state_for(model.line)
     run.set_model(model, state)
     complete = "report" in saved  # not in a checkpoint of 0.6
-    free = dict.fromkeys(("mesh", "plane", "envelope", "payout"))
+    free = dict.fromkeys(("mesh", "plane", "home", "envelope", "payout"))
     template = checkpoint(run) | free | {"report": np.full((2, REPORT_SIZE), np.inf)}
     older = {"report": compiled.books.report[:2], "tension": state.T, "last": 0.0, "_turned": False, "leg": [0.0, 0]}
-    older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None}
+    older |= {"envelope": None, "_slackened": False, "self_contact": None, "payout": None, "home": None}
     report = saved.get("report")
     if isinstance(report, np.ndarray) and report.ndim == 2 and FIRST_REPORT <= report.shape[1] < REPORT_SIZE:
         saved = {**saved, "report": np.pad(report, ((0, 0), (0, REPORT_SIZE - report.shape[1])))}
+    if isinstance(saved["push"], dict):
+        saved = {**saved, "push": {"real": False} | saved["push"]}
     if run.correction is not None and isinstance(saved.get("correction"), dict):
         older |= {"correction": {"sampled": run.correction.corrector.sampled[0]} | saved["correction"]}
         saved = {name: x for name, x in saved.items() if name != "correction"}
     if isinstance(saved.get("state"), dict) and "turn" not in saved["state"] and not model.line.torsion.size:
         saved = {**saved, "state": {**saved["state"], "turn": state.turn}}
+    if isinstance(saved.get("state"), dict) and "slow" not in saved["state"] and not state.slow.size:  # not in 0.6
+        saved = {**saved, "state": {**saved["state"], "slow": state.slow}}
     if isinstance(saved.get("ends"), dict) and "released" not in saved["ends"]:  # not in a checkpoint of 0.6
         saved = {**saved, "ends": {**saved["ends"], "released": model.ends.released.copy()}}
     if isinstance(saved.get("zoning"), dict):

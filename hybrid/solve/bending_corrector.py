@@ -28,7 +28,7 @@ from hybrid.kernels.entry import workspace
 from hybrid.kernels.forces import FRICTION, SEABED, WAVES
 from hybrid.kernels.neglected_moments import Bending
 from hybrid.kernels.seabed import contact
-from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
+from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea, State, Work, ends_in, no_sea
 from hybrid.kernels.step import friction_axes
 
 # Part of the line's length beyond which an error is none that a linear estimate could know: it is clipped there.
@@ -171,7 +171,8 @@ class Corrector:
             a = self._carried(batch, e, part * error[:, 0, :-1, 3])
             found, strain = np.zeros((2, n + 1, 3))
             for k in range(len(e)):
-                observe(line, ends_in(batch, k), e[k], batch.v[k], a[k], batch.w[k], found, strain, np.zeros(4))
+                of = ends_in(batch, k), e[k], batch.v[k], a[k], batch.w[k], batch.T[k], NO_TURN
+                observe(line, *of, found, strain, np.zeros(4))
                 M[k] += found[[0, 1, n - 1, n]]
         out = np.zeros((len(batch.t), 2, 3))
         for k, c, sign in ((0, 0, 1.0), (1, n - 1, -1.0)):

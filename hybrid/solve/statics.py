@@ -12,10 +12,10 @@ from hybrid.errors import ComputationError, Outcome
 from hybrid.kernels import entry
 from hybrid.kernels.bed import planes_under
 from hybrid.kernels.entry import Limits, workspace_of
-from hybrid.kernels.forces import FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
+from hybrid.kernels.forces import AXIAL_LAW, FLOW, FRICTION, MASS_DAMPING, PLANAR, ROTARY, SEABED, WAVES
 from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE
 from hybrid.kernels.resolution_checks import lowest, lowest_not_held
-from hybrid.kernels.state import Ends, Floats, Line, Sea, State
+from hybrid.kernels.state import NO_ADDRESS, Ends, Floats, Line, Sea, State
 from hybrid.kernels.step import friction_axes
 from hybrid.solve.laid import laid_on_bed
 from hybrid.solve.stability import Stability, is_judged
@@ -152,6 +152,7 @@ def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, 
     falls to the real one.  A part of the way that fails is halved.
     """
     line, state = solver.line, start.copy()
+    straight = line._replace(bits=line.bits & ~AXIAL_LAW, law_at=NO_ADDRESS)
     state.T[:] = solver.scale
     chords = np.linalg.norm(start.e, axis=1)
     soft, short = np.maximum(line.ck, 1.0 / solver.scale), 0.5 * chords
@@ -161,7 +162,7 @@ def _hardened(solver: _Solver, ends: Ends, start: State) -> tuple[str, Outcome, 
     while done < 1.0 and part > 1e-3:
         goal = min(1.0, done + part)
         longer, harder = min(1.0, 2.0 * goal), max(0.0, 2.0 * goal - 1.0)
-        between = line._replace(h=short ** (1 - longer) * line.h**longer, ck=soft ** (1 - harder) * hard**harder)
+        between = straight._replace(h=short ** (1 - longer) * line.h**longer, ck=soft ** (1 - harder) * hard**harder)
         outcome, where, found = solver.newton(between if goal < 1.0 else line, ends, state)
         steps += 1
         if outcome == Outcome.OK:

@@ -105,7 +105,7 @@ class Stepper:
         line = self.line._replace(bits=self.line.bits & ~(FRICTION | WAVES))
         rows = block_rows(line)
         self.work.u[:] = 0.0
-        at_rest = state._replace(vd=still, T=tension)
+        at_rest = state._replace(vd=still, T=state.T if line.law.size else tension)
         entry.assembly(line, sea, ends, at_rest, 0.0, HEAVY, self.work._replace(rows=rows))
         force = out_of_balance(line, rows)
         force[np.flatnonzero(ends.held) * (line.s.size - 1)] = 0.0

@@ -21,9 +21,11 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.block_elimination import KEPT, ROW, SIZE, WIDTH
 from hybrid.kernels.bodies import FRAME, LINES, MASS, NUMBERS, OWN, PLACE, STATE, VD, WA, WD, WORK, A, U, V, W, X
 from hybrid.kernels.books import Books
+from hybrid.kernels.carried_frames import ANSWER, SEAT, TURNS
 from hybrid.kernels.entry import NO_PUSH, workspace
 from hybrid.kernels.forces import FRICTION, WAVES
-from hybrid.kernels.joined_lines import FUNCTIONAL
+from hybrid.kernels.joined_lines import COLUMNS, FUNCTIONAL
+from hybrid.kernels.junctions import HANDED
 from hybrid.kernels.newton import ASSEMBLY, CORRECTION, EQUILIBRIUM, STEP, Limits, Task
 from hybrid.kernels.report import LOCAL_ERROR, RESIDUAL
 from hybrid.kernels.resolution_checks import lowest
@@ -58,6 +60,9 @@ class JoinedLine(NamedTuple):
     floor: float  # N, tension at or below which a catenary cell is slack in motion; -infinity: it may be
     joints: tuple[int, int]  # numbers of the points, or behind them bodies, that start and end are joined to; -1: held
     fairleads: Floats = np.zeros((2, 3))  # m, of ends that are joined to bodies, in axes of the body
+    seats: Floats = np.zeros(
+        (2, SEAT)
+    )  # frames of ends that turn with these (kernels.carried_frames); zeros: none does
 
 
 class SystemState(NamedTuple):
@@ -92,9 +97,15 @@ def joined_ends(ends: Ends, joints: tuple[int, int]) -> Ends:
     return ends._replace(held=held)
 
 
-def _room(cells: int, joints: tuple[int, int]) -> Work:
-    """Arrays for a line, with room for all its factors where its start is joined, for the last where its end is."""
-    kept = (cells + 1) * KEPT if joints[0] >= 0 else KEPT if joints[1] >= 0 else 0
+def _carries(x: JoinedLine) -> bool:
+    """Whether a line is solved for more right-hand sides: its start is joined, or an end turns."""
+    return x.joints[0] >= 0 or bool(x.seats[:, TURNS].any())
+
+
+def _room(x: JoinedLine) -> Work:
+    """Arrays for a line, with room for all its factors where they serve again, for the last where its end is joined."""
+    cells, joints = x.line.h.size, x.joints
+    kept = (cells + 1) * KEPT if _carries(x) else KEPT if joints[1] >= 0 else 0
     rows = np.zeros((1 if joints[0] >= 0 else 0, SIZE * WIDTH))
     return workspace(cells)._replace(X=np.zeros((cells + 1) * ROW + kept), rows=rows)
 
@@ -114,20 +125,23 @@ class SystemSolver:
         self.body_work = np.zeros((len(bodies), WORK))
         self._fairleads = np.array([x.fairleads for x in lines], float).reshape(-1, 2, 3)
         self._arms, self._gaps = np.zeros_like(self._fairleads), np.zeros_like(self._fairleads)
-        self._handed, self._follow = np.zeros((7, 8)), np.zeros((2, 3, 6))
+        self._seats = np.array([x.seats for x in lines], float).reshape(-1, 2, SEAT)
+        self._handed, self._follow = np.zeros((HANDED - 1, HANDED)), np.zeros((2, 6, 6))
+        self._answers, self._turned = np.zeros((2, ANSWER)), np.zeros(COLUMNS)
         self.joints: NDArray[np.int64] = np.array([x.joints for x in lines], np.int64).reshape(-1, 2)
-        self.work = [_room(x.line.h.size, x.joints) for x in lines]
+        self.work = [_room(x) for x in lines]
         self.books = [blank_books(x.line.h.size) for x in lines]  # powers, work, extremes; `keep_books` gives others
         self._floors = np.array([x.floor for x in lines])
-        carried = [x.line.h.size + 1 if x.joints[0] >= 0 else 0 for x in lines]
+        carried = [x.line.h.size + 1 if _carries(x) else 0 for x in lines]
+        columns = COLUMNS if self._seats[:, :, TURNS].any() else 3
         self._first = np.concatenate([[0], np.cumsum(carried)[:-1]]).astype(np.int64)
-        self._columns = np.zeros((3, max(sum(carried), 1), SIZE))
-        self._functional, self.net = np.zeros((3, FUNCTIONAL)), np.zeros((points, 3))
+        self._columns = np.zeros((columns, max(sum(carried), 1), SIZE))
+        self._functional, self.net = np.zeros(FUNCTIONAL), np.zeros((points, 3))
         unknowns = int((self.joints[:, 1] >= 0).sum()) + 3 * points + 6 * len(bodies)
         self._matrix = np.zeros((unknowns + 3, unknowns + 1))
-        size = Table(blank_job()).numbers.size
-        self._numbers = np.zeros((len(lines), size), np.int64)
-        self._tables = [Table(blank_job(), room) for room in self._numbers]
+        blank = Table(blank_job())
+        self._numbers = np.zeros((len(lines), blank.numbers.size), np.int64)
+        self._tables = [blank.again(room) for room in self._numbers]
         self._states: tuple[list[State], list[State]] = ([], [])  # of lines, that are bound
         self._solver = in_space.address(self._numbers[0])
         mass = sum(float(x.line.mass.sum()) for x in lines) + float(bodies[:, MASS].sum())
@@ -158,8 +172,9 @@ class SystemSolver:
         self._states = [*old.lines], [*new.lines]
         outcome, iterations, left, line, where = solve_system(
             task, t, self._solver, self._numbers, self._numbers.view(np.float64), self.joints, self._fairleads,
-            self._arms, self._gaps, self._floors, self._first, self._columns, self._functional, self.net,
-            self.bodies, old.bodies, new.bodies, self.body_work, self._handed, self._follow, self._matrix,
+            self._seats, self._arms, self._gaps, self._floors, self._first, self._columns, self._functional,
+            self._answers, self._turned, self.net, self.bodies, old.bodies, new.bodies, self.body_work, self._handed,
+            self._follow, self._matrix,
         )  # fmt: skip
         return SystemTaken(Outcome(outcome), iterations, left, line, where, self.residual())
 
@@ -222,9 +237,10 @@ class SystemSolver:
             table.bind(work=work, ends=x.ends)
         if taken.outcome != Outcome.OK:
             return taken
-        for row, solved in zip(states.bodies, self.body_work[:, X : X + 6], strict=True):
+        for row, own, solved in zip(states.bodies, self.bodies, self.body_work[:, X : X + 6], strict=True):
             row[VD : VD + 3] = row[A : A + 3] = HEAVY * solved[:3]
-            row[WD : WD + 3] = row[WA : WA + 3] = HEAVY * solved[3:] @ row[FRAME:V].reshape(3, 3)
+            if own[MASS + 21 : MASS + 36].any():  # a turn without inertia has no acceleration
+                row[WD : WD + 3] = row[WA : WA + 3] = HEAVY * solved[3:] @ row[FRAME:V].reshape(3, 3)
         for x, work, state in zip(self.lines, self.work, states.lines, strict=True):
             state.vd[:] = HEAVY * work.x[:, 1:4]
             state.a[:] = state.vd

@@ -78,7 +78,7 @@ def _attempts(
     for name, start in starts:
         given.append((name, start))
         yield f"Newton from {name}", *solver.newton(start)
-    if any(x.line.bits & (SEABED | FLOW) for x in solver.lines):
+    if any(x.line.bits & (SEABED | FLOW) or x.line.element[[0, -1]].any() for x in solver.lines):
         for name, start in given:
             how, taken, states = _eased(solver, points, start)
             yield f"{how}, from {name}", taken, states

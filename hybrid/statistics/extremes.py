@@ -27,7 +27,7 @@ Floats = NDArray[np.float64]
 THREE_HOURS = 10800.0
 # Fractile that is printed beside the most probable value, and the part of bootstrap values inside an interval.
 FRACTILE, CONFIDENCE = 0.9, 0.9
-# Bootstrap samples: the ends of a 90 % interval then vary by 3 % of its width.
+# Bootstrap samples: a hundred lie beyond each end of an interval.
 RESAMPLES = 2000
 # Peaks, or largest values, that a fit needs; a law of two numbers through fewer says nothing.
 LEAST_PEAKS, LEAST_RECORDS = 20, 5

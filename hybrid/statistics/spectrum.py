@@ -15,7 +15,7 @@ from hybrid.statistics.moments import checked
 
 Floats = NDArray[np.float64]
 
-# Segments overlap by a half; so many in a record make a value of the spectrum good to about a fifth.
+# Segments overlap by a half; of so many a value of the spectrum has a standard deviation of a quarter.
 SEGMENTS = 16
 # Samples of a segment at least: fewer resolve no peak.
 LEAST_SAMPLES = 16

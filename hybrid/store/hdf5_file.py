@@ -21,6 +21,7 @@ from hybrid.store.integrity import being_written, is_signed, unmarked
 from hybrid.store.lock import is_held
 
 _LIBVER = ("v110", "v110")
+METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
 _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
 
 
@@ -168,6 +169,18 @@ def created(path: Path, make: bytes | Callable[[Path], None]) -> h5py.File:
     finally:
         new.unlink(missing_ok=True)
     return file
+
+
+def hold_metadata(file: h5py.File) -> None:
+    """Let a file of many datasets keep what it knows of them in memory, up to `METADATA` bytes.
+
+    Written by one and read by many, HDF5 2.0 fails where it has to drop some of it ("doesn't have a flush dependency
+    parent array"): results of 200 lines could not be written, and closing them ended the process.
+    """
+    config = file.id.get_mdc_config()
+    config.set_initial_size, config.initial_size, config.max_size = True, METADATA, METADATA
+    config.incr_mode = config.flash_incr_mode = config.decr_mode = 0
+    file.id.set_mdc_config(config)
 
 
 def in_memory(content: bytes = b"") -> h5py.File:

@@ -12,6 +12,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.statistics import extremes, fatigue, moments, spectrum
+from hybrid.store.bends import bends_of
 from hybrid.store.names import ALIASES
 
 if TYPE_CHECKING:
@@ -20,8 +21,13 @@ if TYPE_CHECKING:
 Floats = np.ndarray
 Window = tuple[float | None, float | None]
 
-# What is looked at when nothing is asked for, where the result has it.
-USUAL = ("end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact")
+# What is looked at when nothing is asked for, where the result has it; and all that its scene asks for by name.
+USUAL = (
+    "end_force_start", "end_force_end", "tension", "curvature", "bending_moment", "torque", "contact", "wall_tension",
+    "von_mises",
+)  # fmt: skip
+# Histories of one value that every result may have, and no scene asks for.
+NOT_ASKED_FOR = ("t", "contact_force", "grounded_length")
 # Fibres around a section at which its stress is counted.
 FIBRES = 8
 
@@ -46,8 +52,9 @@ class Section(NamedTuple):
 
 
 def usual_names(result: Result) -> list[str]:
-    """The quantities of USUAL that a result has."""
-    return [name for name in USUAL if name in result or f"steps/{name}" in result]
+    """The quantities of USUAL that a result has, and those that its scene asks for."""
+    asked = [x for x in result.names if "/" not in x and x not in NOT_ASKED_FOR and result.dims(x) == ("t",)]
+    return [name for name in USUAL if name in result or f"steps/{name}" in result] + asked
 
 
 def history_of(result: Result, name: str, times: Window | None = None, at: Any = None) -> History:
@@ -110,14 +117,17 @@ class Histories:
         """Summaries of histories by name, each of the shape of the quantity at one time: mean, deviation, skewness,
         extremes with their times, period between up-crossings of the mean, significant range, number of cycles.
 
-        names: None for end forces, tension, curvature, bending moment, torque and contact force, where the result has
-        them; times: from and to, s; at: arc lengths, m, None: all output points.  A quantity along the line has a value
+        names: None for end forces, tension, curvature, bending moment, torque, contact force, and what the scene asks
+        for, where the result has them at all outputs; times: from and to, s; at: arc lengths, m, None: all output
+        points.  A quantity along the line has a value
         at each place of `both_sides(name)[0]`: where it jumps, one before and one after.
         """
         found = {}
         asked = usual_names(self) if names is None else [names] if isinstance(names, str) else names
         for name in asked:
             history = history_of(self, name, times, at if lies_along(self, name) else None)
+            if names is None and not np.isfinite(history.values).all():
+                continue
             found[name] = moments.summary(history.t, history.values)
         return found
 
@@ -171,7 +181,7 @@ class Histories:
         if section is None or strength is not None or len(section) != 3 or not all(0.0 < x < np.inf for x in section):
             fix = "section=(area m2, outer diameter m, Young's modulus Pa)"
             raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
-        bends = _bends(self, times, np.asarray(tension.s))
+        bends = _bends(self, times, at)
         found = []
         for k in range(FIBRES):
             angle = 2.0 * np.pi * k / FIBRES
@@ -181,31 +191,11 @@ class Histories:
         return np.asarray(tension.s), np.max(found, axis=0)
 
 
-def _bends(result: Result, times: Window | None, at: Floats) -> Floats:
-    """Curvature (nt, n, 2) 1/m about two axes across the mean tangent at places (n,) m of `history_of`."""
-    (s, size), (_, theta), (_, phi) = (result.both_sides(name) for name in ("curvature", "theta", "phi"))
+def _bends(result: Result, times: Window | None, at: Any) -> Floats:
+    """Curvature (nt, n, 2) 1/m about two axes across the mean tangent at the places of `history_of`."""
     a, b = _window(times)
-    inside = (result["t"] >= a) & (result["t"] <= b)
-    size, theta, phi = size[inside], theta[inside], phi[inside]
-    tangent = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=2)
-    before = np.concatenate([tangent[:, :1], tangent[:, :-1]], axis=1)
-    after = np.concatenate([tangent[:, 1:], tangent[:, -1:]], axis=1)
-    axis = np.cross(before, after)
-    length = np.linalg.norm(axis, axis=2, keepdims=True)
-    axis = np.divide(axis, length, out=np.zeros_like(axis), where=length > 0.0)
-    mean = tangent.mean(axis=0)
-    if at.size != s.size or not np.array_equal(at, s):
-        nearest = np.array([np.abs(s - x).argmin() for x in at])
-        twice = np.flatnonzero(np.diff(at) == 0.0) + 1  # the second of two is the value after a jump
-        nearest[twice] += 1
-        size = np.stack([np.interp(at, s, row) for row in size]) if not np.isin(at, s).all() else size[:, nearest]
-        axis, mean = axis[:, nearest], mean[nearest]
-    aside = np.eye(3)[np.abs(mean).argmin(axis=1)]
-    one = np.cross(mean, aside)
-    one /= np.linalg.norm(one, axis=1, keepdims=True)
-    two = np.cross(mean, one)
-    two /= np.linalg.norm(two, axis=1, keepdims=True)
-    return np.stack([(axis * one).sum(axis=2) * size, (axis * two).sum(axis=2) * size], axis=2)
+    found = bends_of(result, (result["t"] >= a) & (result["t"] <= b))
+    return (found if at is None else found.at(at)).across()
 
 
 def lies_along(result: Result, name: str) -> bool:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from filelock import FileLock, Timeout
@@ -22,6 +22,8 @@ def is_held(path: Path) -> bool:
         return False
     try:
         with FileLock(_beside(path), timeout=0):
+            with suppress(OSError):  # Windows keeps what is open
+                _beside(path).unlink(missing_ok=True)  # it is made anew where the other process has just ended
             return False
     except (Timeout, OSError):
         return True

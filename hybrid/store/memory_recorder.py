@@ -31,9 +31,13 @@ class MemoryRecorder:
         self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
 
     def save_batch(
-        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]]
-    ) -> None:
-        """Append outputs at the times (nb,), s, of the fields (nb, ...).  ResultError when one is not finite."""
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
+        later: Sequence[Sequence[tuple[str, float, float]]] = (),
+    ) -> None:  # fmt: skip
+        """Append outputs at the times (nb,), s, of the fields (nb, ...).  ResultError when one is not finite.
+
+        later: as of `Recorder.save_batch`; not kept.
+        """
         for name, value in values.items():
             finite = np.isfinite(value).reshape(len(times), -1).all(axis=1)
             if not finite.all():

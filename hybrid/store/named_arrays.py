@@ -27,15 +27,29 @@ Tree = dict[str, Any]
 
 def pack(tree: Mapping[str, Any]) -> bytes:
     """A tree as bytes."""
-    arrays: list[bytes] = []
+    arrays = _Arrays()
     head = json.dumps(_plain(tree, arrays)).encode()
-    body = b"".join([len(head).to_bytes(8, "little"), head, *arrays])
+    body = b"".join([len(head).to_bytes(8, "little"), head, *arrays.parts])
     body = len(body).to_bytes(8, "little") + body
     return MAGIC + hashlib.blake2b(body, digest_size=DIGEST).digest() + body
 
 
-def _plain(x: Any, arrays: list[bytes]) -> Any:
-    """What JSON can write; the bytes of arrays are appended to `arrays`."""
+class _Arrays:
+    """Bytes of arrays one after the other, and their number so far."""
+
+    def __init__(self) -> None:
+        self.parts: list[bytes] = []
+        self.size = 0
+
+    def add(self, part: bytes) -> int:
+        """Where the part begins."""
+        at, self.size = self.size, self.size + len(part)
+        self.parts.append(part)
+        return at
+
+
+def _plain(x: Any, arrays: _Arrays) -> Any:
+    """What JSON can write; the bytes of arrays are added to `arrays`."""
     if isinstance(x, Mapping):
         return {name: _plain(value, arrays) for name, value in x.items()}
     if isinstance(x, list | tuple):
@@ -47,9 +61,7 @@ def _plain(x: Any, arrays: list[bytes]) -> Any:
     name = x.dtype.newbyteorder("<").str
     if name not in DTYPES:
         raise TypeError(f"an array of type {x.dtype} cannot be in a checkpoint")
-    at = sum(map(len, arrays))
-    arrays.append(np.asarray(x, name).tobytes())
-    return {ARRAY: [name, list(x.shape), at]}
+    return {ARRAY: [name, list(x.shape), arrays.add(np.asarray(x, name).tobytes())]}
 
 
 def unpack(data: bytes) -> Tree:

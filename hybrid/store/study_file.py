@@ -34,6 +34,8 @@ if TYPE_CHECKING:
 
 FORMAT = "hybrid-cable study 1"
 OPEN, DONE, FAILED = 0, 1, 2
+# Attribute of a coordinate whose values are written: an array and its values are two files.
+COMPLETE = "complete"
 # What is known of every case, with unit and description.
 OWN: dict[str, tuple[str, str, Any, Any]] = {
     "status": ("", "0: not done, 1: done, 2: failed", "i1", OPEN),
@@ -71,6 +73,7 @@ class StudyFile:
                 f"{path} is no study of this release\n    given:    format '{found}'\n    expected: '{FORMAT}'"
             )
         self.batch = int(self._group.attrs["batch"])
+        self._status = np.asarray(self._group["status"][:])
         self.cases = int(self._group["case"].shape[0])
 
     @classmethod
@@ -117,8 +120,8 @@ class StudyFile:
 
     @property
     def status(self) -> np.ndarray:
-        """Status (n,) of every case."""
-        return np.asarray(self._group["status"][:])
+        """Status (n,) of every case, as it was when the study was opened and with what was added since."""
+        return self._status.copy()
 
     def open_batches(self) -> list[int]:
         """Numbers of the batches that are not done."""
@@ -132,17 +135,16 @@ class StudyFile:
     def add(self, batch: int, columns: Mapping[str, Column], coordinates: Mapping[str, Column]) -> None:
         """Write what a batch has found: its collected columns (m, ...), those of OWN, and coordinates of dimensions.
 
-        Cases whose arrays have another shape than those of the study, or other coordinates, must have failed before.
+        Columns have the shapes of those of the study, and coordinates are new.
         """
-        where = self.slice_of(batch)
-        known = set(self._group.array_keys())
+        where, known = self.slice_of(batch), set(self._group.array_keys())
         for name, column in coordinates.items():
-            if name not in known:
-                array = self._group.create_array(
-                    name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype,
-                    dimension_names=[name], attributes={"units": column.unit, "long_name": column.description},
-                )  # fmt: skip
-                array[:] = column.values
+            array = self._group.create_array(
+                name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype, overwrite=True,
+                dimension_names=[name], attributes={"units": column.unit, "long_name": column.description},
+            )  # fmt: skip
+            array[:] = column.values
+            array.attrs[COMPLETE] = 1
         for name, column in columns.items():
             if name == "status":
                 continue
@@ -150,17 +152,18 @@ class StudyFile:
                 self._array(self._group, name, column, self.cases, self.batch)
             text = column.values.dtype.kind in "UO"
             self._group[name][where] = column.values.astype(object) if text else column.values
-        self._group["status"][where] = columns["status"].values
+        self._group["status"][where] = self._status[where] = columns["status"].values
 
     def coordinate(self, name: str) -> np.ndarray | None:
-        """Values of a dimension; None: there is none yet."""
-        return np.asarray(self._group[name][:]) if name in self._group else None
+        """Values of a dimension; None: there are none yet, or a kill came while they were written."""
+        if name not in self._group or not self._group[name].attrs.get(COMPLETE):
+            return None
+        return np.asarray(self._group[name][:])
 
     def reopen(self, cases: Iterable[int]) -> None:
         """Make cases open again, to be computed anew."""
-        status = self.status
-        status[list(cases)] = OPEN
-        self._group["status"][:] = status
+        self._status[list(cases)] = OPEN
+        self._group["status"][:] = self._status
 
 
 def open_study(path: str | Path) -> xarray.Dataset:

@@ -46,7 +46,7 @@ from hybrid.store.format import (
     write_fixed,
     write_texts,
 )
-from hybrid.store.hdf5_file import check_target, created, drafted, give_up, in_memory, unwritable
+from hybrid.store.hdf5_file import check_target, created, drafted, give_up, hold_metadata, in_memory, unwritable
 from hybrid.store.integrity import sign
 from hybrid.store.lines import GROUP, add_parts, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
@@ -114,6 +114,8 @@ class Recorder:
             image = bytes(file.id.get_file_image())
             file.close()
             file = created(path, image)
+            if parts:
+                hold_metadata(file)
         self._write_to(file, path, tables_of(fields, step_fields))
         self._take(parts or {})
 
@@ -159,7 +161,10 @@ class Recorder:
                         del each.attrs[name]
 
         self._memory = None
-        self._write_to(created(path.expanduser().resolve(), make), path, tables)
+        file = created(path.expanduser().resolve(), make)
+        if parts:
+            hold_metadata(file)
+        self._write_to(file, path, tables)
         self._go_on(at.rows, at.happened)
         self._zones, self._number = list(at.zones), at.number + 1
         self._take(parts or {})
@@ -217,10 +222,12 @@ class Recorder:
         self.save_batch(np.array([t]), {name: np.asarray(x)[None] for name, x in values.items()}, zones)
 
     def save_batch(
-        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]]
-    ) -> None:
-        """Append outputs at the times (nb,), s, of the fields (nb, ...), with the zones that hold in all of them.
+        self, times: np.ndarray, values: Mapping[str, np.ndarray], zones: Sequence[tuple[str, float, float]],
+        later: Sequence[Sequence[tuple[str, float, float]]] = (),
+    ) -> None:  # fmt: skip
+        """Append outputs at the times (nb,), s, of the fields (nb, ...), with the zones that hold in all of them, or
 
+        in the first; later: those of each of the others, where they differ.
         The arrays are kept until they are written.  ResultError when a field is missing, unknown, of another shape, or
         not finite; the outputs before the first that is wrong are kept.
         """
@@ -238,19 +245,23 @@ class Recorder:
             if first < good:
                 good, error = first, why
         if good:
-            self._keep(times[:good], [values[field.name][:good] for field in fields], zones)
+            self._keep(times[:good], [values[field.name][:good] for field in fields], [zones, *later][:good])
         if error:
             raise ResultError(error)
 
-    def _keep(self, times: np.ndarray, columns: list[np.ndarray], zones: Sequence[tuple[str, float, float]]) -> None:
-        """Let outputs wait, and their zones where they are others than before."""
-        now = [(str(kind), float(a), float(b)) for kind, a, b in zones]
-        if not all(isfinite(a) and isfinite(b) for _, a, b in now):
-            raise ResultError(f"a zone is not finite at t = {times[0]:.9g} s: {now}")
-        if now != self._zones:
-            for zone in now:
-                self._zone_rows.add_row((times[0], self._outputs.count + self._outputs.waiting, *zone))
-            self._zones = now
+    def _keep(
+        self, times: np.ndarray, columns: list[np.ndarray], zones: Sequence[Sequence[tuple[str, float, float]]]
+    ) -> None:
+        """Let outputs wait, and the zones of the first, or of each, where they are others than before."""
+        first = self._outputs.count + self._outputs.waiting
+        for k, these in enumerate(zones):
+            now = [(str(kind), float(a), float(b)) for kind, a, b in these]
+            if not all(isfinite(a) and isfinite(b) for _, a, b in now):
+                raise ResultError(f"a zone is not finite at t = {times[k]:.9g} s: {now}")
+            if now != self._zones:
+                for zone in now:
+                    self._zone_rows.add_row((times[k], first + k, *zone))
+                self._zones = now
         self._outputs.add([times, *columns])
         self.last = float(times[-1])
 

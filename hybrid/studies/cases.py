@@ -18,9 +18,10 @@ from typing import Any
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.scene.read import parse_either, text_of, validate_scene
+from hybrid.scene.read import as_scene_or_system, parse_either, text_of
 from hybrid.scene.schema import Scene
 from hybrid.scene.study import MOST_CASES, TAKEN, Study
+from hybrid.scene.system import System
 from hybrid.store.selection import optional_package
 from hybrid.studies.sensitivity import DESIGNS, design
 
@@ -51,9 +52,14 @@ class Cases:
     static: bool
     bounds: dict[str, tuple[float, float]]
 
-    def scene(self, case: int) -> Scene:
+    def scene(self, case: int) -> Scene | System:
         """The scene of a case; SceneError if it is refused."""
         return scene_of(self.base, self.keys, self.rows[case])
+
+    @property
+    def lines(self) -> tuple[str, ...]:
+        """Names of the lines of a scene of several; empty of a scene of one."""
+        return tuple(self.base.get("lines", ()))
 
     @property
     def identity(self) -> str:
@@ -75,9 +81,6 @@ def cases_of(study: Study) -> Cases:
     """The cases of a study; SceneError if its scene, its keys or its table of cases is refused, or none is left."""
     text = text_of(study.scene)
     scene, _ = parse_either(text, study.scene)
-    if not isinstance(scene, Scene):
-        fix = "a scene with `cable` and `ends`"
-        raise SceneError([Complaint("scene", f"{len(scene.lines)} lines", "a scene of one cable", fix)], study.scene)
     if not study.static:
         scene.require_time()
     keys = {name: each.keys or (each.key or name,) for name, each in study.vary.items()}
@@ -104,8 +107,8 @@ def _refuse_names(keys: Mapping[str, Sequence[str]], study: Study) -> None:
     """SceneError for a name that means two things, or a key that two variables set."""
     known: dict[str, str] = {}
     for name, paths in keys.items():
-        if name in TAKEN or name == "s" or name in study.derive:
-            expected = f"a name of its own, none of {', '.join((*TAKEN, 's'))}, and not that of a derived column"
+        if name in TAKEN or name in study.derive:
+            expected = f"a name of its own, none of {', '.join(TAKEN)}, and not that of a derived column"
             raise SceneError([Complaint("vary", name, expected, f"{name}_: {{key: ...}}")])
         for path in paths:
             if path in known:
@@ -120,13 +123,13 @@ def _with_absolute_files(row: Row, keys: Mapping[str, Sequence[str]], folder: Pa
     return {k: str((folder / v).absolute()) if k in named and isinstance(v, str) else v for k, v in row.items()}
 
 
-def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene:
-    """The scene with the values of a row; SceneError if it is refused."""
+def scene_of(base: Mapping[str, Any], keys: Mapping[str, Sequence[str]], row: Row) -> Scene | System:
+    """The scene, of one line or several, with the values of a row; SceneError if it is refused."""
     data = deepcopy(dict(base))
     for name, paths in keys.items():
         for path in paths:
             _set(data, path, row[name])
-    return validate_scene(data)
+    return as_scene_or_system(data)
 
 
 def short_names(names: Iterable[str]) -> dict[str, str]:
@@ -259,7 +262,7 @@ def _check_keys(text: str, file: str, keys: Mapping[str, Sequence[str]], row: Ro
 
 def _set(data: Any, path: str, value: Any) -> None:
     """Set a value in tables and lists; tables that are not there are made."""
-    parts: list[str | int] = [int(x) if x.isdigit() else x for x in re.findall(r"\w+", path)]
+    parts: list[str | int] = [int(x[1:]) if x[0] == "[" else x.strip() for x in re.findall(r"\[\d+|[^.\[\]]+", path)]
     for part, after in pairwise(parts):
         if isinstance(data, dict) and not isinstance(data.get(part), dict | list):
             data[part] = {} if isinstance(after, str) else []

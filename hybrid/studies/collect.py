@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import re
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -48,9 +49,16 @@ class Variable(NamedTuple):
     coordinates: Mapping[str, tuple[str, Floats]]
 
 
-def usual(static: bool) -> dict[str, Kept]:
-    """What is kept where a study does not say."""
-    return {name: Kept(quantity=q, take=take) for name, (q, take) in (AT_REST if static else USUAL).items()}
+def usual(static: bool, lines: Sequence[str] = ()) -> dict[str, Kept]:
+    """What is kept where a study does not say; lines: names of several lines, of each of which it is kept."""
+    table = AT_REST if static else USUAL
+    if not lines:
+        return {name: Kept(quantity=q, take=take) for name, (q, take) in table.items()}
+    return {
+        re.sub(r"\W", "_", f"{line}_{name}"): Kept(quantity=q, take=take, line=line)
+        for line in lines
+        for name, (q, take) in table.items()
+    }
 
 
 def names_of(wanted: Mapping[str, Kept]) -> dict[str, tuple[str, str]]:
@@ -69,7 +77,8 @@ def collected(result: Result, wanted: Mapping[str, Kept]) -> dict[str, tuple[Var
     """
     found: dict[str, tuple[Variable, Floats]] = {}
     for key, (name, take) in names_of(wanted).items():
-        found[key] = _taken(result, name, wanted[name], take)
+        of = result if wanted[name].line is None else result.line(str(wanted[name].line))
+        found[key] = _taken(of, name, wanted[name], take)
     return found
 
 
@@ -81,14 +90,14 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
         known = values[np.isfinite(values)]
         worst = (known.max() if take == "max" else known.min()) if known.size else np.nan
         return Variable(result.units[name], f"{WORDS[take]} {name}, every step", (), {}), np.asarray(worst)
-    places = {f"{own}_at": ("m", at)} if at is not None and at.size > 1 else {}
-    dims = tuple(places)
     if take == "damage":
         assert kept.curve is not None
         s, damage = result.damage(kept.curve, strength=kept.strength, section=kept.section, times=kept.times, at=at)
         text = f"fatigue damage by {kept.curve}"
         if at is None:
-            return Variable("", text, ("s",), {"s": ("m", s)}), damage
+            along = "s" if kept.line is None else f"{own}_s"
+            return Variable("", text, (along,), {along: ("m", s)}), damage
+        dims, places = _places(own, s)
         return Variable("", text, dims, places), damage if dims else damage[0]
     if at is not None and not lies_along(result, name):
         raise ResultError(f"'{name}' has no value at an arc length")
@@ -97,20 +106,20 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
         raise ResultError(
             f"'{name}' has {history.values[0].size} values at a time, and one is kept\n    try:      end_force_end"
         )
-    if places and history.s is not None and history.s.size != at.size:  # type: ignore[union-attr]
-        places = {f"{own}_at": ("m", history.s)}  # a place where the quantity jumps comes twice
+    dims, places = ((), {}) if at is None or history.s is None else _places(own, history.s)
     unit, about = history.unit, f"{name}, {history.basis}"
     values = history.values
     if take == "profile":
         if history.s is None:
             raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
-        return Variable(unit, f"{WORDS[take]}: {about}", ("s",), {"s": ("m", history.s)}), values.max(axis=0)
+        along = "s" if kept.line is None else f"{own}_s"
+        return Variable(unit, f"{WORDS[take]}: {about}", (along,), {along: ("m", history.s)}), values.max(axis=0)
     if take == "history":
         if history.s is not None and at is None:
             raise ResultError(f"a history of '{name}' is at a place\n    try:      at: [0]")
         time = f"{own}_time"
-        along = {time: ("s", history.t)} | places
-        return Variable(unit, about, (time, *dims), along), values if dims else values.reshape(-1)
+        axes = {time: ("s", history.t)} | places
+        return Variable(unit, about, (time, *dims), axes), values if dims else values.reshape(-1)
     flat = values.reshape(history.t.size, -1)
     text = f"{WORDS[take]} {about}"
     if take in ("extreme", "fractile"):
@@ -124,6 +133,11 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
     summary = moments.summary(history.t, flat)
     variable = Variable(unit if other is None else other, text, dims, places)
     return _placed(variable, getattr(summary, attribute))
+
+
+def _places(own: str, s: Floats) -> tuple[tuple[str, ...], dict[str, tuple[str, Floats]]]:
+    """Dimension and coordinate of several places s (m); none of one.  Where a quantity jumps a place comes twice."""
+    return ((), {}) if s.size == 1 else ((f"{own}_at",), {f"{own}_at": ("m", s)})
 
 
 def _extreme(t: Floats, x: Floats, hours: float, take: str) -> float:

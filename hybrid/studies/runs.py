@@ -220,7 +220,7 @@ class RunStore:
 def key_of(scene: Scene, repeat: int, also: str = "") -> str:
     """Hash of all that decides the result of a run: scene, files it reads, package, repetitions."""
     digest = hashlib.sha256(f"{version('hybrid-cable')} {repeat}{also}\n{scene_text(scene)}".encode())
-    for path in (*scene.ends.files(), *scene.environment.files()):
+    for path in (*scene.ends.files(), *scene.environment.files(), *scene.cable.files()):
         digest.update(Path(path).read_bytes())
     package = Path(__file__).parents[1]
     for source in sorted(package.rglob("*.py")):

@@ -9,6 +9,7 @@ docs/studies.md
 
 from __future__ import annotations
 
+import hashlib
 import json
 import os
 import sys
@@ -16,15 +17,16 @@ import time as clock
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
+from importlib.metadata import version
+from os import PathLike
 from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 
-from hybrid.errors import EVENTS_BY_WEIGHT, Complaint, ComputationError, HybridError, ResultError, SceneError
+from hybrid.errors import EVENTS_BY_WEIGHT, Complaint, HybridError, ResultError, SceneError
 from hybrid.model.plan import plan
-from hybrid.scene.read import SceneLike
 from hybrid.scene.study import Kept, Study, read_study, study_from
 from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
@@ -36,7 +38,7 @@ from hybrid.studies.collect import Variable, collected, names_of, usual
 if TYPE_CHECKING:
     import xarray
 
-# s of processor time that a batch should take: long against the scheduler's millisecond, short against a coffee.
+# s of processor time that a batch should take: long against the scheduler's milliseconds, and little is lost by a kill.
 BATCH_TIME, MOST_IN_BATCH = 4.0, 200
 # Batches that a worker has, or waits for.
 AHEAD = 3
@@ -83,7 +85,7 @@ class Outcome(NamedTuple):
 
 
 def study(
-    source: SceneLike | Study | None = None,
+    source: str | PathLike[str] | Study,
     output: str | Path | None = None,
     *,
     vary: Mapping[str, Any] | None = None,
@@ -107,8 +109,10 @@ def study(
     is gone; what was computed until then stays, and the same call goes on.
     """
     asked, target = _asked(source, vary, collect, more, output)
-    cases, wanted = cases_of(asked), asked.collect or usual(asked.static)
+    cases = cases_of(asked)
+    wanted = asked.collect or usual(asked.static, cases.lines)
     _refuse_collisions(cases, wanted)
+    _refuse_unknown_lines(cases, wanted)
     identity = _identity(cases, wanted, asked.derive)
     with locked(target):
         if target.exists() and overwrite:
@@ -166,17 +170,27 @@ def _refuse_collisions(cases: Cases, wanted: Mapping[str, Kept]) -> None:
         raise SceneError([Complaint("collect", given, expected, "another name")])
 
 
-def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str]) -> str:
-    import hashlib
+def _refuse_unknown_lines(cases: Cases, wanted: Mapping[str, Kept]) -> None:
+    """SceneError where something is to be kept of a line that is not there, or of none where there are several."""
+    for name, kept in wanted.items():
+        if kept.line is not None and kept.line not in cases.lines:
+            expected = f"one of {', '.join(cases.lines)}" if cases.lines else "nothing, because the scene has one line"
+            raise SceneError([Complaint(f"collect.{name}.line", kept.line, expected, "see `lines` of the scene")])
+        if kept.line is None and cases.lines and (kept.curve or {"profile"} & set(kept.take)):
+            expected = f"one of {', '.join(cases.lines)}: what lies along a line is of one of them"
+            raise SceneError([Complaint(f"collect.{name}.line", "nothing", expected, f"line: {cases.lines[0]}")])
 
-    kept = {name: each.model_dump(mode="json") for name, each in wanted.items()} | {"derive": dict(derived)}
+
+def _identity(cases: Cases, wanted: Mapping[str, Kept], derived: Mapping[str, str]) -> str:
+    kept: dict[str, Any] = {name: each.model_dump(mode="json") for name, each in wanted.items()}
+    kept |= {"derive": dict(derived), "release": version("hybrid-cable")}  # results of two releases are not mixed
     return hashlib.sha256((cases.identity + json.dumps(kept, sort_keys=True)).encode()).hexdigest()[:16]
 
 
 def _refuse_other(file: StudyFile, identity: str) -> None:
     if file.attributes["identity"] != identity:
         raise ResultError(
-            f"{file.path} holds another study: its scene, values, files or what is kept have changed since\n"
+            f"{file.path} holds another study: its scene, values, files, what is kept or the release have changed\n"
             "    try:      -o with another name, or --overwrite to begin anew"
         )
 
@@ -230,8 +244,6 @@ def _computed(job: Job, row: dict[str, Any]) -> Outcome:
         first = error.complaints[0]
         reason = f"refused: {first.where}: given {first.value}, expected {first.expected}"
         return Outcome(FAILED, reason, "", clock.process_time() - begin, -1, {})
-    except ComputationError as error:
-        return Outcome(FAILED, str(error).splitlines()[0], "", clock.process_time() - begin, -1, {})
     except HybridError as error:
         return Outcome(FAILED, str(error).splitlines()[0], "", clock.process_time() - begin, -1, {})
     except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
@@ -240,7 +252,8 @@ def _computed(job: Job, row: dict[str, Any]) -> Outcome:
     with result:
         kinds = {event.kind for event in result.events}
         events = ", ".join([*(k for k in EVENTS_BY_WEIGHT if k in kinds), *sorted(kinds - set(EVENTS_BY_WEIGHT))])
-        steps = len(result["steps/t"]) if "steps/t" in result else 0
+        logged = next(iter(result.lines.values()), result)
+        steps = len(logged["steps/t"]) if "steps/t" in logged else 0
         try:
             return Outcome(DONE, "", events, spent, steps, collected(result, job.wanted))
         except (HybridError, KeyError, AttributeError) as error:
@@ -332,7 +345,7 @@ def _one_by_one(client: Any, job: Job, error: BaseException, distributed: Any) -
         try:
             outcomes += future.result()
         except distributed.KilledWorker:
-            outcomes.append(Outcome(FAILED, f"its worker died, {TRIES} times (memory?)", "", np.nan, -1, {}))
+            outcomes.append(Outcome(FAILED, "its worker died at every try (out of memory?)", "", np.nan, -1, {}))
     return outcomes
 
 
@@ -342,9 +355,13 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     distributed = optional_package("distributed", "a study", "studies")
     import dask
 
-    settings = {"distributed.scheduler.allowed-failures": TRIES - 1, "distributed.comm.timeouts.connect": "20s"}
+    settings = {
+        "distributed.scheduler.allowed-failures": TRIES - 1, "distributed.comm.timeouts.connect": "20s",
+        "distributed.worker.profile.enabled": False,  # it stops the worker a hundred times a second to look at it
+    }  # fmt: skip
     with dask.config.set(settings), ExitStack() as stack:
         if scheduler is not None:
+            stack.enter_context(_quiet("distributed"))
             try:
                 yield stack.enter_context(distributed.Client(scheduler, timeout="20s", set_as_default=False))
             except OSError as error:
@@ -365,6 +382,22 @@ def _client(workers: int | None, scheduler: str | None) -> Iterator[Any]:
             yield stack.enter_context(distributed.Client(cluster, set_as_default=False))
         finally:
             os.environ.pop("HYBRID_THREADS") if before is None else os.environ.update(HYBRID_THREADS=before)
+
+
+@contextmanager
+def _quiet(name: str) -> Iterator[None]:
+    """Nothing is logged under a name and below it: that a scheduler is gone is said once, in our words."""
+    import logging
+
+    known = [x for x in list(logging.Logger.manager.loggerDict) if x == name or x.startswith(f"{name}.")]
+    before = {x: logging.getLogger(x).level for x in known}
+    for x in before:
+        logging.getLogger(x).setLevel(logging.CRITICAL)
+    try:
+        yield
+    finally:
+        for x, level in before.items():
+            logging.getLogger(x).setLevel(level)
 
 
 @contextmanager
@@ -390,16 +423,8 @@ def _write(file: StudyFile, batch: int, outcomes: list[Outcome]) -> None:
     for one in outcomes:
         kept, why = dict(one.kept), []
         for name, (variable, values) in one.kept.items():
-            misfit = shapes.setdefault(name, values.shape) != values.shape
-            for dim, (unit, along) in variable.coordinates.items():
-                known = coordinates[dim].values if dim in coordinates else file.coordinate(dim)
-                if known is None:
-                    text = "arc length" if unit == "m" else "time"
-                    coordinates[dim] = Column(unit, text, (), np.asarray(along, float))
-                elif known.shape != np.shape(along) or not np.allclose(known, along, rtol=1e-9, atol=1e-12):
-                    misfit = True
-            if misfit:
-                why.append(f"{name}, whose times or places are not those of the first case")
+            if not _fits(file, shapes, coordinates, name, variable, values):
+                why.append(f"{name}, whose times or places are not those of the cases before")
                 del kept[name]
         if why:
             one = one._replace(reason=NOT_KEPT + "; ".join(why), kept=kept)
@@ -417,3 +442,22 @@ def _write(file: StudyFile, batch: int, outcomes: list[Outcome]) -> None:
         array = np.array([getattr(one, name) for one in fitting], dtype=object if kind is str else kind)
         columns[name] = Column(unit, text, (), array)
     file.add(batch, columns, coordinates)
+
+
+def _fits(
+    file: StudyFile, shapes: dict[str, tuple[int, ...]], coordinates: dict[str, Column], name: str, variable: Variable,
+    values: np.ndarray,
+) -> bool:  # fmt: skip
+    """Whether an array has the shape, times and places of the study; those of the first one become the study's."""
+    new = {}
+    for dim, (unit, along) in variable.coordinates.items():
+        known = coordinates[dim].values if dim in coordinates else file.coordinate(dim)
+        if known is None:
+            new[dim] = Column(unit, "arc length" if unit == "m" else "time", (), np.asarray(along, float))
+        elif known.shape != np.shape(along) or not np.allclose(known, along, rtol=1e-9, atol=1e-12):
+            return False
+    if shapes.get(name, values.shape) != values.shape:
+        return False
+    shapes[name] = values.shape
+    coordinates.update(new)
+    return True

@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.store.envelope import GROUP, SCALE, has_envelope
 from hybrid.store.reader import Result
 
 AXES = ("x", "y", "z")
@@ -37,6 +38,24 @@ class Along(NamedTuple):
         """Of the k-th place -1 or 1, on the left or on the right of a jump; else 0."""
         s = self.s
         return int(k > 0 and s[k - 1] == s[k]) - int(k + 1 < len(s) and s[k + 1] == s[k])
+
+
+def extent(result: Result, name: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, str]:
+    """Arc lengths (n,), lowest and highest value there with a gap at jumps, and of what: every step, or every output.
+
+    Every accepted step where the file has its envelope, except where zones are corrected for bending: an envelope is of
+    the line that was computed.
+    """
+    found = along(result, name)
+    corrected = any(zone.kind == "corrected" for zone in result.zones[-1])
+    if has_envelope(result) and not corrected and f"{GROUP}/{name}_max" in result:
+        bounds = [result[f"{GROUP}/{name}_{x}"] for x in ("min", "max")]
+        if all(np.isfinite(x).all() for x in bounds):
+            steps = found._replace(s=result[SCALE])
+            (s, low), (_, high) = (steps.curve(x) for x in bounds)
+            return s, low, high, "every step"
+    (s, low), (_, high) = (found.curve(x) for x in (found.values.min(axis=0), found.values.max(axis=0)))
+    return s, low, high, "every output"
 
 
 def along(result: Result, name: str) -> Along:

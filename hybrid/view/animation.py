@@ -23,7 +23,7 @@ from hybrid.view.panels import cable, framed, profiles, sea
 from hybrid.view.projections import View, aspect_of, pieces_of, views_of
 from hybrid.view.save import COMMENT, check_target, write_file
 from hybrid.view.scenery import speed_of
-from hybrid.view.style import colour_of, prefix
+from hybrid.view.style import colour_of, prefix, short
 
 FORMATS = (".mp4", ".gif")
 # A film of 12 to 30 s shows a motion without tiring; at most so many frames are drawn for it, and a gif, which stores
@@ -45,7 +45,7 @@ class Film(NamedTuple):
     @property
     def text(self) -> str:
         of = f" of {self.outputs} outputs" if self.frames < self.outputs else ""
-        return f"{self.frames} frames{of}, {self.seconds:.3g} s at {self.factor:g} x real time"
+        return f"{self.frames} frames{of}, {short(self.seconds, 3)} s at {self.factor:g} x real time"
 
 
 def animate(result: Result, path: str | Path, *, overwrite: bool = False) -> Film:
@@ -68,7 +68,7 @@ def animate(result: Result, path: str | Path, *, overwrite: bool = False) -> Fil
     pause = span / factor / len(frames)  # of each frame, s
     if suffix == ".gif":
         pause = max(round(pause, 2), 0.02)  # it counts in hundredths, and viewers slow down what is faster
-        factor = float(f"{span / (pause * len(frames)):.3g}")
+        factor = float(f"{short(span / (pause * len(frames)), 3)}")
     seconds = pause * len(frames)
     pictures = _pictures(result, frames, factor, _DPI[suffix])
     write = _write_mp4 if suffix == ".mp4" else _write_gif
@@ -159,7 +159,7 @@ def _write_mp4(path: Path, pictures: Iterator[np.ndarray], rate: float) -> None:
     height, width = first.shape[:2]
     program = ffmpeg()
     assert program is not None  # asked before
-    given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}", "-r", f"{rate:.6g}", "-i", "-"]
+    given = ["-f", "rawvideo", "-pix_fmt", "rgba", "-s", f"{width}x{height}", "-r", f"{short(rate, 6)}", "-i", "-"]
     # yuv420p and faststart: what every browser and every office program plays
     coded = ["-c:v", "libx264", "-crf", _CRF, "-pix_fmt", "yuv420p", "-movflags", "+faststart"]
     kept = ["-metadata", f"comment={COMMENT}", "-an", *coded]

@@ -172,7 +172,7 @@ class Page(NamedTuple):
 
     title: str
     facts: str
-    fact_lines: int = 1  # at most
+    fact_lines: int = 3  # at most
     panels: dict[str, Panel] = {}  # noqa: RUF012  never written to
     mosaic: list[Any] = []  # noqa: RUF012
     widths: Sequence[float] | None = None

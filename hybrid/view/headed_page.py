@@ -7,7 +7,7 @@ from typing import Any
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.view.figure import Page
-from hybrid.view.style import NEWS
+from hybrid.view.style import NEWS, short
 from hybrid.view.summary import warnings_of
 
 
@@ -16,14 +16,14 @@ def page_of(result: Result, facts: list[str], **more: Any) -> Page:
     n, complete = len(result.times), result.status == "complete"
     head = [] if complete else [result.status_text]
     if n:
-        span = f"{n} outputs, t = {result.times[0]:.5g} … {result.times[-1]:.5g} s"
-        head.append(span if n > 1 else "static" if complete else f"one output, t = {result.times[0]:.5g} s")
+        span = f"{n} outputs, t = {short(result.times[0], 5)} … {short(result.times[-1], 5)} s"
+        head.append(span if n > 1 else "static" if complete else f"one output, t = {short(result.times[0], 5)} s")
     found = warnings_of(result)
     alarms = [(event, count) for event, count in found if event.kind not in NEWS]
     note = "; ".join(dict.fromkeys(event.text for event, _ in (alarms[:1] or found)))
     if alarms:
         names = ", ".join(event.kind + f" (× {count})" * (count > 1) for event, count in alarms)
-        note = f"Warning: {names}; at t = {alarms[0][0].t:.4g} s: {note}"
+        note = f"Warning: {names}; at t = {short(alarms[0][0].t, 4)} s: {note}"
     elif found:
         note = f"Note: {note}"
     texts = "; ".join(filter(None, [*head, *facts]))

@@ -140,7 +140,7 @@ def _style(ax: Axes, panel: Panel) -> None:
             axis.set_minor_formatter(NullFormatter())
         else:
             axis.set_major_locator(MaxNLocator("auto", steps=[1, 2, 5, 10], min_n_ticks=3))
-            ax.ticklabel_format(axis=axis.axis_name, useOffset=False, scilimits=(-4, 5))
+            ax.ticklabel_format(axis=axis.axis_name, useOffset=False, scilimits=(-4, 6))
             axis.get_offset_text().set_fontsize(SMALL)
             if of.ticks:
                 axis.set_ticks(of.ticks)
@@ -149,6 +149,13 @@ def _style(ax: Axes, panel: Panel) -> None:
 
 def _small_ticks(ax: Axes) -> None:
     ax.tick_params(labelsize=SMALL, width=0.6, length=2.5, color=GREY, labelcolor=INK)
+
+
+def new_axes() -> Axes:
+    """Axes of a new figure."""
+    figure = Figure(figsize=(6.4, 4.0), dpi=DPI, layout="constrained")
+    FigureCanvasAgg(figure)
+    return figure.add_subplot()
 
 
 # ---- pages ----------------------------------------------------------------------------------------

@@ -9,7 +9,7 @@ from html import escape
 
 from hybrid.store.reader import Result
 from hybrid.view.panels import shape
-from hybrid.view.style import ALARM, GREY, INK
+from hybrid.view.style import ALARM, GREY, INK, short
 from hybrid.view.summary import attention, facts_of, length_of
 from hybrid.view.svg_backend import WIDTH, draw
 from hybrid.view.zones import strip
@@ -26,8 +26,14 @@ def card(result: Result) -> str:
     first = attention(facts)
     good = result.status == "complete"
     n, s = len(result.times), result.s
-    span = f"t = {result.times[0]:.6g} … {result.times[-1]:.6g} s" if n > 1 else "static" if n and good else ""
-    head = f"{n} output{'s' * (n != 1)}" + f", {span}" * bool(span) + f"; {len(s)} points on {length_of(result):.6g} m"
+    span = (
+        f"t = {short(result.times[0], 6)} … {short(result.times[-1], 6)} s" if n > 1 else "static" if n and good else ""
+    )
+    head = (
+        f"{n} output{'s' * (n != 1)}"
+        + f", {span}" * bool(span)
+        + f"; {len(s)} points on {short(length_of(result), 6)} m"
+    )
     status = result.status if good else result.status_text.splitlines()[0]
     colour = GREY if good else ALARM
     rows = [(f.title, f.text) for f in facts if f.key in _SHOWN and f.weight != "absent"]

@@ -14,7 +14,7 @@ import numpy as np
 
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
-from hybrid.view.along import AXES, Along, along
+from hybrid.view.along import AXES, Along, along, extent
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Area, Axis, Band, Box, Item, Line, Marks, Panel, Rule, Text
 from hybrid.view.projections import (
@@ -37,6 +37,7 @@ from hybrid.view.style import (
     BED,
     BODY,
     DOUBT,
+    END_COLOURS,
     GREY,
     LEVEL,
     POINT_COLOURS,
@@ -46,13 +47,13 @@ from hybrid.view.style import (
     colour_of,
     earlier_grey,
     prefix,
+    short,
     title_of,
 )
 
 MOST_CHANGES = 12  # of zones that are marked over time: more would hide the curves
 RANGES = ("tension", "curvature", "bending_moment", "torque", "shear", "contact")
 _SIZES = ("curvature", "bending_moment", "shear")  # quantities that are not below zero
-_ENDS = {"start": "#0072B2", "end": "#D55E00"}
 _PARTS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#000000", "#8C6D31", "#7F7F7F")
 
 
@@ -105,7 +106,7 @@ def framed(result: Result, view: View, items: list[Item], when: str = "") -> Pan
     margin = 0.06 * np.ptp(box, axis=1, keepdims=True) + (1e-6 * float(np.ptp(box)) or 0.5)
     (left, right), (low, high) = (box + margin * [-1.0, 1.0]).tolist()
     across, up = Axis(view.across_label, "m", left, right), Axis(view.up_label, "m", low, high)
-    size = " × ".join(f"{x:.4g}" for x in np.ptp(box, axis=1))
+    size = " × ".join(f"{short(x, 4)}" for x in np.ptp(box, axis=1))
     caption = f"{view.across_label} – {view.up_label}, {size} m{stretch}"
     return Panel("shape", f"shape{above}{when}{stretch}", across, up, items, taller / wider, caption=caption)
 
@@ -183,7 +184,7 @@ def profiles(
             usual = max(float(np.percentile(high, 90)), float(values[output].max()))
             if len(drawn) == 1 and 0.0 < 10.0 * usual < high.max():  # a spike would press all else to the ground
                 bottom, top = float(low.min()) - 0.1 * usual, 1.5 * usual
-                spike = f"peak {high.max():.3g} {unit} at s = {s[high.argmax()]:.4g} m"
+                spike = f"peak {short(high.max(), 3)} {unit} at s = {short(s[high.argmax()], 4)} m"
                 items.append(Text(0.03, 0.91, spike, parts="xy"))
         for n, t in enumerate(times if k == 0 else ()):
             then = values[int(np.abs(result.times - t).argmin())]
@@ -192,9 +193,11 @@ def profiles(
         if error is not None:
             items.append(_doubt(s, values[output], error[output] * factor, size=name in _SIZES))
         items.append(Line(*found.curve(values[output]), title_of(name), width=1.3, dash="dash" * bool(k)))
-    short = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
-    up = ",\n".join([short, *(title_of(n) for n, _ in drawn[1:])])  # on the axis; a title has to leave room for others
-    title = title or (short if drawn[1:] else title_of(names[0])) + _at(result, output)
+    name_of = title_of(names[0]).replace("bending ", "").replace("contact force", "contact")
+    up = ",\n".join(
+        [name_of, *(title_of(n) for n, _ in drawn[1:])]
+    )  # on the axis; a title has to leave room for others
+    title = title or (name_of if drawn[1:] else title_of(names[0])) + _at(result, output)
     y = Axis(up, unit, bottom, top, peak * factor)
     return Panel("-".join(names), title, _along(result), y, items, legend=len(drawn) > 1)
 
@@ -209,8 +212,9 @@ def ranges(result: Result, shown: Kept) -> list[Panel]:
 def _range(result: Result, name: str, shown: Kept) -> Panel:
     found, several = along(result, name), len(result.times) > 1
     s, values = found.s, found.values
-    factor, unit = prefix(result.units[name], float(np.abs(values).max()))
-    low, high = values.min(axis=0), values.max(axis=0)
+    bounds_s, low, high, basis = extent(result, name)
+    peak = max(float(np.abs(values).max()), float(np.nanmax(np.abs([low, high]))))
+    factor, unit = prefix(result.units[name], peak)
     items: list[Item] = []
     error = _error_along(result, name, found)
     if error is not None:
@@ -219,10 +223,10 @@ def _range(result: Result, name: str, shown: Kept) -> Panel:
         items.append(Band(s, below * factor, outer[1] * factor, "± error", DOUBT, 0.25))
     if several:
         items += [
-            Band(s, low * factor, high * factor, colour=GREY, opacity=0.22),
-            Line(*found.curve(high * factor), "highest", "#B84F04"),
+            Band(bounds_s, low * factor, high * factor, colour=GREY, opacity=0.22),
+            Line(bounds_s, high * factor, "highest", "#B84F04"),
             Line(*found.curve(values.mean(axis=0) * factor), "mean", GREY, dash="dash"),
-            Line(*found.curve(low * factor), "lowest", "#2C72B6"),
+            Line(bounds_s, low * factor, "lowest", "#2C72B6"),
         ]
     else:
         items += _zones_behind(result, 0)
@@ -234,8 +238,11 @@ def _range(result: Result, name: str, shown: Kept) -> Panel:
         items.append(Line(*found.curve(factor / allowed), "allowed", ALARM, 1.6, "dot"))
     title = title_of(name).replace("|", "")
     label = title_of(name).replace("bending ", "").replace("contact ", "")
-    y = Axis(label, unit, peak=float(np.abs(values).max()) * factor)
-    return Panel(f"range-{name}", title, _along(result), y, items)
+    y = Axis(label, unit, peak=peak * factor)
+    caption = f"{title[:1].upper()}{title[1:]} along the cable"
+    seen = f": lowest and highest of {basis}, mean of the outputs, and now: the time of the slider."
+    caption += seen if several else "."
+    return Panel(f"range-{name}", title, _along(result), y, items, caption=caption)
 
 
 def _along(result: Result) -> Axis:
@@ -264,11 +271,16 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
     if component is not None:
         values = values[..., component] - values[0, ..., component]
         label = f"Δ{AXES[component]}" if name == "position" else f"Δ{title_of(name)} {AXES[component]}"
-        title, caption = f"{label} since t = {result.times[0]:.4g} s", "Change since then, at the same points."
+        title, caption = (
+            f"{label} since t = {short(result.times[0], 4)} s",
+            f"Change of {title_of(name)} {AXES[component]}",
+        )
     else:
         values = np.linalg.norm(values, axis=-1) if result.dims(name)[-1] == "xyz" else values
         label = title_of(name)
-        title, caption = f"{label} over time", "At some points of the cable."
+        title = f"{label} over time"
+        caption = title_of(name)[:1].upper() + title_of(name)[1:]
+    caption += f" over time at s = {', '.join(f'{short(x, 4)}' for x in s)} m."
     peak = float(np.abs(values).max() if not jumps.size else max(np.abs(values).max(), np.abs(right).max()))
     round_off = STILL * float(np.ptp(result.position, axis=(0, 1)).max()) if label.startswith("Δ") else 0.0
     factor, unit = prefix(result.units[name], max(peak, round_off))
@@ -280,7 +292,7 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
             items.append(_doubt(result.times, values[:, k] * factor, at * factor, size=size))
     for k, point in enumerate(s):
         width = max(1.8 - 0.4 * k, 1.0)  # later curves are thinner, so that coinciding ones all show
-        y, label_of = values[:, k] * factor, f"s = {point:.4g} m"
+        y, label_of = values[:, k] * factor, f"s = {short(point, 4)} m"
         two = bool(np.isclose(point, jumps, rtol=0.0, atol=1e-9 * result.s[-1]).any())
         before = f"{label_of}, before the point" if two else label_of
         items.append(Line(result.times, y, before, _colour(k), width, symbol="o", last_only=True))
@@ -291,14 +303,15 @@ def history(result: Result, name: str, s: Numbers, *, component: int | None = No
         items.append(Rule("x", changes.tolist(), "zones changed"))
     bound = round_off * factor if peak < round_off else None
     up = Axis(label, unit, None if bound is None else -bound, bound, peak * factor)
-    key = name if component is None else "displacement" if name == "position" else f"{name}-{AXES[component]}"
+    moved = "displacement" if name == "position" else name
+    key = name if component is None else f"{moved}-{AXES[component]}"
     return Panel(key, title, _time(result), up, items, legend=legend, caption=caption, cursor=True)
 
 
 def end_forces(result: Result) -> Panel | None:
     """Force at each end at every step, or where the file has none at every output."""
     found: dict[str, tuple[np.ndarray, np.ndarray]] = {}
-    for end in _ENDS:
+    for end in END_COLOURS:
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
             found[end] = (result["steps/t"], result[f"steps/end_force_{end}"])
         elif f"reaction_{end}" in result:
@@ -311,7 +324,7 @@ def end_forces(result: Result) -> Panel | None:
         if error in result and f"reaction_{end}" in result:
             middle = np.linalg.norm(result[f"reaction_{end}"], axis=1)
             items.append(_doubt(result.times, middle * factor, result[error] * factor, size=True))
-    items += [Line(t, y * factor, f"at the {end}", _ENDS[end]) for end, (t, y) in found.items()]
+    items += [Line(t, y * factor, f"at the {end}", END_COLOURS[end]) for end, (t, y) in found.items()]
     y = Axis("force", unit, peak=peak * factor)
     caption = "Force that holds or loads each end, at every step."
     return Panel("end-forces", "end forces", _time(result), y, items, caption=caption, cursor=True) if items else None
@@ -397,7 +410,7 @@ def _place(where: np.ndarray, s: np.ndarray, position: np.ndarray) -> np.ndarray
 
 
 def _at(result: Result, output: int) -> str:
-    return f" at t = {result.times[output]:.5g} s" if len(result.times) > 1 else ""
+    return f" at t = {short(result.times[output], 5)} s" if len(result.times) > 1 else ""
 
 
 def _colour(k: int) -> str:

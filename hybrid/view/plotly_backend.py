@@ -63,12 +63,15 @@ def _layout(panel: Panel, across: tuple[float, float], up: tuple[float, float]) 
             "tickcolor": "#BDBDBD", "automargin": True, "exponentformat": "SI",
         }  # fmt: skip
 
+    up_axis = axis(panel.y, up)
+    if panel.aspect:
+        up_axis |= {"scaleanchor": "x", "scaleratio": panel.aspect}
     return {
         "font": {"family": _FONT, "size": 13, "color": INK},
         "margin": {"l": 56, "r": 22, "t": 32, "b": 44},  # at the top plotly's buttons, the legend at the foot
         "paper_bgcolor": "#FFFFFF", "plot_bgcolor": panel.fill,
         "hovermode": "closest" if any(isinstance(item, Map) for item in panel.items) else "x",
-        "xaxis": axis(panel.x, across), "yaxis": axis(panel.y, up),
+        "xaxis": axis(panel.x, across), "yaxis": up_axis,
         "legend": {"orientation": "h", "tracegroupgap": 0, "x": 0, "y": 0, "yanchor": "bottom", "yref": "container"}
         | {"font": {"size": 12}},
         "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#9E9E9E", "align": "left"}

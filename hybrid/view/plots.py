@@ -26,6 +26,7 @@ from hybrid.view.projections import (
     whole_zones,
 )
 from hybrid.view.save import save_figure
+from hybrid.view.style import short
 from hybrid.view.zones import counted, share_of_rod, zone_map
 
 if TYPE_CHECKING:
@@ -138,10 +139,10 @@ def _facts(result: Result, earlier: np.ndarray) -> list[str]:
     zones = whole_zones(result.zones[-1]) if len(result.times) else []
     facts = []
     if 0 < len(zones) <= 4:  # more do not fit a line
-        facts.append(", ".join(f"{z.kind} {z.s_a:.4g} … {z.s_b:.4g} m" for z in zones))
+        facts.append(", ".join(f"{z.kind} {short(z.s_a, 4)} … {short(z.s_b, 4)} m" for z in zones))
     if "error_total_position" in result.attributes:
         size = {x: float(result.attributes[f"error_total_{x}"]) for x in ("position", "end_force")}
-        facts.insert(0, f"estimated error {size['position']:.2g} m, {size['end_force']:.2g} N at the ends")
+        facts.insert(0, f"estimated error {short(size['position'], 2)} m, {short(size['end_force'], 2)} N at the ends")
     if len(earlier):
-        facts.append("earlier shapes at t = " + ", ".join(f"{t:.3g}" for t in earlier) + " s")
+        facts.append("earlier shapes at t = " + ", ".join(f"{short(t, 3)}" for t in earlier) + " s")
     return facts

@@ -11,6 +11,7 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.store.reader import Result
 from hybrid.store.records import Zone
+from hybrid.view.style import short
 
 Numbers = Sequence[float] | np.ndarray
 STILL = 1e-6  # of the cable's extent: motion and deflection below this are round-off
@@ -44,7 +45,7 @@ def views_of(result: Result) -> list[View]:
     ahead = np.linalg.eigh(np.cov(level.T))[1][:, 1]  # the direction of the largest horizontal extent
     ahead *= math.copysign(1.0, ahead[np.argmax(np.abs(ahead))])
     sideways, angle = np.array([-ahead[1], ahead[0], 0.0]), math.degrees(math.atan2(ahead[1], ahead[0]))
-    along = View(np.array([*ahead, 0.0]), np.eye(3)[2], f"horizontal, {angle:.3g}° from x", "z")
+    along = View(np.array([*ahead, 0.0]), np.eye(3)[2], f"horizontal, {short(angle, 3)}° from x", "z")
     if _is_flat(result.position, sideways):
         return [along]
     if z >= max(x, y) and not touches_bed(result):

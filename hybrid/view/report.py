@@ -21,7 +21,7 @@ from hybrid.view.panels import end_forces, energy, energy_parts, history, ranges
 from hybrid.view.plotly_backend import figure_of
 from hybrid.view.projections import free_edges, history_points
 from hybrid.view.report_parts import (
-    attention_html,
+    caption_html,
     events_html,
     facts_html,
     figure_html,
@@ -30,12 +30,18 @@ from hybrid.view.report_parts import (
     plot_html,
     settings_html,
     space_html,
+    statistics_html,
     table_html,
+    verdict_html,
 )
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 from hybrid.view.scenery import scenery
-from hybrid.view.summary import amount, attention, facts_of, length_of
+from hybrid.view.style import short
+from hybrid.view.summary import amount, facts_of, length_of
 from hybrid.view.zones import shares, zone_map
+
+# Part of the largest displacement that one along another axis needs to be shown.
+LEAST_MOVE = 0.02
 
 
 def write_report(result: Result, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -65,14 +71,16 @@ def html(result: Result) -> str:
     parts = {
         "title": escape(result.title or "(no title)"),
         "subtitle": escape(_subtitle(result, shown)),
-        "attention": attention_html(attention(facts), several),
+        "verdict": verdict_html(facts, several),
         "facts": facts_html(facts, several),
         "cable": _cable(result, scene, shown) if scene else "",
         "figures": _graphs(result, numbered, several),
+        "statistics": statistics_html(result),
         "events": events_html(result, several),
         "energy": _energy(result, numbered["energy"]),
         "settings": settings_html(result),
         "scene": escape(result.scene_text),
+        "scene_title": "Scene as it was run (YAML)",
         "footer": escape(footer()),
         "mark": REPORT_MARK,
         "index": script_json(index),
@@ -88,7 +96,8 @@ def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
     points = history_points(result, None)
     moves = np.ptp(result.at(s=points, names=["position"])["position"], axis=0).max(axis=0)
     over = [end_forces(result), history(result, "tension", points)]
-    over.append(history(result, "position", points, component=int(moves.argmax())))
+    moving = [k for k in range(3) if moves[k] > LEAST_MOVE * moves.max()]
+    over += [history(result, "position", points, component=k) for k in moving]
     over += [touchdown(result)] if free_edges(result) else []
     return {
         "zones": [zone_map(result, shown)] if any(result.zones) else [],
@@ -101,29 +110,36 @@ def _panels(result: Result, shown: Kept) -> dict[str, list[Panel]]:
 def _subtitle(result: Result, shown: Kept) -> str:
     n, s = len(result.times), result.s
     outputs = "no output" if n == 0 else "static, one output" if n == 1 and result.status == "complete" else ""
-    outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {result.times[-1]:.6g} s"
-    size = f"{length_of(result):.6g} m of cable, {len(s)} point{'s' * (len(s) != 1)}"
+    outputs = outputs or f"{n} output{'s' * (n != 1)} to t = {short(result.times[-1], 6)} s"
+    size = f"{short(length_of(result), 6)} m of cable, {len(s)} point{'s' * (len(s) != 1)}"
     made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
     computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
     return f"{outputs}; {size}; {computed}"
 
 
 def _cable(result: Result, scene: dict[str, Any], shown: Kept) -> str:
-    return space_html(scene, picture(result), len(shown.frames) > 1, shown.notice)
+    title = result.title or "The cable"
+    if len(shown.frames) < 2:
+        return space_html(scene, picture(result), False, shown.notice, f"{title}: its equilibrium.")
+    span = f"t = {short(result.times[0], 5)} to {short(result.times[-1], 5)} s"
+    last = f"{title}, {span}; on paper the last shape over earlier ones."
+    return space_html(scene, picture(result), True, shown.notice, last)
 
 
 def _graphs(result: Result, groups: dict[str, list[tuple[int, Panel]]], several: bool) -> str:
     out = ""
     if groups["zones"]:
         out += f'<section id="zones"><h2>Zones over time</h2><p class="quiet">{escape(shares(result))} '
-        out += "".join(f"{escape(f.caption)}</p>{plot_html(k, f)}" for k, f in groups["zones"]) + "</section>"
+        out += '<span class="screen">Point at a mark, or tap it, to read what happened.</span></p>'
+        out += "".join(f"<figure>{plot_html(k, f)}{caption_html(k, f)}</figure>" for k, f in groups["zones"])
+        out += "</section>"
     if groups["histories"]:
         figures = "".join(figure_html(k, f) for k, f in groups["histories"])
         bands = any("errors/total" in name for name in result.names)
         note = "Bands are the estimated error." if bands else "Errors were not estimated, so there are no bands."
         if max(len(result.times), len(result["steps/t"]) if "steps/t" in result else 0) > MOST_ON_CURVE:
             note += " Long curves are drawn by the lowest and highest value of every short stretch."
-        text = f'<p class="quiet">{note} Click a graph to set the time.</p>'
+        text = f'<p class="quiet">{note} <span class="screen">Click a graph to set the time.</span></p>'
         out += f'<section id="histories"><h2>Over time</h2>{text}<div class="grid">{figures}</div></section>'
     if groups["ranges"]:
         figures = "".join(figure_html(k, f) for k, f in groups["ranges"])

@@ -11,10 +11,11 @@ from importlib.resources import files
 from typing import Any
 
 from hybrid.store.reader import Result
+from hybrid.store.statistics_table import rows_of
 from hybrid.view.decimate import Store
 from hybrid.view.figure import Map, Panel
-from hybrid.view.style import prefix
-from hybrid.view.summary import CAUSES, Fact, amount, short
+from hybrid.view.style import prefix, short
+from hybrid.view.summary import CAUSES, Fact, amount, attention
 from hybrid.view.zones import event_rows
 
 _SPEEDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 20.0, 50.0, 100.0)
@@ -28,7 +29,10 @@ _SETTINGS = {
 
 def filled_page(parts: dict[str, str], store: Store) -> str:
     """The page of these parts, with its numbers, scripts and styles."""
-    more = {"data": packed(store.block), "plotly": packed(plotly_script().encode())}
+    sections = re.findall(r'<section id="(\w+)"><h2>([^<]+)</h2>', "".join(parts.values()))
+    links = [("summary", "Summary"), *sections, ("scene", "The scene")]
+    more = {"contents": "".join(f'<a href="#{name}">{title}</a>' for name, title in links)}
+    more |= {"data": packed(store.block), "plotly": packed(plotly_script().encode())}
     return filled("report.html", parts | more | {"css": page_file("report.css"), "js": page_file("report.js")})
 
 
@@ -54,12 +58,38 @@ def packed(data: bytes) -> str:
     return b64encode(gzip.compress(data, 9, mtime=0)).decode()
 
 
-def attention_html(facts: list[Fact], several: bool) -> str:
-    """What to look at first, as a section."""
-    if not facts:
-        return '<div class="attention well"><h2>No warnings, and no limit is broken.</h2></div>'
-    rows = "".join(f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in facts)
-    return f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul></div>'
+def verdict_html(facts: list[Fact], several: bool) -> str:
+    """What to know first: what is wrong, else that nothing is; limits as a table; the numbers that matter, large."""
+    alarms, notes = attention(facts), [f for f in facts if f.key == "warning" and f.weight == "note"]
+    limits = [f for f in facts if f.key.startswith("limits") and f.values]
+    count = sum(len(f.values["limits"]) for f in limits)
+    if alarms:
+        rows = "".join(f"<li><b>{escape(f.title)}.</b> {_code(f.text)} {_show(f, several)}</li>" for f in alarms)
+        head = f'<div class="attention" role="alert"><h2>Look at this first</h2><ul>{rows}</ul></div>'
+    else:
+        kept = "no limits were given to hold it against" if not count else f"all {count} limits are kept"
+        kept = "the one limit is kept" if count == 1 else kept
+        told = f"; {len(notes)} note{'s' * (len(notes) > 1)} below" * bool(notes)
+        look = "" if count and not notes else " open"
+        head = f'<div class="attention well{look}"><h2>No warnings; {kept}{told}.</h2></div>'
+    tables = "".join(
+        f"<h3>{escape(f.title)}</h3>{_limit_table(f)}<p class='quiet'>{escape(f.text)}</p>" for f in limits
+    )
+    return f'<section id="verdict" aria-label="Verdict">{head}{tables}{_cards(facts, several)}</section>'
+
+
+def _cards(facts: list[Fact], several: bool) -> str:
+    """Numbers that have a headline, large, each with its sentence."""
+    cards = ""
+    for fact in (f for f in facts if "headline" in f.values):
+        number, _, doubt = fact.values["headline"].partition(" (")
+        small = f"<small> {escape(doubt.rstrip(')'))}</small>" * bool(doubt)
+        cards += (
+            f'<div class="card {fact.weight}" id="fact-{fact.key}"><h3>{escape(fact.title)}</h3>'
+            f'<p class="large">{escape(number)}{small}</p><p class="quiet">{_code(fact.text)}</p>'
+            f"{_show(fact, several)}</div>"
+        )
+    return f'<div class="cards">{cards}</div>' * bool(cards)
 
 
 def _code(text: str) -> str:
@@ -70,18 +100,18 @@ def _code(text: str) -> str:
 def _show(fact: Fact, several: bool) -> str:
     if fact.t is None or not several:
         return ""
-    s = f' data-s="{fact.s:.9g}"' if fact.s is not None else ""
-    return f'<button class="show" data-t="{fact.t:.9g}"{s}>Show</button>'
+    s = f' data-s="{short(fact.s, 9)}"' if fact.s is not None else ""
+    return f'<button class="show" data-t="{short(fact.t, 9)}"{s}>Show</button>'
 
 
 def facts_html(facts: list[Fact], several: bool) -> str:
-    """The rows of the summary; a warning that stands above is not repeated."""
+    """The rows of the summary, without what stands in the verdict."""
     rows = []
     for fact in facts:
-        if fact.key == "warning" and fact.weight == "alarm":
+        limits = fact.key.startswith("limits") and fact.values
+        if limits or "headline" in fact.values or (fact.key == "warning" and fact.weight == "alarm"):
             continue
-        table = _error_table(fact) if fact.key == "errors" and fact.values else ""
-        table = _limit_table(fact) if fact.key == "limits" and fact.values else table
+        table = _error_table(fact) if fact.key.startswith("errors") and fact.values else ""
         text = f"<dt>{escape(fact.title)}</dt><dd>{_code(fact.text)}{table}</dd>{_show(fact, several)}"
         rows.append(f'<div class="fact {fact.weight}" id="fact-{fact.key}">{text}</div>')
     return f'<dl class="facts">{"".join(rows)}</dl>'
@@ -101,10 +131,15 @@ def _limit_table(fact: Fact) -> str:
     for x in fact.values["limits"]:
         unit = "m" if x["limit"] == "min_bend_radius" else "N"
         used = "–" if x["used"] is None else f"{short(100 * x['used'], 3)} %"
-        verdict = "broken" if x["broken"] else "kept"
+        part = 1.0 if x["broken"] else min(x["used"] or 0.0, 1.0)
+        look, verdict = ("broken", "broken") if x["broken"] else ("kept", "kept")
         numbers = [amount(x["allowed"], unit), amount(x["value"], unit), used, short(x["s"], 5), short(x["t"], 5)]
-        rows.append([x["limit"], verdict, *numbers])
-    return table_html(rows, ["limit", "", "allowed", "reached", "used", "s (m)", "t (s)"], numbers=5)
+        cells = "".join(f'<td class="number">{escape(y)}</td>' for y in numbers)
+        bar = f'<span class="used {look}" aria-hidden="true"><i style="width:{short(100 * part, 3)}%"></i></span>'
+        rows.append(f'<tr class="{look}"><td>{escape(x["limit"])}</td><td>{verdict}</td><td>{bar}</td>{cells}</tr>')
+    heads = ["allowed", "reached", "used", "s (m)", "t (s)"]
+    head = "<th>limit</th><th>verdict</th><td></td>" + "".join(f'<th class="number">{x}</th>' for x in heads)
+    return f'<div class="scroll" tabindex="0"><table class="limits"><tr>{head}</tr>{"".join(rows)}</table></div>'
 
 
 def table_html(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0) -> str:
@@ -115,11 +150,11 @@ def table_html(rows: list[list[str]], head: Sequence[str] = (), numbers: int = 0
         return f"<tr>{''.join(f'<{tag}{look}>{escape(x)}</{tag}>' for x, look in zip(cells, looks, strict=True))}</tr>"
 
     lines = row(head, "th") * bool(head) + "".join(row(cells, "td") for cells in rows)
-    return f'<div class="scroll"><table>{lines}</table></div>'
+    return f'<div class="scroll" tabindex="0"><table>{lines}</table></div>'
 
 
-def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str) -> str:
-    """The section of the moving picture; poster: SVG of what a browser without WebGL shows."""
+def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str, caption: str) -> str:
+    """The section of the moving picture; poster: SVG of what paper, and a browser without WebGL, shows."""
     usual = scene["speed"]
     speeds = sorted({*_SPEEDS, usual})
     buttons = [
@@ -131,18 +166,22 @@ def space_html(scene: dict[str, Any], poster: str, moves: bool, notice: str) -> 
         "colours": "".join(buttons),
         "poster": poster.replace("<svg ", '<svg class="poster" ', 1),
         "time": filled("time.html", {"speeds": "".join(options)}) if moves else "",
-        "static": "" if moves else "; a static result",
+        "caption": f"<b>Figure 1.</b> {escape(caption)}",
         "notice": f'<p class="quiet" id="thinned">{escape(notice)}</p>' if notice else "",
     }
     return filled("cable.html", parts)
 
 
 def figure_html(k: int, panel: Panel) -> str:
-    """A graph with its title and caption; k: its number in the index."""
-    caption = f"<figcaption>{escape(panel.caption)}</figcaption>" if panel.caption else ""
-    return (
-        f"<figure><h3>{escape(panel.title[:1].upper() + panel.title[1:])}</h3>{caption}{plot_html(k, panel)}</figure>"
-    )
+    """A graph with its title and caption; k: its number in the index; the cable in space is figure 1."""
+    title = panel.title[:1].upper() + panel.title[1:]
+    return f"<figure><h3>{escape(title)}</h3>{plot_html(k, panel)}{caption_html(k, panel)}</figure>"
+
+
+def caption_html(k: int, panel: Panel) -> str:
+    """A caption that can be quoted."""
+    text = panel.caption or f"{panel.title[:1].upper()}{panel.title[1:]}."
+    return f"<figcaption><b>Figure {k + 2}.</b> {escape(text)}</figcaption>"
 
 
 def plot_html(k: int, panel: Panel) -> str:
@@ -159,8 +198,8 @@ def events_html(result: Result, several: bool) -> str:
         return ""
     lines = "".join(
         f'<tr class="{family}"'
-        + (f' tabindex="0" data-t="{t:.9g}">' if several else ">")
-        + f"<td>{t:.5g}</td><td>{escape(where)}</td><td>{escape(kind)}</td><td>{escape(text)}</td></tr>"
+        + (f' tabindex="0" data-t="{short(t, 9)}">' if several else ">")
+        + f"<td>{short(t, 5)}</td><td>{escape(where)}</td><td>{escape(kind)}</td><td>{escape(text)}</td></tr>"
         for t, where, kind, text, family in rows
     )
     note = f'<p class="quiet">{escape(left)}</p>' if left else ""
@@ -168,9 +207,52 @@ def events_html(result: Result, several: bool) -> str:
     head = "<tr><th>t (s)</th><th>s (m)</th><th>kind</th><th>what happened, and why</th></tr>"
     count = len(result.events)
     return (
-        f'<section id="events"><details{" open" if count <= 12 else ""}><summary>{count} event{"s" * (count != 1)}: '
-        f'what the program noticed and did.{hint}</summary><div class="scroll"><table class="events">{head}{lines}'
-        f"</table></div>{note}</details></section>"
+        f'<section id="events"><h2>Events</h2><details{" open" if count <= 12 else ""}><summary>'
+        f"{count} event{'s' * (count != 1)}: "
+        f'what the program noticed and did.{hint}</summary><div class="scroll" tabindex="0">'
+        f'<table class="events">{head}{lines}</table></div>{note}</details></section>'
+    )
+
+
+def statistics_html(result: Result) -> str:
+    """Statistics of the histories, as a section that opens; empty for a result with too few outputs."""
+    if len(result.times) < 3 or not result.times[-1] > result.times[0]:
+        return ""
+    rows = []
+    for x in rows_of(result):
+        extreme = x["extreme"] or {}
+        numbers = [x["mean"], x["deviation"], x["minimum"], x["maximum"], x["significant_range"]]
+        longer = [extreme.get("most_probable"), extreme.get("fractile")]
+        size = max(abs(y) for y in numbers if y is not None)
+        factor, unit = prefix(x["unit"], size) if size else (1.0, x["unit"])
+        period = "–" if x["crossing_period"] is None else short(x["crossing_period"], 4)
+        cells = ["–" if y is None else short(y * factor, 4) for y in (*numbers, *longer)]
+        where = "" if x["s"] is None else short(x["s"], 5)
+        rows.append([f"{x['quantity']} ({unit})" if unit else x["quantity"], where, *cells[:5], period, *cells[5:]])
+    if not rows:
+        return ""
+    head = [
+        "",
+        "s (m)",
+        "mean",
+        "deviation",
+        "smallest",
+        "largest",
+        "significant range",
+        "period (s)",
+        "in 3 h",
+        "90 %",
+    ]
+    note = (
+        "Of the time from the first output to the last, starts of loads and motions included; along the cable where a "
+        "quantity is largest. Significant range: mean of the largest third between up-crossings of the mean; period: "
+        "mean time between them; in 3 h: most probable largest value of three hours, by peaks over a threshold, and "
+        "what it does not exceed with 90 %. “–”: too few peaks or cycles."
+    )
+    return (
+        f'<section id="statistics"><details><summary>Statistics of {len(rows)} histories</summary>'
+        f'<p class="quiet">{note} <code>hybrid stats</code> has other times, places and hours.</p>'
+        f"{table_html(rows, head, numbers=len(head) - 1)}</details></section>"
     )
 
 
@@ -179,11 +261,12 @@ def settings_html(result: Result) -> str:
     hidden = {"title", "status", "message", "format", "format_version", "fairleads"}
     given = {k: v for k, v in result.attributes.items() if k not in hidden and not k.startswith(("version_", "error_"))}
     rows = [
-        (_SETTINGS.get(k, k.replace("_", " ")), f"{v:.6g}" if isinstance(v, float) else v) for k, v in given.items()
+        (_SETTINGS.get(k, k.replace("_", " ")), f"{short(v, 6)}" if isinstance(v, float) else v)
+        for k, v in given.items()
     ]
     if "steps/dt" in result and len(result["steps/dt"]):
         dt = result["steps/dt"]
-        low, high = f"{dt.min():.4g}", f"{dt.max():.4g}"
+        low, high = f"{short(dt.min(), 4)}", f"{short(dt.max(), 4)}"
         rows.append(("steps", f"{len(dt)}, of {low} s" if low == high else f"{len(dt)}, of {low} to {high} s"))
     rows += [("version of " + name, version) for name, version in result.versions.items()]
     cells = [[name, str(value)] for name, value in rows]

@@ -13,7 +13,7 @@ from hybrid.store.reader import Result
 from hybrid.view.decimate import Kept, Store
 from hybrid.view.plotly_backend import colour_scale
 from hybrid.view.projections import STILL, bed_heights
-from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, WATER, colour_of, prefix
+from hybrid.view.style import BED, BODY, INK, LEVEL, SAND, TOUCHDOWN, WATER, colour_of, prefix, short
 from hybrid.view.zones import COLOURS, span_of
 
 # Pale shades would be lost on white: of nine, those from here on.
@@ -64,7 +64,7 @@ def speed_of(result: Result, seconds: float = 12.0) -> float:
     if span == 0.0:
         return 1.0
     power = 10.0 ** np.floor(np.log10(span / seconds))
-    return float(f"{max(m * power for m in (1, 2, 5) if m * power <= span / seconds * (1 + 1e-9)):.6g}")
+    return float(f"{short(max(m * power for m in (1, 2, 5) if m * power <= span / seconds * (1 + 1e-9)), 6)}")
 
 
 # ---- colours --------------------------------------------------------------------------------------
@@ -124,7 +124,7 @@ def _marks(result: Result, store: Store, shown: Kept) -> list[dict[str, Any]]:
         places, edges = result["touchdown_position"][shown.frames].copy(), result["touchdown"][shown.frames]
         places[np.abs(edges - s[[0, -1]]) <= 0.005 * (s[-1] - s[0])] = np.nan  # ends have marks of their own
         if np.isfinite(places).any():
-            marks.append(mark("touchdown", places, "diamond", BED, 5))
+            marks.append(mark("touchdown", places, "diamond", TOUCHDOWN, 5))
     ends = mark("start", position[:, :1], "square", INK, 5), mark("end", position[:, -1:], "diamond", INK, 4)
     return [*marks, *ends]
 
@@ -146,7 +146,7 @@ def _planes(result: Result, box: np.ndarray) -> list[dict[str, Any]]:
         low, high = min(corners), max(corners)
         gap = max(box[0, 2] - high, low - box[1, 2], 0.0)
         plane["far"] = gap > _NEAR * size
-        plane["text"] = f"{plane['name']} at z = {offset / normal[2]:.4g} m"
+        plane["text"] = f"{plane['name']} at z = {short(offset / normal[2], 4)} m"
     for plane in (x for x in planes if not x["far"] and x["normal"][:2] == [0.0, 0.0]):
         level = plane["offset"] / plane["normal"][2]
         box[:, 2] = min(box[0, 2], level), max(box[1, 2], level)
@@ -162,7 +162,7 @@ def _uneven(result: Result, box: np.ndarray, size: float) -> dict[str, Any]:
     far = max(box[0, 2] - high, low - box[1, 2], 0.0) > _NEAR * size
     if not far:
         box[:, 2] = min(box[0, 2], low), max(box[1, 2], high)
-    text = f"seabed, z from {low:.4g} to {high:.4g} m"
+    text = f"seabed, z from {short(low, 4)} to {short(high, 4)} m"
     return {
         "name": "seabed", "far": far, "text": text, "surface": (X, Y, z), "fill": SAND, "line": BED, "solid": 0.85
     }  # fmt: skip

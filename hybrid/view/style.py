@@ -16,7 +16,9 @@ KIND_COLOURS = {
 }  # kinds that are not named here are drawn in ink
 SAND, BED, BODY = "#EEE5D0", "#8C6D31", "#F0E442"
 WATER, LEVEL = "#EFF6FA", "#4A90C2"
-DOUBT = "#D55E00"  # of estimated errors
+DOUBT = "#8E63B5"  # of estimated errors
+TOUCHDOWN = "#CC79A7"  # where contact begins and ends
+END_COLOURS = {"start": "#009E73", "end": "#222222"}
 POINT_COLOURS = ("#009E73", "#000000", "#CC79A7", "#E69F00", "#56B4E9", "#7F7F7F")
 SMALL, NORMAL = 7.0, 8.0  # type sizes in points, for a page 8 inches wide
 ZERO = 1e-12  # SI; below this a force or moment of any real cable is round-off
@@ -58,3 +60,9 @@ def prefix(unit: str, peak: float) -> tuple[float, str]:
         power = min(max(math.floor(math.log10(peak) / 3.0 + 1e-12), -4), 4)
         return 10.0 ** (-3 * power), ("p", "n", "µ", "m", "", "k", "M", "G", "T")[power + 4] + unit
     return 1.0, unit or "–"
+
+
+def short(value: float, digits: int) -> str:
+    """So many digits, without an exponent where a person would write none."""
+    rounded = float(f"{value:.{digits}g}")
+    return f"{rounded:.9g}" if 1e-4 <= abs(rounded) < 1e6 or rounded == 0.0 else f"{rounded:g}"

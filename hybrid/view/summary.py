@@ -15,12 +15,13 @@ import numpy as np
 from hybrid.errors import EVENTS_BY_WEIGHT, LIMIT_EVENTS, weight_of_event
 from hybrid.store.envelope import GROUP, NOTHING, SCALE, has_envelope
 from hybrid.store.hockling import formation_ratio, formation_tension
+from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
 from hybrid.view.along import along
 from hybrid.view.loops import trapped_loop
 from hybrid.view.projections import STILL, free_edges
-from hybrid.view.style import NEWS, ZERO, prefix
+from hybrid.view.style import NEWS, ZERO, prefix, short
 from hybrid.view.worst import Worst, limits_of, worst
 
 HOCKLING = (
@@ -44,7 +45,7 @@ class Fact(NamedTuple):
 
 def facts_of(result: Result) -> list[Fact]:
     """All facts, in the order of importance to a reader: warnings, loads, limits, errors, status."""
-    facts = [*_warnings(result)]
+    facts = [*_warnings(result), *_quantities(result)]
     if len(result.times):
         makers: tuple[Callable[[Result], Fact], ...] = (_tension, _bend, _slack, _limits, _hockling, _seabed, _errors)
         facts += [make(result) for make in makers + (_itself,) * (f"{GROUP}/self_contact_max" in result)]
@@ -53,7 +54,7 @@ def facts_of(result: Result) -> list[Fact]:
 
 def status_facts(result: Result) -> list[Fact]:
     """Warnings, and how it ended: what is known of several lines together."""
-    return [*_warnings(result), _status(result)]
+    return [*_warnings(result), *_quantities(result), _status(result)]
 
 
 def attention(facts: list[Fact]) -> list[Fact]:
@@ -69,18 +70,12 @@ def amount(value: float, unit: str, digits: int = 4) -> str:
     return f"{short(value * factor, digits)} {name}"
 
 
-def short(value: float, digits: int) -> str:
-    """So many digits, without an exponent where a person would write none."""
-    rounded = float(f"{value:.{digits}g}")
-    return f"{rounded:.9g}" if 1e-4 <= abs(rounded) < 1e6 or rounded == 0.0 else f"{rounded:g}"
-
-
 def place(result: Result, s: float) -> str:
     """An arc length in words: "at the start", "at the end (s = 250 m)", "at s = 85 m"."""
     length = length_of(result)
     if s <= 1e-9 * length:
-        return f"at the start (s = {s:.4g} m)"
-    return f"at the end (s = {s:.5g} m)" if s >= (1.0 - 1e-9) * length else f"at s = {s:.4g} m"
+        return f"at the start (s = {short(s, 4)} m)"
+    return f"at the end (s = {short(s, 5)} m)" if s >= (1.0 - 1e-9) * length else f"at s = {short(s, 4)} m"
 
 
 def length_of(result: Result) -> float:
@@ -91,7 +86,7 @@ def length_of(result: Result) -> float:
 
 def moment(result: Result, t: float) -> str:
     """When, in words; of a result with one output nothing."""
-    return f", t = {t:.5g} s" if len(result.times) > 1 else ""
+    return f", t = {short(t, 5)} s" if len(result.times) > 1 else ""
 
 
 def _at(values: np.ndarray, k: int) -> tuple[int, int]:
@@ -121,8 +116,12 @@ def _warnings(result: Result) -> list[Fact]:
         if event.kind in LIMIT_EVENTS.values():
             continue  # facts of their own
         more = f" ({count} times; this is the first)" if count > 1 else ""
-        at = f"At t = {event.t:.5g} s, " if len(result.times) > 1 else ""
-        where = f"s = {event.s_a:.4g} m: " if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m: "
+        at = f"At t = {short(event.t, 5)} s, " if len(result.times) > 1 else ""
+        where = (
+            f"s = {short(event.s_a, 4)} m: "
+            if event.s_a == event.s_b
+            else f"s = {short(event.s_a, 4)} to {short(event.s_b, 4)} m: "
+        )
         text = f"{at}{where}{event.text}{more}"
         weight = "note" if event.kind in NEWS else "alarm"
         values = {"kind": event.kind, "count": count}
@@ -138,7 +137,7 @@ def _tension(result: Result) -> Fact:
     found = worst(result, "tension")
     doubt = _doubt(result, "tension", found)
     text = f"{amount(found.value, 'N')} {place(result, found.s)}{moment(result, found.t)}{doubt}."
-    values: dict[str, Any] = {"tension": found.value}
+    values: dict[str, Any] = {"tension": found.value, "headline": f"{amount(found.value, 'N')}{doubt}"}
     for end in ("start", "end"):  # every step is logged there, outputs are farther apart
         if f"steps/end_force_{end}" in result and len(result["steps/t"]):
             force = result[f"steps/end_force_{end}"]
@@ -146,7 +145,7 @@ def _tension(result: Result) -> Fact:
             values[f"end_force_{end}"], when = float(force[n]), float(result["steps/t"][n])
             if force[n] > found.value * (1.0 + 1e-3):
                 between = "The" if has_envelope(result) else "Between outputs the"
-                text += f" {between} force at the {end} reaches {amount(force[n], 'N')}, at t = {when:.5g} s."
+                text += f" {between} force at the {end} reaches {amount(force[n], 'N')}, at t = {short(when, 5)} s."
     return _with_limit(
         result, "max_tension", Fact("tension", "Largest tension", text, "plain", values, found.t, found.s)
     )
@@ -188,6 +187,7 @@ def _bend(result: Result) -> Fact:
         "radius": 1.0 / found.value if found.value > 0.0 else None,
         "allowed": None,
         "ratio": None,
+        "headline": "straight",
     }
     place_of: tuple[float | None, float | None]
     if found.value * float(np.ptp(result.s)) < STILL:
@@ -197,7 +197,9 @@ def _bend(result: Result) -> Fact:
         stiff = "" if kind == "rod" else ", which does not resist bending"
         inside = f", in a {kind} zone{stiff}" if kind else ""
         text = f"{amount(1.0 / found.value, 'm')} {place(result, found.s)}{moment(result, found.t)}{inside}"
-        text += f"{_doubt_of_radius(result, found)}."
+        doubt = _doubt_of_radius(result, found)
+        text += f"{doubt}."
+        values["headline"] = f"{amount(1.0 / found.value, 'm')}{doubt}"
         place_of = (found.t, found.s)
     unknown = _bends_left_out(result)
     text += unknown
@@ -229,7 +231,7 @@ def _bends_left_out(result: Result) -> str:
     found = [e for e in result.events if e.kind in ("bending at point load neglected", "bending at clamp neglected")]
     if not found:
         return ""
-    where = ", ".join(dict.fromkeys(f"s = {x:.4g} m" for e in found for x in (e.s_a, e.s_b)))
+    where = ", ".join(dict.fromkeys(f"s = {short(x, 4)} m" for e in found for x in (e.s_a, e.s_b)))
     return f" Not known at {where}, where the bend at a point load or clamp is left out: say force_rod there."
 
 
@@ -254,12 +256,13 @@ def _slack(result: Result) -> Fact:
     pressed = tension < -zero
     weights = np.gradient(along_line.s) if len(along_line.s) > 1 else np.ones(1)
     length, outputs = float((pressed @ weights).max()), int(pressed.any(axis=1).sum())
-    values = {"tension": found.value, "outputs": outputs, "length": length}
+    values: dict[str, Any] = {"tension": found.value, "outputs": outputs, "length": length}
+    values["headline"] = f"{amount(found.value, 'N')}{_doubt(result, 'tension', found)}" if found.value else "0 N"
     there, weight = f"{place(result, found.s)}{moment(result, found.t)}", "plain"
     if outputs:
         part = f"at {outputs} of {len(result.times)} outputs" if len(result.times) > 1 else "at rest"
         text = f"{amount(found.value, 'N')} {there}: the cable is slack or compressed {part}"
-        text += f", at most {length:.3g} m of it."
+        text += f", at most {short(length, 3)} m of it."
         weight = "note"
     elif found.value < -zero:
         text, weight = f"{amount(found.value, 'N')} {there}: the cable is slack or compressed between outputs.", "note"
@@ -283,6 +286,18 @@ def _limits(result: Result) -> Fact:
     text += ", over every accepted step." if has_envelope(result) else ", at the outputs that were saved."
     values = {"limits": [x._asdict() for x in found]}
     return Fact("limits", title, text, "plain", values)
+
+
+def _quantities(result: Result) -> list[Fact]:
+    """Quantities that the scene gives limits for, each at the output where it is nearest to them."""
+    facts = []
+    for x in held_of(result):
+        there = f" {place(result, x.s)}" if x.s is not None else ""
+        weight = "alarm" if x.broken else "plain"
+        text = f"{x.text}{there}{moment(result, x.t)}."
+        values = {"value": x.value, "allowed": x.allowed, "limit": x.limit}
+        facts.append(Fact("quantity", x.name.replace("_", " ").capitalize(), text, weight, values, x.t, x.s))
+    return facts
 
 
 def _hockling(result: Result) -> Fact:
@@ -348,21 +363,26 @@ def _seabed(result: Result) -> Fact:
     if high == 0.0:
         return Fact("seabed", title, "The cable never touches it.", "plain", values)
     if len(grounded) == 1 or high - low <= 1e-9 * high:
-        text = f"{high:.4g} m of the cable lie on it"
+        text = f"{short(high, 4)} m of the cable lie on it"
     else:
-        text = f"Between {low:.4g} and {high:.4g} m of the cable lie on it"
+        text = f"Between {short(low, 4)} and {short(high, 4)} m of the cable lie on it"
     for edge in free_edges(result):
         seen = result["touchdown"][:, edge]
         a, b = float(np.nanmin(seen)), float(np.nanmax(seen))
         name = ("begins", "ends")[edge]
         values["touchdown"][("first", "last")[edge]] = [a, b]
-        text += f"; contact {name} " + (f"at s = {a:.4g} m" if b - a < 5e-4 * b else f"at s = {a:.4g} to {b:.4g} m")
+        text += f"; contact {name} " + (
+            f"at s = {short(a, 4)} m" if b - a < 5e-4 * b else f"at s = {short(a, 4)} to {short(b, 4)} m"
+        )
     gone = int((grounded == 0.0).sum())
     if gone:
         text += f"; at {gone} of {len(grounded)} outputs nothing does"
     i = int(force.argmax())
     t = float(result.times[i])
     text += f". It bears at most {amount(float(force[i]), 'N')}{moment(result, t)}."
+    values["headline"] = (
+        f"{short(high, 4)} m" if high - low <= 1e-9 * high else f"{short(low, 4)} to {short(high, 4)} m"
+    )
     return Fact("seabed", title, text, "plain", values, t)
 
 
@@ -397,9 +417,9 @@ def _status(result: Result) -> Fact:
     if n == 0:
         held = " No output was saved."
     elif n == 1:
-        held = f" One output, at t = {result.times[0]:.6g} s."
+        held = f" One output, at t = {short(result.times[0], 6)} s."
     else:
-        held = f" {n} outputs, t = {result.times[0]:.6g} to {result.times[-1]:.6g} s."
+        held = f" {n} outputs, t = {short(result.times[0], 6)} to {short(result.times[-1], 6)} s."
     good = result.status == "complete"
     text = f"{result.status_text[:1].upper()}{result.status_text[1:].rstrip('.')}.{held}"
     return Fact("status", "How it ended", text, "plain" if good else "alarm", values)

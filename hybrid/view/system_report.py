@@ -17,8 +17,8 @@ from hybrid.view.plotly_backend import colour_scale, figure_of
 from hybrid.view.projections import views_of
 from hybrid.view.save import REPORT_MARK
 from hybrid.view.scenery import box_and_planes, speed_of
-from hybrid.view.style import BODY, INK, prefix
-from hybrid.view.summary import Fact, amount, attention, facts_of, short, status_facts
+from hybrid.view.style import BODY, INK, prefix, short
+from hybrid.view.summary import Fact, amount, facts_of, status_facts
 from hybrid.view.svg_backend import draw
 from hybrid.view.system_views import (
     AllLines,
@@ -36,6 +36,8 @@ from hybrid.view.zones import COLOURS
 
 # Numbers of the moving picture, all lines together: frames times points, as of one cable.
 MOST_VALUES = 80_000
+# Lines whose statistics are on the page: of more the first ones, `hybrid stats --line` has all.
+MOST_STATISTICS = 20
 # Extremes of each line in the table: quantity, bound, heading, unit.
 EXTREMES = (
     ("tension", "max", "largest tension", "N"), ("tension", "min", "smallest tension", "N"),
@@ -57,19 +59,30 @@ def html(result: Result) -> str:
     made = {
         "title": escape(result.title or "(no title)"),
         "subtitle": escape(_subtitle(result, every)),
-        "attention": parts.attention_html(attention(facts), several),
+        "verdict": parts.verdict_html(facts, several),
         "facts": parts.facts_html([f for f in facts if f.weight != "alarm"], several) + _tables(result),
         "cable": _space(result, every, scene, shown) if scene else "",
         "figures": _graphs(numbered),
+        "statistics": _statistics(result),
         "events": parts.events_html(result, several),
         "energy": "",
         "settings": parts.settings_html(result),
+        "scene_title": "Scene as it was run (YAML)",
         "scene": escape(result.scene_text),
         "footer": escape(parts.footer()),
         "mark": REPORT_MARK,
         "index": script_json({"scene": scene, "figures": figures}),
     }
     return parts.filled_page(made, store)
+
+
+def _statistics(result: Result) -> str:
+    """Statistics of what the scene asks for, and of every line."""
+    found = parts.statistics_html(result)
+    for name, line in [*result.lines.items()][:MOST_STATISTICS]:
+        own = parts.statistics_html(line).replace('<section id="statistics">', "<section>")
+        found += own.replace("<summary>Statistics of", f"<summary>Line {escape(name)}: statistics of")
+    return found
 
 
 def facts_of_all(result: Result) -> list[Fact]:
@@ -84,7 +97,9 @@ def facts_of_all(result: Result) -> list[Fact]:
 
 def _subtitle(result: Result, every: AllLines) -> str:
     n = every.outputs
-    outputs = f"{n} outputs to t = {every.times[-1]:.6g} s" if n > 1 else "static, one output" if n else "no output"
+    outputs = (
+        f"{n} outputs to t = {short(every.times[-1], 6)} s" if n > 1 else "static, one output" if n else "no output"
+    )
     made = str(result.attributes.get("created", ""))[:16].replace("T", " ")
     computed = f"computed {made} UTC with hybrid-cable {result.versions.get('hybrid-cable', '?')}"
     return "; ".join([outputs, *facts_line(result, every), computed])
@@ -110,10 +125,10 @@ def _tables(result: Result) -> str:
     heads = [x for x in EXTREMES if any(extreme(line, x[0], x[1]) for line in result.lines.values())]
     rows = []
     for name, line in result.lines.items():
-        row = [name, f"{float(line.attributes.get('length', line.s[-1])):.6g} m"]
+        row = [name, f"{short(float(line.attributes.get('length', line.s[-1])), 6)} m"]
         for quantity, bound, _, unit in heads:
             found = extreme(line, quantity, bound)
-            where = f" at s = {found.s:.5g} m, t = {found.t:.5g} s" if found else ""
+            where = f" at s = {short(found.s, 5)} m, t = {short(found.t, 5)} s" if found else ""
             row.append(amount(found.value, unit) + where if found else "–")
         rows.append(row)
     out = "<h3>Lines: extremes of all steps</h3>"
@@ -127,7 +142,7 @@ def _largest(result: Result, name: str, unit: str) -> str:
     sizes = np.linalg.norm(result[name], axis=1)
     k = int(sizes.argmax())
     vector = _vector(result[name][k] * prefix(unit, float(sizes[k]))[0], 4)
-    return f"{amount(float(sizes[k]), unit)} [{vector}] at t = {result.times[k]:.5g} s"
+    return f"{amount(float(sizes[k]), unit)} [{vector}] at t = {short(result.times[k], 5)} s"
 
 
 def _points(result: Result) -> str:
@@ -137,7 +152,21 @@ def _points(result: Result) -> str:
         row = [name, fairleads_of(result).get(name, ""), _vector(at[-1]), _vector(np.ptp(at, axis=0))]
         rows.append([*row, _largest(result, force, "N") if force in result else "–"])
     head = ["point", "on body", "last place (m)", "range of motion (m)", "largest force of its lines"]
-    return "<h3>Points</h3>" + parts.table_html(rows, head, numbers=3)
+    return "<h3>Points</h3>" + parts.table_html(rows, head, numbers=3) + _clamped(result)
+
+
+def _clamped(result: Result) -> str:
+    """Points at which lines are clamped: how they turn, and the moments there."""
+    rows = []
+    for name in points_of(result):
+        turned, moment = f"points/{name}/rotation", f"points/{name}/moment"
+        if turned in result:
+            x = result[turned]
+            rows.append([name, _vector(x[-1]), _vector(np.ptp(x, axis=0)), "–"])
+        elif moment in result:
+            rows.append([name, "–", "–", _largest(result, moment, "N m")])
+    head = ["point with clamped lines", "last roll, pitch, yaw (deg)", "range (deg)", "largest moment of its lines"]
+    return parts.table_html(rows, head, numbers=3) if rows else ""
 
 
 def _bodies(result: Result) -> str:
@@ -256,5 +285,10 @@ def _marks(result: Result, frames: np.ndarray, store: Store) -> list[dict[str, A
 def _space(result: Result, every: AllLines, scene: dict[str, Any], shown: dict[str, Kept]) -> str:
     poster = draw([shape(result, every, views_of(every.as_result)[0])])
     thinned = next(iter(shown.values()))
-    section = parts.space_html(scene, poster, len(thinned.frames) > 1, thinned.notice)
+    moves = len(thinned.frames) > 1
+    when = (
+        f", t = {short(every.times[0], 5)} to {short(every.times[-1], 5)} s; on paper the last shapes" if moves else ""
+    )
+    caption = f"{result.title or 'All lines'}{when}."
+    section = parts.space_html(scene, poster, moves, thinned.notice, caption)
     return section.replace("<h2>The cable</h2>", "<h2>The lines</h2>")

@@ -17,7 +17,7 @@ from hybrid.view.figure import Axis, Band, Item, Line, Marks, Page, Panel
 from hybrid.view.headed_page import page_of
 from hybrid.view.panels import framed, sea
 from hybrid.view.projections import Numbers, View, aspect_of, telling_times, views_of
-from hybrid.view.style import BODY, INK, earlier_grey, prefix
+from hybrid.view.style import BODY, INK, earlier_grey, prefix, short
 
 LINE_COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9", "#8C6D31", "#000000", "#7F7F7F")
 MOST_NAMED = 12  # lines in a legend: more would hide the picture
@@ -100,7 +100,7 @@ def shape(result: Result, every: AllLines, view: View) -> Panel:
         for line in every.lines.values():
             items.append(Line(*view.project(line.position[output]), label, earlier_grey(k, len(times)), 0.6))
     items += shapes(result, every, view)
-    when = f" at t = {every.times[-1]:.4g} s" if every.outputs > 1 else ""
+    when = f" at t = {short(every.times[-1], 4)} s" if every.outputs > 1 else ""
     return framed(every.as_result, view, items, when)
 
 

@@ -20,7 +20,7 @@ from hybrid.store.records import Event, Zone
 from hybrid.view.decimate import Kept, even
 from hybrid.view.figure import Axis, Band, Box, Item, Line, Map, Marks, Panel
 from hybrid.view.projections import STILL, free_edges, whole_zones
-from hybrid.view.style import ALARM, INK, NEWS, colour_of, prefix
+from hybrid.view.style import ALARM, INK, NEWS, colour_of, prefix, short
 
 # What is shown of each kind, and its colours: shades of the orange and the blue that the kinds have on other pages.
 # Lightness falls evenly (in OKLab, 0.93 to 0.32), and none of one kind is near any of the other to colour-blind eyes.
@@ -181,7 +181,7 @@ def zone_map(result: Result, shown: Kept | None = None) -> Panel:
     if ((cells.kind >= 0) & (cells.point < 0)).any():
         nowhere = np.zeros(0)
         items.append(Marks(nowhere, nowhere, "s", "no output point in the zone", _UNSEEN, _UNSEEN))
-    caption = "What kind of model holds where and when. Point at a mark, or tap it, to read what happened."
+    caption = "Zones along the cable over time: rods in shades of their curvature, catenaries of their tension."
     if shown and len(frames) < len(shown.frames):
         caption += f" {len(frames)} of {len(result.times)} outputs are drawn."
     if len(result.events) > _MOST_ON_PAGE:
@@ -203,10 +203,10 @@ def share_of_rod(result: Result) -> Panel:
         Band(t, 0.0 * y, y, colour=COLOURS["rod"][2], opacity=1.0),
         Line(t, y, width=0.8),
     ]
-    low, high = (f"{x:.3g}" for x in (share.min(), share.max()))
+    low, high = (f"{short(x, 3)}" for x in (share.min(), share.max()))
     span = f" on average, between {low} and {high} %" * (low != high)
     up = Axis("share", "%", 0.0, 100.0, ticks=(0.0, 50.0, 100.0))
-    return Panel("share", f"share of rod: {mean:.3g} % of the cable{span}", _time(result, edges), up, items)
+    return Panel("share", f"share of rod: {short(mean, 3)} % of the cable{span}", _time(result, edges), up, items)
 
 
 def strip(result: Result) -> Panel:
@@ -221,7 +221,7 @@ def strip(result: Result) -> Panel:
         for kind, s_a, s_b in zones:
             items.append(Box((edges[k], edges[n]), (s_a, s_b), kind, colour_of(kind), 1.0))
         k = n
-    caption = f"zones: s = 0 (below) to {s[-1]:.5g} m, over t = {times[0]:.5g} … {times[-1]:.5g} s"
+    caption = f"zones: s = 0 (below) to {short(s[-1], 5)} m, over t = {short(times[0], 5)} … {short(times[-1], 5)} s"
     x, y = Axis("t", "s", float(times[0]), float(times[-1])), Axis("s", "m", float(s[0]), float(s[-1]))
     return Panel("strip", "", x, y, items, caption=caption)
 
@@ -234,8 +234,12 @@ def shares(result: Result) -> str:
     low, high = float(part.min()), float(part.max())
     changes = sum(a != b for a, b in pairwise(result.zones))
     if not changes:
-        return f"{low:.3g} % of the cable is rod, all the time." if len(result.times) > 1 else f"{low:.3g} % is rod."
-    return f"Rod is {low:.3g} to {high:.3g} % of the cable; zones changed at {changes} outputs."
+        return (
+            f"{short(low, 3)} % of the cable is rod, all the time."
+            if len(result.times) > 1
+            else f"{short(low, 3)} % is rod."
+        )
+    return f"Rod is {short(low, 3)} to {short(high, 3)} % of the cable; zones changed at {changes} outputs."
 
 
 def _time(result: Result, edges: np.ndarray) -> Axis:
@@ -280,7 +284,7 @@ def sorted_events(result: Result, most: int) -> list[Event]:
 def event_rows(result: Result) -> tuple[list[tuple[float, str, str, str, str]], str]:
     """Rows of the list of events: time, place, kind, text, family; and what was left out."""
     events = sorted_events(result, _MOST_LISTED)
-    rows = [(e.t, f"{e.s_a:.4g} – {e.s_b:.4g}", e.kind, e.text, family(e.kind)) for e in events]
+    rows = [(e.t, f"{short(e.s_a, 4)} – {short(e.s_b, 4)}", e.kind, e.text, family(e.kind)) for e in events]
     left = len(result.events) - len(rows)
     return rows, f"{left} more are in the result file: result.events in Python." if left else ""
 
@@ -310,6 +314,10 @@ def _events(events: Sequence[Event]) -> list[Item]:
 
 def _event_lines(event: Event) -> list[str]:
     """An event in words, line by line."""
-    where = f"s = {event.s_a:.4g} m" if event.s_a == event.s_b else f"s = {event.s_a:.4g} to {event.s_b:.4g} m"
-    energy = [] if event.energy is None else [f"energy put in: {event.energy:.3g} J"]
-    return [event.kind, f"t = {event.t:.5g} s, {where}", *wrap(event.text, _WIDE)[:12], *energy]
+    where = (
+        f"s = {short(event.s_a, 4)} m"
+        if event.s_a == event.s_b
+        else f"s = {short(event.s_a, 4)} to {short(event.s_b, 4)} m"
+    )
+    energy = [] if event.energy is None else [f"energy put in: {short(event.energy, 3)} J"]
+    return [event.kind, f"t = {short(event.t, 5)} s, {where}", *wrap(event.text, _WIDE)[:12], *energy]

@@ -169,7 +169,7 @@ def test_a_change_of_cells_keeps_momentum_to_second_order(monkeypatch: pytest.Mo
         return booked
 
     monkeypatch.setattr(CellChanges, "change", measured)
-    hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", list(TOUCHDOWN)))
+    hybrid.run(hybrid.load_scene(EXAMPLES / "touchdown.yaml", [*TOUCHDOWN, "time.duration=40"]))
     assert len(left) > 50 and 0.0 < np.median(left) < 1e-4 and max(left) < 1e-3, max(left)
 
 

@@ -11,6 +11,7 @@ import pytest
 from moordyn_decks import DECKS, FOLDER, from_text, imported, text_of
 
 import hybrid
+from hybrid.errors import SceneError
 from hybrid.interop.moordyn import ImportedScene
 from hybrid.interop.moordyn.cables import _rotated
 from hybrid.scene.schema import Body, Clamped, Free, Pinned, Scene
@@ -167,8 +168,9 @@ def test_everything_without_a_place_is_named_with_its_line() -> None:
         "1          WaveKin", "1          Currents", "7          quality", "only_a_word",
     ]  # fmt: skip
     assert {line for line, kind in found if kind == "left out"} == {row(begin) for begin in left_out}
-    taken = ["poly ", "1     Coupled", "2     Free", "1    can", "4    can", "6    Free", "8    Coupled"]
+    taken = ["1     Coupled", "2     Free", "1    can", "4    can", "6    Free", "8    Coupled"]
     assert {line for line, kind in found if kind == "taken as"} == {row(begin) for begin in taken}
+    assert row("poly ") not in {line for line, _ in found}  # its static and dynamic stiffness have a counterpart
     assert {line for line, kind in found if kind == "not needed"} == {row("0.25"), row("200        CV")}
 
 
@@ -326,3 +328,54 @@ def test_generated_decks_are_those_written_by_hand() -> None:
     assert len(imported("generator_spread").scenes) == 3
     assert only("generator_clump").scene.cable.attachments[0].mass == 2000.0
     assert "MoorDyn" in PEERS
+
+
+# --- stiffness of more than one number ----------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("cells", "dynamic", "tau"),
+    [
+        ("1.0e8|2.0e8 4.0e9|1.0e6", {"constant": 2e8, "relaxation_time": 20.0}, 1e6 / 2e8),
+        ("1.0e8|2.0e8|3 4.0e9", {"constant": 2e8, "per_tension": 3.0, "relaxation_time": 20.0}, None),
+    ],
+)
+def test_a_static_and_a_dynamic_stiffness(
+    cells: str, dynamic: dict[str, float], tau: float | None, tmp_path: Path
+) -> None:
+    """The slow spring is EA_s EA_d/(EA_d - EA_s) = 2e8 N, beside its dashpot."""
+    made = from_text(text_of("chain").replace("2.0e8    0  ", f"{cells}  "), tmp_path).scenes["line1"]
+    (section,) = made.scene.cable.sections
+    assert section.axial_stiffness == 1e8
+    assert section.dynamic_stiffness.model_dump(exclude_defaults=True) == pytest.approx(dynamic)
+    assert (section.damping.stiffness if section.damping else None) == (pytest.approx(tau) if tau else None)
+    assert hybrid.parse_scene(made.text) == made.scene
+
+
+def test_a_table_of_tension_over_strain(tmp_path: Path) -> None:
+    (tmp_path / "rope.dat").write_text("strain tension\n(-) (N)\n0 0\n0.01 1e6\n0.02 4e6\n", encoding="utf-8")
+    made = from_text(text_of("chain").replace("2.0e8 ", "rope.dat"), tmp_path).scenes["line1"]
+    (section,) = made.scene.cable.sections
+    assert section.curve == ((0.0, 0.0), (0.01, 1e6), (0.02, 4e6)) and section.axial_stiffness is None
+    with pytest.raises(SceneError, match="one stiffness, which this export writes"):
+        hybrid.export_moordyn(hybrid.static(made.scene), tmp_path / "back.txt")
+
+
+@pytest.mark.parametrize(
+    ("rows", "message"),
+    [
+        ("0 0\n0.01 1e6\n", "two lines before the table"),
+        ("a b\n(-) (N)\n0 0\n0.02 4e6\n0.01 5e6\n", "line 5"),
+        ("a b\n(-) (N)\n0 0\n0.02 x\n", "line 4"),
+        ("a b\n(-) (N)\n0 0\n", "2 to 1000 rows"),
+    ],
+)
+def test_a_table_that_is_none(rows: str, message: str, tmp_path: Path) -> None:
+    (tmp_path / "rope.dat").write_text(rows, encoding="utf-8")
+    with pytest.raises(SceneError, match=message):
+        from_text(text_of("chain").replace("2.0e8 ", "rope.dat"), tmp_path)
+
+
+def test_a_dynamic_stiffness_below_the_static_one(tmp_path: Path) -> None:
+    with pytest.raises(SceneError, match="exchanged"):
+        from_text(text_of("chain").replace("2.0e8    0  ", "2.0e8|1.0e8 4.0e9|1e6 "), tmp_path)

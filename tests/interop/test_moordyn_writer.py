@@ -167,3 +167,30 @@ def test_a_deck_that_is_there_is_kept(tmp_path: Path) -> None:
     with pytest.raises(hybrid.SceneError, match="not there yet"):
         export_moordyn(Straight(made.scene), path)
     export_moordyn(Straight(made.scene), path, overwrite=True)
+
+
+def test_clamps_of_several_lines_are_rods_and_come_back(tmp_path: Path) -> None:
+    """At a fixed point and at a body that is turned, in axes of the body; a spring has no counterpart."""
+    pipe = {"length": 30.0, "mass": 9.0, "diameter": 0.08, "axial_stiffness": 1e7, "bending_stiffness": 5e3}
+    held = {"start": {"tangent": [0.0, 0.6, 0.8], "swivel": True}, "end": {"tangent": [1.0, 0.0, 0.0], "swivel": True}}
+    tables: dict[str, Any] = {
+        "environment": {"fluid": {"density": 1025.0, "surface": 5.0}},
+        "points": {"low": {"position": [0.0, 0.0, -20.0]}, "far": {"position": [-20.0, 0.0, -15.0]}, "lug": {"body": "ship", "place": [1.0, 0.0, -2.0]}},
+        "bodies": {"ship": {"position": [8.0, 3.0, 2.0], "rotation": [0.0, 0.0, 90.0]}},
+        "lines": {
+            "pipe": {"start": "low", "end": "lug", "connections": held, "sections": [pipe], "mesh": {"cells": 20}},
+            "leg": {"start": "low", "end": "far", "sections": [pipe], "model": "catenary", "mesh": {"cells": 10}},
+        },
+    }  # fmt: skip
+    scene = System.model_validate(tables)
+    made = back(scene, tmp_path)
+    ours, theirs = scene.lines["pipe"], made.lines["line1"]
+    for end in ("start", "end"):
+        mine, its = getattr(ours.connections, end), getattr(theirs.connections, end)
+        assert its.tangent == pytest.approx(mine.tangent) and its.swivel
+    assert all(getattr(made.lines["line2"].connections, end).kind == "pinned" for end in ("start", "end"))
+    shapes = [next(iter(hybrid.static(x).lines.values())) for x in (scene, made)]
+    assert np.abs(shapes[0]["position"][-1] - shapes[1]["position"][-1] - [0.0, 0.0, 5.0]).max() < 1e-6
+    held["end"]["bend_stiffness"] = 1e3
+    with pytest.raises(hybrid.SceneError, match=r"lines\.pipe\.connections\.end"):
+        back(System.model_validate(tables), tmp_path)

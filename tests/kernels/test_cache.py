@@ -42,7 +42,7 @@ ends = Ends(np.zeros(2, np.int8), z, np.zeros((2, 9)), z, z, z)
 state = blank_state(1)
 state.e[0], state.v[1], state.a1[0] = (1.0, 0.0, 0.0), (0.0, 2.0, 0.0), (0.0, 1.0, 0.0)
 energy = np.zeros(5)
-observe(line, ends, state.e, state.v, state.a1, state.w, np.zeros((2, 3)), np.zeros((2, 3)), energy)
+observe(line, ends, state.e, state.v, state.a1, state.w, state.T, state.turn, np.zeros((2, 3)), np.zeros((2, 3)), energy)
 print(energy[0])
 """
 

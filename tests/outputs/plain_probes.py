@@ -154,7 +154,7 @@ class Plain:
             return self._plain._observed
         n, st = self.line.h.size, self.computed
         M, strain, energy = np.zeros((n + 1, 3)), np.zeros((n + 1, 3)), np.zeros(4)
-        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, M, strain, energy)
+        observe(self.line, self.ends, st.e, st.v, st.a1, st.w, st.T, st.turn, M, strain, energy)
         return M, strain, energy
 
     @property

@@ -182,6 +182,22 @@ initial: {kind: equilibrium}
 model: {kind: catenary}
 """
 
+QUANTITIES = """\
+output:
+  elevation: [[0.0, 0.0], [20.0, 5.0]]
+  quantities:
+    hang_off: {kind: end_angle, end: end, direction: [1.0, 0.0, 0.0], smallest: 2.0, largest: 90.0}
+    moved: {kind: touchdown_excursion, end: start, reference: [10.0, 0.0]}
+    back: {kind: layback, end: start, to: touchdown}
+    gap: {kind: clearance, point: [1.0, 2.0, -3.0], diameter: 0.5, range: [10.0, 90.0]}
+    hull: {kind: clearance, point: [1.0, 2.0, -3.0], normal: [0.0, 0.0, 1.0]}
+    pipeline: {kind: clearance, path: [[1.0, 2.0, -99.0], [50.0, 2.0, -99.0]]}
+"""
+PIPE = "diameter: 0.03, pipe: {wall: 0.004, outer_diameter: 0.025, modulus: 2.0e+11, pressure: 1.0e+6, pressure_z: -5.0, content_density: 800.0, max_stress: 3.0e+8}}]"
+# Quantities that are asked for, and the steel of a pipe.
+MEASURED = SEA.replace("output: {elevation: [[0.0, 0.0], [20.0, 5.0]]}\n", QUANTITIES)
+PIPED = SEA_TOO.replace("diameter: 0.03}]", PIPE)
+
 SEAS = {"sea": SEA, "sea too": SEA_TOO, "sea list": SEA_LIST, "sea uniform": SEA_UNIFORM}
 
 AT_REST = """\

@@ -363,7 +363,10 @@ def test_check_motions_names_the_end_without_a_file() -> None:
 
 def test_the_motion_files_of_the_page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     page = (Path(__file__).parents[2] / "docs" / "scene.md").read_text(encoding="utf-8")
-    scene, code, begin = (re.findall(rf"^```{x}\n(.*?)^```$", page, re.S | re.M)[0] for x in ("yaml", "python", "csv"))
+    scenes, (code, *_), (begin, *_) = (
+        re.findall(rf"^```{x}\n(.*?)^```$", page, re.S | re.M) for x in ("yaml", "python", "csv")
+    )
+    scene = next(text for text in scenes if "heave: {amplitude: 0.5" in text)
     monkeypatch.chdir(tmp_path)
     exec(compile(code, "scene.md", "exec"), {})
     assert Path("lift.csv").read_text().startswith(begin)

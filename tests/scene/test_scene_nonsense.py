@@ -13,7 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from ruamel.yaml import YAML
 from ruamel.yaml.nodes import MappingNode, SequenceNode
-from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, OCEAN, SEAS, SUSPENSION, complaints
+from scene_texts import AT_REST, EVERYTHING, EVERYTHING_ELSE, MEASURED, OCEAN, PIPED, SEAS, SUSPENSION, complaints
 
 from hybrid.errors import SceneError
 from hybrid.scene.base import dotted
@@ -51,10 +51,24 @@ ends:
 initial: {kind: equilibrium}
 model: {kind: rod}
 """
+ROPES = """\
+cable:
+  sections:
+    - {length: 10.0, mass: 1.0, tension_strain: [[0, 0], [0.01, 1000.0], [0.03, 5000.0]]}
+    - length: 10.0
+      mass: 1.0
+      axial_stiffness: 1.0e+5
+      dynamic_stiffness: {constant: 3.0e+5, per_tension: 20.0, relaxation_time: 60.0}
+ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
+initial: {kind: equilibrium}
+model: {kind: catenary}
+"""
 SWIVELS = """\
 environment: {fluid: {density: 1025.0}}
 cable:
-  sections: [{length: 10.0, mass: 1.0, bending_stiffness: 2.0, torsional_stiffness: 1.0}]
+  sections:
+    - {length: 10.0, mass: 1.0, axial_stiffness: 1.0e+6, bending_stiffness: 2.0, torsional_stiffness: 1.0,
+       tension_torque: -1.0e-3}
   attachments:
     - {kind: swivel, at: 6.0, mass: 5.0, volume: 0.001, drag_area: 0.02, added_mass: 1.0, height: 0.1}
 ends: {start: {kind: pinned, position: [0.0, 0.0, 0.0]}, end: {kind: free}}
@@ -112,6 +126,9 @@ TEXTS = (
         "touching": TOUCHING,
         "twisted": TWISTED,
         "swivels": SWIVELS,
+        "ropes": ROPES,
+        "measured": MEASURED,
+        "piped": PIPED,
     }
     | SEAS
 )
@@ -235,6 +252,7 @@ SIGNED |= {
     "intrinsic_curvature",
     *WORDS,
     "swivel",
+    "tension_torque",
     "joint",
     "criteria",
     "correct",
@@ -255,6 +273,15 @@ SIGNED |= {
     "turns",
     "history",
     "elevation",
+    "end",
+    "to",
+    "smallest",
+    "largest",
+    "pressure_z",
+    "point",
+    "normal",
+    "path",
+    "reference",
     "rate",
     "rates",
 }
@@ -268,6 +295,7 @@ def test_a_negative_number(case: tuple[str, tuple[str | int, ...]]) -> None:
     if (
         keys[-1] in SIGNED
         or "depths" in keys
+        or "tension_strain" in keys
         or keys == ["initial", "friction"]
         or keys[:2] == ["initial", "points"]
         or ballast
@@ -298,6 +326,7 @@ def test_the_texts_of_this_file_have_every_key() -> None:
     known = {key for table in (schema, *schema["$defs"].values()) for key in table["properties"]}
     written = {part for text in TEXTS.values() for path, _ in _places(text) for part in path}
     elsewhere = {"file", "exact", "max_tension", "min_tension", "vessel", "rao", "heading", "fairlead", "drift"}
+    elsewhere |= {"line", "other"}
     assert known - written == elsewhere  # where these are tested
 
 

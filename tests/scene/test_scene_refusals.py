@@ -34,6 +34,15 @@ CASES = {
     "missing key": (SUSPENSION, f"- length: 2.0                    # m, unstretched\n      diameter: 1.0e-3               # m\n      {MASS}", "- §length: 2.0\n      diameter: 1.0e-3", "cable.sections[0].mass", "add `mass: ...` (kg/m)"),
     "missing table": (SUSPENSION, f"§initial: {STRAIGHT}".replace("§", ""), "", "initial", "add `initial: equilibrium`"),
     "empty value": (SUSPENSION, "gravity: 9.8", "§gravity:", "environment.gravity", "leave the key out"),
+    # --- stretch
+    "table and stiffness": (SUSPENSION, MASS, f"{MASS}\n      axial_stiffness: §1.0e+5\n      tension_strain: [[0, 0], [0.01, 1000]]", "cable.sections[0].axial_stiffness", "leave one of the two out"),
+    "table of one row": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: §[[0, 0]]", "cable.sections[0].tension_strain", "axial_stiffness"),
+    "table without zero": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [§[0.01, 100], [0.02, 300]]", "cable.sections[0].tension_strain[0]", "begin with [0, 0]"),
+    "table that falls": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [[0, 0], [0.01, 300], [0.02, §200]]", "cable.sections[0].tension_strain[2][1]", "slackens"),
+    "table the wrong way": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: [[0, 0], [0.01, 300], [§0.005, 400]]", "cable.sections[0].tension_strain[2][0]", "strain comes first"),
+    "table file": (SUSPENSION, MASS, f"{MASS}\n      tension_strain: {{file: §none.csv}}", "cable.sections[0].tension_strain.file", "folder"),
+    "dynamic alone": (SUSPENSION, MASS, f"{MASS}\n      dynamic_stiffness: §{{constant: 3.0e+5, relaxation_time: 60}}", "cable.sections[0].dynamic_stiffness", "axial_stiffness"),
+    "dynamic below static": (SUSPENSION, MASS, f"{MASS}\n      axial_stiffness: 4.0e+5\n      dynamic_stiffness: {{constant: §3.0e+5, relaxation_time: 60}}", "cable.sections[0].dynamic_stiffness.constant", "exchanged"),
     # --- values
     "negative": (SUSPENSION, MASS, "mass: §-1", "cable.sections[0].mass", "check the sign"),
     "with unit": (SUSPENSION, MASS, "mass: §2 kg/m", "cable.sections[0].mass", "write the number alone, 2; the unit is kg/m"),

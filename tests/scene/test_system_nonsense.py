@@ -22,6 +22,7 @@ SCENE: dict[str, Any] = {
         "east": {"kind": "fixed", "position": [150.0, 0.0, -100.0], "motion": {"travel": {"by": [1.0, 0.0, 0.0], "over": 9.0}}},
         "buoy": {"kind": "free", "initial_guess": [0.0, 0.0, 5.0], "mass": 900.0, "volume": 9.0, "height": 2.0,
                  "shape": "cylinder", "drag_area": 1.0, "added_mass": 5.0, "force": [1.0, 0.0, 0.0]},
+        "low": {"position": [10.0, 0.0, -100.0]},
         "lead": {"body": "float", "place": [1.0, 0.0, -1.0]},
         "hangoff": {"kind": "fairlead", "body": "ship", "place": [0.0, 5.0, -1.0], "break_at": {"tension": 5e5}},
     },
@@ -39,6 +40,9 @@ SCENE: dict[str, Any] = {
     },
     "lines": {
         "one": {"start": "west", "end": "buoy", "sections": [SECTION], "model": "rod", "mesh": {"cells": 20}},
+        "six": {"start": "low", "end": "lead", "sections": [SECTION], "model": "rod", "mesh": {"cells": 20},
+                "connections": {"start": {"tangent": [0.0, 0.0, 1.0], "normal": [1.0, 0.0, 0.0], "swivel": False},
+                                "end": {"kind": "clamped", "tangent": [0.0, 1.0, 1.0], "bend_stiffness": 5e3}}},
         "two": {"start": "buoy", "end": "east", "sections": [SECTION], "attachments": [{"kind": "clump", "at": 5.0, "mass": 3.0, "volume": 0.001}]},
         "three": {"start": "buoy", "end": "lead", "sections": [SECTION | {"length": 80.0}]},
         "four": {"start": "lead", "end": "hangoff", "sections": [SECTION | {"length": 150.0}]},

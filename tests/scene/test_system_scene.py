@@ -102,3 +102,10 @@ def test_every_key_is_on_the_page(table: type) -> None:
     page = PAGE.read_text(encoding="utf-8")
     for key in table.model_fields:
         assert f"`{key}`" in page, key
+
+
+def test_keys_of_one_cable_say_what_several_lines_have_instead() -> None:
+    for key, fix in System.instead.items():
+        with pytest.raises(SceneError) as refused:
+            parse_either(f"{TEXT}{key}: 1\n")
+        assert [x.fix for x in refused.value.complaints if x.where == key] == [fix]

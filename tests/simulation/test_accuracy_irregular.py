@@ -187,6 +187,49 @@ def test_chance_in_means_over_windows_is_seen_from_window_to_window(scatter, unc
     np.testing.assert_array_equal(again.chance, chance)
 
 
+@pytest.mark.parametrize("scatter, repeated", [(1500.0, False), (30.0, True)])
+def test_a_largest_force_within_the_scatter_of_windows_is_not_refined(scatter, repeated):
+    """It seems to converge, from 15 to 18 to 20 kN; but all windows of two runs differ by as much as it does."""
+    snaps = {(0.5, 2): 18e3, (0.5, 4): 18e3, (0.25, 4): 15e3}
+    rng = np.random.default_rng(7)
+
+    def sample(resolution: Resolution) -> RunSample:
+        force = noisy(1e3)
+        force[40::80] += scatter * rng.normal(size=len(force[40::80])) + 4e3
+        force[2000] = snaps.get((resolution.fineness, resolution.every), 20e3)
+        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
+        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
+        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
+        return replace(found, resolution=resolution, forces=steps)
+
+    asked = RequestedAccuracy(None, None, 0.02)
+    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control.start(FINENESS)
+    assert (len(control.runs) > 4) == repeated
+    assert bool(control.scattered) != repeated
+
+
+def test_means_over_windows_that_do_not_converge_are_not_refined():
+    """Finer runs change them by 300 N after 200 N, in all windows alike: more of it would not help, and is not tried."""
+    off = {(0.5, 2): -300.0, (0.5, 4): -300.0, (0.25, 4): -500.0}
+
+    def sample(resolution: Resolution) -> RunSample:
+        force = noisy(1e3)
+        force[40::80] += 2e3 + off.get((resolution.fineness, resolution.every), 0.0)
+        force[2000] = 20e3
+        steps = np.column_stack([np.linspace(0.1, 400.0, len(force)), force, force])
+        kept = np.unique(np.append(np.arange(0, len(force), resolution.every), len(force) - 1))
+        found = run(force[kept], round(100 * resolution.fineness), 1000 // resolution.every, every=resolution.every)
+        return replace(found, resolution=resolution, forces=steps)
+
+    asked = RequestedAccuracy(None, 100.0, None)
+    control = ErrorController(asked, Free(True, True, False), True, sample, sample, irregular=True)
+    control.start(FINENESS)
+    assert len(control.runs) == 4
+    missed = [text for kind, text in control.notes if kind == "accuracy missed"]
+    assert len(missed) == 1 and "windows' largest" in missed[0] and "several seeds" in missed[0]
+
+
 SEA = {
     "environment": {
         "fluid": {
@@ -228,6 +271,7 @@ def test_instant_in_a_scene():
         hybrid.validate_scene(SEA | {"accuracy": {"instant": 2}})
 
 
+@pytest.mark.slow
 def test_what_is_judged_survives_a_stop(tmp_path, monkeypatch):
     """A run that is refined, stopped in its comparisons, its result and its refinement, and resumed: the same bits."""
     scene = hybrid.validate_scene(SEA | {"time": {"duration": 12.0}, "accuracy": {"tension": "0.05%"}})

@@ -38,6 +38,7 @@ def test_no_step_takes_more_and_the_motion_is_nearly_the_same(model: str) -> Non
         told = [e for e in result.events if e.kind == "iterations cut"]
         assert [e.value for e in told[1:]] == [count] and told[0].value is None
         assert f"after {most} Newton iterations" in told[0].text and f"{count} of 100 steps" in told[1].text
+        assert float(told[0].text.split("changed it by ")[1].split()[0]) > 0.0
         off.append(np.abs(forces - full).max() / np.abs(full).max())
     assert off[2] < 0.2 * off[1] < 0.04 * off[0] < 0.04 * 0.1
 

@@ -141,6 +141,7 @@ def test_heavier_line_on_the_reel() -> None:
     length = result["payout/length"]
     mass = 2.0 * np.minimum(length, 43.3) + 7.0 * np.maximum(length - 43.3, 0.0)
     assert np.abs(result["reaction_end"][1:, 2] / (mass * (G - 0.05))[1:] - 1.0).max() < 1e-9
+    assert np.abs(result["work/scheme"]).max() < 1e-3 * np.abs(result["work/end"]).max()
 
 
 @pytest.mark.parametrize("clamp", [False, True])
@@ -244,6 +245,78 @@ def test_energy_is_balanced_to_second_order(model: str, EA: float | None, EI: fl
     assert left[0] > 3.0 * left[1]
 
 
+# --- at the start -----------------------------------------------------------------------------------
+
+
+def exchanged(scene: dict[str, Any]) -> dict[str, Any]:
+    """The same line with its ends exchanged: the winch at the start."""
+    cable, ends = dict(scene["cable"]), {name: dict(x) for name, x in scene["ends"].items()}
+    for end in ends.values():
+        end |= {"tangent": [-x for x in end["tangent"]]} if "tangent" in end else {}
+    length = sum(x["length"] for x in cable["sections"])
+    cable["sections"] = cable["sections"][::-1]
+    cable["attachments"] = [{**x, "at": length - x["at"]} for x in cable.get("attachments", [])]
+    return {**scene, "cable": cable, "ends": {"start": ends["end"], "end": ends["start"]}}
+
+
+def two_sections(payout: dict[str, Any], **more: Any) -> dict[str, Any]:
+    """A hanging line of two sections with a clump, and a third section on the reel."""
+    reel = [{"length": 3.3, "mass": 3.0}, {"length": 50.0, "mass": 7.0, "diameter": 0.05}]
+    scene = hanging(payout | {"reel": reel}, 12.0, **more)
+    scene["cable"] = {
+        "sections": [{"length": 12.0, "mass": 1.0}, {"length": 28.0, "mass": 3.0, "max_tension": 900.0}],
+        "attachments": [{"kind": "clump", "at": 6.0, "mass": 20.0}],
+    }
+    return scene
+
+
+@pytest.mark.parametrize(
+    "scene",
+    [
+        two_sections({"rates": [[0, 0], [12, 1.0]]}),
+        two_sections({"rates": [[0, 0], [12, -0.5]]}, dimension=3),
+        clamped(sagging("rod", 2e6, 2e4, duration=8.0), [1.0, 0.2, 0.5]),
+        sagging("rod", None, 2e4, -0.8, duration=8.0),
+    ],
+)
+def test_a_winch_at_the_start_does_as_one_at_the_end(scene: dict[str, Any]) -> None:
+    """The line and its mirror image, to round-off: s counts from the start of t = 0, and is negative beyond it."""
+    found, mirror = hybrid.run(scene), hybrid.run(exchanged(scene))
+    length = float(found["payout/length"][0])
+    np.testing.assert_allclose(mirror["s"], length - found["s"][::-1], atol=1e-12 * length)
+    tension = np.abs(found["tension"]).max()
+    single = found["s"] != 6.0  # where a clump is there are two values
+    for name, size in (("position", length), ("tension", tension), ("velocity", 1.0)):
+        assert np.abs(mirror[name][:, ::-1] - found[name])[:, single].max() < 1e-8 * size, name
+    for name in ("payout/length", "payout/rate", "payout/power", "work/zones"):
+        assert np.abs(mirror[name] - found[name]).max() < 1e-8 * (1.0 + np.abs(found[name]).max()), name
+    for mine, its in (("reaction_start", "reaction_end"), ("work/start", "work/end")):
+        assert np.abs(mirror[mine] - found[its]).max() < 1e-8 * np.abs(found[its]).max(), mine
+    for name in ("envelope/tension_max", "envelope/displacement_max", "envelope/max_tension"):
+        if name in found:
+            np.testing.assert_allclose(mirror[name][::-1], found[name], rtol=1e-8, atol=1e-9, err_msg=name)
+
+
+def test_at_the_start_it_is_resumed_bit_for_bit(tmp_path: Path) -> None:
+    scene = exchanged(clamped(sagging("rod", 2e6, 2e4, duration=8.0)))
+    scene["ends"]["start"]["payout"]["longest"] = 112.0
+    whole = hybrid.run(scene, output=tmp_path / "whole.h5")
+    hybrid.run({**scene, "time": {"duration": 5.0, "step": 0.05}}, output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
+    for name in ("position", "tension", "reaction_start", "work/start", "work/scheme", "envelope/tension_t_max"):
+        assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
+    assert whole["s"][0] == -12.0
+
+
+def test_at_the_start_a_length_is_set_from_python() -> None:
+    with hybrid.Simulation(exchanged(hanging({"longest": 60.0}, 5.0))) as sim:
+        while sim.t < 4.9:
+            sim.set_payout(0.2 * (sim.t + 0.05))
+            sim.step()
+        assert sim.length == pytest.approx(40.0 + 0.1 * sim.t**2, abs=1e-9)
+        assert sim.forces().start[2] == pytest.approx(-2.0 * sim.length * (G - 0.2), rel=1e-9)
+
+
 # --- resume and Python ------------------------------------------------------------------------------
 
 
@@ -264,6 +337,18 @@ def test_resumed_bit_for_bit(tmp_path: Path, model: str, EA: float | None, EI: f
     with np.errstate(invalid="ignore"):
         for name in ("envelope/tension_max", "envelope/displacement_max", "envelope/tension_t_min"):
             assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
+
+
+def test_a_checkpoint_without_the_side_of_the_winch_is_that_of_one_at_the_end() -> None:
+    """Files of before winches at the start have ten numbers of a reel."""
+    with hybrid.Simulation(hanging({"rate": 0.5, "ramp": 2.0, "longest": 50.0}, 5.0)) as sim:
+        sim.advance(2.0)
+        run = sim._loop.run
+        assert run.payout is not None
+        before = run.payout.reel.numbers.copy()
+        kept = run.payout.checkpoint()
+        run.payout.restore({**kept, "numbers": kept["numbers"][:10]}, run.model)
+        assert np.array_equal(run.payout.reel.numbers, before)
 
 
 def test_a_resume_does_not_pay_out_more_than_the_result_has_points_for(tmp_path: Path) -> None:
@@ -382,7 +467,13 @@ def test_other_refusals() -> None:
     scene["cable"]["sections"][0]["damping"] = {"stiffness": 0.01}
     assert "damping.stiffness" in refused(scene)
     scene = hanging(RATE, 5.0)
-    scene["ends"] = {"start": scene["ends"]["end"], "end": scene["ends"]["start"]}
+    scene["ends"]["start"] = scene["ends"]["end"] | {"position": [30, 0, 0]}
+    assert "ends.start.payout" in refused(scene)
+    scene = exchanged(hanging({"winch": {"tension": 900.0, "inertia": 50}, "longest": 60}, 5.0))
+    assert "ends.start.payout.winch" in refused(scene)
+    scene = exchanged(hanging({"rate": 0.5}, 5.0))
+    assert "ends.start.payout.ramp" in refused(scene)
+    scene = exchanged(hanging({"rate": -20.0, "ramp": 1}, 6.0))
     assert "ends.start.payout" in refused(scene)
     scene = hanging(RATE, 5.0)
     scene["ends"]["end"]["release_at"] = {"time": 2.0}
@@ -424,6 +515,9 @@ def test_the_plan_says_how_long_the_line_will_be() -> None:
     assert said({"longest": 60}) == "set from Python: 40 m at t = 0, up to 60 m; up to 30 cells"
     winch = {"tension": 900.0, "inertia": 50}
     assert said({"winch": winch, "longest": 60}).startswith("a winch holds 900 N: 40 m at t = 0, up to 60 m")
+    for scene in (clamped(sagging("rod", 2e6, 2e4, 0.0)), sagging("rod", None, 2e4, 0.0)):
+        found = hybrid.plan(scene)  # nodes that ride are counted, too
+        assert found.payout is not None and found.payout.cells == sum(found.cells) == 40
     plain = hanging({}, 20.0)
     del plain["ends"]["end"]["payout"]
     assert hybrid.plan(plain).payout is None

@@ -82,7 +82,7 @@ def test_a_result_keeps_its_output_points(errors, tmp_path, monkeypatch):
     stopping = Stopping(monkeypatch)
     with monkeypatch.context() as older:
         points = case.OutputPoints(np.linspace(0.0, 1.0, 11), np.zeros(0))
-        older.setattr(case, "output_points", lambda scene, longest=None: points)
+        older.setattr(case, "output_points", lambda scene, *_: points)
         hybrid.run(scene, tmp_path / "whole.h5", progress=stopping).close()
         stopped(tmp_path / "run.h5", monkeypatch, scene, stopping.heard - 50)
     with hybrid.resume(tmp_path / "run.h5") as result:

@@ -55,7 +55,7 @@ def energy(run: Transient) -> float:
     """Kinetic, elastic and contact energy, J."""
     x, parts = run.state, np.zeros(4)
     room = np.zeros((x.T.size + 1, 3))
-    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, room, room.copy(), parts)
+    observe(run.model.line, run.model.ends.values, x.e, x.v, x.a1, x.w, x.T, x.turn, room, room.copy(), parts)
     contact = run.run.contact
     return float(parts.sum()) + (float(contact.contact.numbers[ENERGY]) if contact else 0.0)
 

@@ -179,6 +179,12 @@ def test_a_body_and_a_cable_keep_their_energy() -> None:
     assert left[0] < 1e-3 and 3.0 < left[0] / left[1] < 5.0
 
 
+def test_a_controller_brings_a_vehicle_to_its_depth() -> None:
+    """The example, to 100 m: it stays above its target, and at its depth in the mean."""
+    across, depth_error = runpy.run_path(str(EXAMPLES / "11_rov_controller.py"))["main"](depth=100.0)
+    assert across < 0.1 and abs(depth_error) < 0.1
+
+
 # --- what an attack found ------------------------------------------------------------------------
 
 

@@ -76,8 +76,35 @@ def spar() -> dict[str, Any]:
     }  # fmt: skip
 
 
+def clamped() -> dict[str, Any]:
+    """Rods clamped to a free point, to a body that is moved and to one that is free, one of them by a spring."""
+    pipe = {"mass": 3.0, "diameter": 0.04, "axial_stiffness": 2e6, "bending_stiffness": 300, "drag": {"normal": 1.2}}
+    turns = {"roll": {"amplitude": 4, "period": 5}, "heave": {"amplitude": 0.3, "period": 4}, "ramp": 4}
+    up = {"tangent": [0, 0, 1]}
+    return {
+        "environment": SEA,
+        "points": {
+            "foot": {"position": [0, 0, -40]}, "tee": {"initial_guess": [1, 0, -21], "mass": 20, "volume": 0.2},
+            "lug": {"body": "ship", "place": [1, 0, -4]}, "eye": {"body": "float", "place": [0, 0, -1]},
+        },
+        "bodies": {
+            "ship": {"position": [1, 0, 2], "motion": turns},
+            "float": {"initial_guess": [9, 0, -14], "mass": 200, "volume": 0.4, "inertia": [90, 90, 60]},
+        },
+        "lines": {
+            "low": {"start": "foot", "end": "tee", "connections": {"start": up, "end": up}, "mesh": {"cells": 20},
+                    "sections": [pipe | {"length": 20}]},
+            "high": {"start": "lug", "end": "tee", "mesh": {"cells": 20}, "sections": [pipe | {"length": 19.5}],
+                     "connections": {"start": {"tangent": [0, 0, -1], "bend_stiffness": 5e3}, "end": {"tangent": [0, 0, -1]}}},
+            "branch": {"start": "tee", "end": "eye", "connections": {"start": {"tangent": [1, 0, 0]}, "end": up},
+                       "mesh": {"cells": 20}, "sections": [pipe | {"length": 12}]},
+        },
+        "time": {"duration": 4.0, "step": 0.05},
+    }  # fmt: skip
+
+
 LONG = {"duration": 60.0, "step": 0.02}
-SCENES = {"mooring": mooring(), "spar": spar()}
+SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
 
 
 @pytest.fixture
@@ -142,6 +169,7 @@ def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping) ->
     assert seen == [("running", 40, [40, 40, 40])]
 
 
+@pytest.mark.slow
 def test_kills_lose_no_more_than_the_work_since_a_checkpoint(tmp_path: Path) -> None:
     code = (
         "import sys, hybrid, hybrid.simulation.system_run as r; r.WORK = 3000; "

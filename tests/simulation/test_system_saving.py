@@ -11,6 +11,7 @@ from test_system_resume import HOSE, LEG, mooring, spar
 
 import hybrid
 import hybrid.simulation.deferred_recorder
+import hybrid.store.writer
 from hybrid.errors import Outcome
 
 STEP = 0.05
@@ -55,6 +56,17 @@ def plain(data: dict[str, Any], steps: int = 20) -> hybrid.Result:
         for _ in range(steps):
             step(lines)
         return lines.result()
+
+
+def test_a_file_grows_while_it_is_stepped(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(hybrid.store.writer, "_PAUSE", 0.0)
+    monkeypatch.setattr(hybrid.store.writer, "_PART", 0.0)
+    with hybrid.SystemSimulation(scene(), tmp_path / "run.h5") as lines:
+        for _ in range(6):
+            step(lines)
+        with hybrid.open(tmp_path / "run.h5") as part:
+            assert part.times[-1] == pytest.approx(0.3)
+            assert {len(x.times) for x in part.lines.values()} == {len(part.times)}
 
 
 @pytest.mark.parametrize("breaks", [False, True])

@@ -11,6 +11,7 @@ import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
+from hybrid.store.bends import bends_of
 from hybrid.store.histories import history_of
 
 SCENE = {
@@ -134,7 +135,38 @@ def test_both_sides_of_a_jump_are_counted() -> None:
     places, damage = result.damage("D sea", section=(5e-4, 0.04, 2e11))
     assert np.array_equal(places, s) and damage[right] > 5.0 * damage[left]
     alone_places, alone = result.damage("D sea", section=(5e-4, 0.04, 2e11), at=[30.0])
+    between = result.damage("D sea", section=(5e-4, 0.04, 2e11), at=[12.3])[1]
+    mixed_places, mixed = result.damage("D sea", section=(5e-4, 0.04, 2e11), at=[30.0, 12.3])
+    assert mixed_places.tolist() == [30.0, 30.0, 12.3]
+    assert mixed == pytest.approx([*damage[[left, right]], between[0]], rel=1e-9)
     assert alone_places.tolist() == [30.0, 30.0] and alone == pytest.approx(damage[[left, right]], rel=1e-9)
+
+
+class Helix:
+    """Curvature and tangents of a helix, whose bend turns along the line, on n + 1 points."""
+
+    def __init__(self, n: int) -> None:
+        self.s = np.linspace(0.0, 4.0, n + 1)
+        self.t = np.stack([-0.6 * np.sin(self.s), 0.6 * np.cos(self.s), 0.8 + 0 * self.s], axis=1)
+
+    def both_sides(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        known = {
+            "curvature": 0.6 + 0.0 * self.s, "theta": np.arccos(self.t[:, 2]),
+            "phi": np.arctan2(self.t[:, 1], self.t[:, 0]),
+        }  # fmt: skip
+        return self.s, known[name][None]
+
+
+def test_axes_of_bends_are_of_second_order_at_ends_too() -> None:
+    def errors(n: int) -> np.ndarray:
+        line = Helix(n)
+        found = bends_of(line, slice(None)).vectors[0]  # type: ignore[arg-type]
+        normal = -np.stack([np.cos(line.s), np.sin(line.s), 0.0 * line.s], axis=1)
+        return np.linalg.norm(found - 0.6 * np.cross(line.t, normal), axis=1)
+
+    coarse, fine = errors(20), errors(40)
+    assert coarse.max() < 0.02
+    assert fine[0] < coarse[0] / 3.5 and fine[-1] < coarse[-1] / 3.5 and fine[1:-1].max() < 1e-9
 
 
 def test_the_command_prints_rows(result: hybrid.Result, capsys: pytest.CaptureFixture[str]) -> None:

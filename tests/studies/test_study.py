@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import json
-import os
-import signal
 import subprocess
 import sys
-import time as clock
 from pathlib import Path
 
 import numpy as np
 import pytest
+from killed_studies import killed_study
 
 import hybrid
 from hybrid.cli.commands import main
@@ -290,14 +288,16 @@ def test_files_are_those_beside_the_scene(folder: Path, tmp_path: Path, monkeypa
     assert cases_of(study_from({"scene": "moved.yaml", "vary": vary}, folder)).identity != before
 
 
-def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path) -> None:
+@pytest.mark.parametrize("batch", [1, 3])
+def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path, batch: int) -> None:
     """Where one section is longer a profile has other places: it is left out, and what is one number is kept."""
     kept = {"t": {"quantity": "tension", "take": ["max", "profile"]}}
-    vary = {"cable.sections[0].length": [60, 62]}
+    vary = {"cable.sections[0].length": [60, 62, 60]}
     found = hybrid.study(
-        folder / "scene.yaml", tmp_path / "l.zarr", vary=vary, collect=kept, static=True, workers=1, batch=2
+        folder / "scene.yaml", tmp_path / "l.zarr", vary=vary, collect=kept, static=True, workers=1, batch=batch
     )
-    assert found["status"].values.tolist() == [DONE, DONE] and np.isfinite(found["t_max"].values).all()
+    assert np.isfinite(found["t_profile"].values[[0, 2]]).all()
+    assert found["status"].values.tolist() == [DONE] * 3 and np.isfinite(found["t_max"].values).all()
     assert np.isnan(found["t_profile"].values[1]).all() and "t_profile" in str(found["reason"].values[1])
 
 
@@ -329,51 +329,98 @@ def test_a_script_needs_no_guard(folder: Path, tmp_path: Path) -> None:
     assert done.stdout.split() == ["once", "2"], done.stderr
 
 
+LINES = """
+environment: {fluid: {density: 1025}}
+points:
+  a-1: {kind: fixed, position: [0, 0, 0]}
+  b: {kind: free, initial_guess: [10, 0, -12], mass: 50}
+  c: {kind: fixed, position: [20, 0, 0], motion: {heave: {amplitude: 0.2, period: 4}, ramp: 4}}
+lines:
+  port: {start: a-1, end: b, sections: [{length: 16, mass: 3, diameter: 0.03, axial_stiffness: 1.0e+6}]}
+  star-board: {start: b, end: c, sections: [{length: 16, mass: 3, diameter: 0.03, axial_stiffness: 1.0e+6}]}
+time: {duration: 2, step: 0.1}
+output: {every: 0.5, quantities: {gap: {kind: clearance, line: port, point: [0, 5, -5]}}}
+"""
+
+
+def test_several_lines(folder: Path, tmp_path: Path) -> None:
+    """Each case is the run of its scene: of one line, of another whose name is no word, of what stands beside them."""
+    (folder / "lines.yaml").write_text(LINES)
+    vary = {"m": {"keys": ["lines.port.sections[0].mass", "lines.star-board.sections[0].mass"], "values": [3, 4]},
+            "x": {"key": "points.a-1.position[0]", "values": [0.0, -1.0]}}  # fmt: skip
+    collect = {
+        "port": {"quantity": "tension", "line": "port", "take": ["max", "profile"]},
+        "other": {"quantity": "end_force_end", "line": "star-board", "take": ["mean"]},
+        "gap": {"quantity": "gap", "take": ["min"]},
+    }
+    found = hybrid.study(folder / "lines.yaml", tmp_path / "lines.zarr", vary=vary, collect=collect, workers=1)
+    assert (found.status.values == DONE).all() and found.sizes["case"] == 4
+    text = LINES.replace("mass: 3", "mass: 4").replace("position: [0, 0, 0]", "position: [-1, 0, 0]")
+    (tmp_path / "one.yaml").write_text(text)
+    result = hybrid.run(hybrid.load_system(tmp_path / "one.yaml"))
+    last = found.isel(case=int(np.flatnonzero((found.m.values == 4) & (found.x.values == -1.0))[0]))
+    port, other = result.lines["port"], result.lines["star-board"]
+    assert float(last.port_max) == np.nanmax(port["envelope/tension_max"])
+    assert np.array_equal(last.port_profile.values, port.tension.max(axis=0)) and last.port_profile.dims == ("port_s",)
+    assert float(last.other) == float(other.statistics(["end_force_end"])["end_force_end"].mean)
+    assert float(last.gap) == result.gap.min()
+    again = hybrid.studies.study.case_of(tmp_path / "lines.zarr", int(last.case))
+    assert again.gap.min() == float(last.gap)
+    usual = hybrid.study(
+        folder / "lines.yaml", tmp_path / "usual.zarr", vary={"m": [3.0]} | {"m": vary["m"]}, workers=1
+    )
+    assert {"port_tension_max", "star_board_end_force_end_mean"} <= set(usual.data_vars)
+
+
+@pytest.mark.parametrize(("collect", "text"), [
+    ({"a": {"quantity": "tension", "line": "prot"}}, "one of port, star-board"),
+    ({"a": {"quantity": "tension", "take": ["profile"]}}, "line: port"),
+])  # fmt: skip
+def test_lines_that_are_not_there_are_refused(folder: Path, tmp_path: Path, collect: dict, text: str) -> None:
+    (folder / "lines.yaml").write_text(LINES)
+    vary = {"m": {"key": "lines.port.sections[0].mass", "values": [3]}}
+    with pytest.raises(SceneError, match=text):
+        hybrid.study(folder / "lines.yaml", tmp_path / "no.zarr", vary=vary, collect=collect)
+    with pytest.raises(SceneError, match="one line"):
+        hybrid.study(folder / "scene.yaml", tmp_path / "no.zarr", vary={"n": {"key": "mesh.cells", "values": [8]}},
+                     collect={"a": {"quantity": "tension", "line": "port"}})  # fmt: skip
+
+
 # ---- kills ----------------------------------------------------------------------------------------
 
 
-def workers_of(pid: int) -> list[int]:
-    """Processes below one, its workers among them."""
-    found = []
-    for entry in Path("/proc").glob("[0-9]*"):
-        try:
-            fields = (entry / "stat").read_text().rsplit(")", 1)[1].split()
-        except OSError:
-            continue
-        if int(fields[1]) == pid:
-            found += [int(entry.name), *workers_of(int(entry.name))]
-    return found
-
-
-def killed_study(folder: Path, target: Path, what: str, seed: int) -> None:
-    """Start a study, kill it or one of its workers at a random moment after its first batch, and see it end."""
-    program = [sys.executable, "-c", "from hybrid.cli.commands import main; main()"]
-    command = [*program, "study", str(folder / "heave.yaml"), "-o", str(target), "--workers", "2", "--batch", "1", "-q"]
-    process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
-    rng = np.random.default_rng(seed)
-    begin = clock.monotonic()
-    while process.poll() is None and clock.monotonic() - begin < 200.0:
-        if target.exists() and (StudyFile(target).status != OPEN).any():
-            break
-        clock.sleep(0.02)
-    clock.sleep(float(rng.uniform(0.0, 0.5)))
-    if process.poll() is None:
-        if what == "study":
-            process.send_signal(signal.SIGKILL)
-        else:
-            below = workers_of(process.pid)
-            if below:
-                os.kill(int(rng.choice(below)), signal.SIGKILL)
-    process.communicate(timeout=300)
-
-
 @pytest.mark.slow
-@pytest.mark.parametrize(("what", "seed"), [("study", 0), ("study", 1), ("worker", 2), ("worker", 3)])
+@pytest.mark.parametrize(("what", "seed"), [("study", 0), ("study", 1), ("worker", 2), ("worker", 3), ("scheduler", 4)])
 def test_killed_and_called_again(folder: Path, found: object, tmp_path: Path, what: str, seed: int) -> None:
     """Whatever was killed, the same call completes the study: every case once, every number the same."""
     target = tmp_path / "killed.zarr"
-    killed_study(folder, target, what, seed)
+    code, text = killed_study(folder / "heave.yaml", target, what, seed)
+    assert what != "scheduler" or code == 0 or ("scheduler of the study is gone" in text and "Traceback" not in text)
     after = hybrid.study(folder / "heave.yaml", target, workers=2)
     for name in ("status", "force_max", "force_mean", "tension_history", "shape_profile", "steps"):
         assert np.array_equal(after[name].values, found[name].values, equal_nan=True), name
     assert sorted(after["case"].values.tolist()) == list(range(9))
+
+
+@pytest.mark.slow
+def test_a_case_that_kills_its_worker_is_data(
+    folder: Path, found: object, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Its batch is computed case by case: it alone has failed, with the reason, and the others are what they were."""
+
+    def deadly(job: object) -> list:  # sent by value: workers do not know this module
+        import os as system
+
+        from hybrid.studies.study import compute_batch
+
+        if any(row["A"] == 0.5 and row["T"] == 6 for row in job.rows):  # type: ignore[attr-defined]
+            system.kill(system.getpid(), 9)
+        return compute_batch(job)  # type: ignore[arg-type]
+
+    monkeypatch.setattr("hybrid.studies.study.compute_batch", deadly)
+    after = hybrid.study(folder / "heave.yaml", tmp_path / "deadly.zarr", workers=2, batch=3)
+    dead = (after.A.values == 0.5) & (after["T"].values == 6)
+    assert dead.sum() == 1 and "worker died" in str(after.reason.values[dead][0])
+    assert after.status.values[dead].tolist() == [FAILED]
+    for name in ("status", "force_max", "force_mean", "tension_history", "shape_profile", "steps"):
+        assert np.array_equal(after[name].values[~dead], found[name].values[~dead], equal_nan=True), name

@@ -13,6 +13,7 @@ other ends of rods                   fixed points          lines turn freely at 
 from __future__ import annotations
 
 import json
+import math
 import re
 from collections.abc import Sequence
 from dataclasses import replace
@@ -28,6 +29,7 @@ from hybrid.interop.moordyn.rows import Row, number, show
 from hybrid.interop.moordyn.scenes import ImportedScene
 from hybrid.interop.moordyn.tables import NEAR, Tables, flow, lines_of
 from hybrid.interop.moordyn.types import LineType
+from hybrid.scene.ends import Triple
 from hybrid.scene.read import parse_either
 
 # Two lines are one only where a rod without length joins them: points are points.
@@ -125,15 +127,19 @@ class _SystemMaker(Tables):
         if next_line(self.deck, first, 1 if back else 0, JOINTS) is not None:
             for line in lines:
                 self._refuse(line.row, "it closes a ring of free rods; a line has two ends", "make one of them Fixed")
-        start = self._point(first.ends[1 if back else 0], types[0].ei > 0.0)
-        end = self._point(last.ends[0 if last_back else 1], types[-1].ei > 0.0)
+        bends = [kind.ei > 0.0 for kind in types]
+        ends = {"start": first.ends[1 if back else 0], "end": last.ends[0 if last_back else 1]}
+        start, end = (self._point(each, all(bends)) for each in ends.values())
         lengths = [self._length(line) for line in lines]
         for line, turned in chain[:-1]:
             self._rod_joint(self.deck.rods[line.ends[0 if turned else 1][1]])
         each = zip(lines, types, lengths, strict=True)
-        parts = [f"  {name}:", f"    start: {start}", f"    end: {end}", "    sections:"]
+        parts = [f"  {name}:", f"    start: {start}", f"    end: {end}"]
+        clamps = {key: self._clamp(each, key == "start") for key, each in ends.items() if all(bends)}
+        if held := {key: {"tangent": x, "swivel": True} for key, x in clamps.items() if x is not None}:
+            parts.append(f"    connections: {flow(held)}")
+        parts.append("    sections:")
         parts += [f"      {self._section(line, kind, length)}" for line, kind, length in each]
-        bends = [kind.ei > 0.0 for kind in types]
         if any(bends) and not all(bends):
             why = f"{name}: a section without EI is part of it, so all of it is computed without bending"
             self.notes.append(Note(TAKEN, None, "", why, "give bending_stiffness to every section"))
@@ -155,10 +161,23 @@ class _SystemMaker(Tables):
         if name not in self.points:
             self.points[name] = ({}, row)  # in the order of the lines
             self.points[name] = (self._body_point(body) if body is not None else self._at(end, name, row), row)
-        if bends and kind == "rod":
-            why = "a rod holds the direction of a line that bends; at a point of several lines each turns freely"
-            self.notes.append(note(TAKEN, row, why, "with --separate the line is clamped"))
+        if bends and kind == "rod" and self._clamp(end, True) is not None:
+            why = "the rod holds the direction of a line that bends, which is clamped there and spins freely"
+            self.notes.append(note(TAKEN, row, why))
         return name
+
+    def _clamp(self, end: tuple[str, int, str], starts: bool) -> Triple | None:
+        """Direction of increasing s where a rod that does not turn by itself holds a line, in axes of its body or
+
+        inertial; None: nothing holds it.  starts: whether the line starts there.
+        """
+        kind, id, letter = end
+        rod = self.deck.rods.get(id) if kind == "rod" else None
+        if rod is None or rod.kind not in ("fixed", "coupled", "body"):
+            return None
+        out = [b - a for a, b in zip(rod.a, rod.b, strict=True)]
+        size = math.hypot(*out) * (1.0 if (letter == "A") != starts else -1.0)
+        return (out[0] / size, out[1] / size, out[2] / size) if size else None
 
     def _at(self, end: tuple[str, int, str], name: str, row: Row) -> dict[str, Any]:
         kind, id, _ = end

@@ -96,8 +96,12 @@ class Tables:
     def _section(self, line: Line, kind: LineType, length: float) -> str:
         """A section in one line of YAML."""
         section: dict[str, Any] = {
-            "length": length, "mass": kind.mass, "diameter": kind.diameter, "axial_stiffness": kind.ea,
+            "length": length, "mass": kind.mass, "diameter": kind.diameter,
         }  # fmt: skip
+        how = kind.stretch
+        section |= {"tension_strain": how.table} if how.table is not None else {"axial_stiffness": kind.ea}
+        if how.dynamic is not None:
+            section["dynamic_stiffness"] = how.dynamic
         if kind.ei:
             section["bending_stiffness"] = kind.ei
         if self.wet and any(kind.drag):
@@ -112,7 +116,7 @@ class Tables:
     def _tau(self, kind: LineType, line: Line, length: float) -> float:
         """Damping time of stretch, s: BA/EA."""
         if kind.ba >= 0.0:
-            return kind.ba / kind.ea
+            return kind.ba / (kind.ea if kind.stretch.dynamic is None else kind.stretch.dynamic["constant"])
         segment = length / line.segments
         ba = -kind.ba * segment * math.sqrt(kind.ea * kind.mass)
         why = (

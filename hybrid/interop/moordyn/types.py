@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import math
-import re
 from dataclasses import dataclass
 
 from hybrid.interop.moordyn.notes import LEFT_OUT, TAKEN, Note, note
-from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, number, simple
+from hybrid.interop.moordyn.rows import Row, Section, Source, check_names, simple
+from hybrid.interop.moordyn.stretch import Stretch, is_word, stretch_of
 from hybrid.scene.cable import SECTION_DENSITIES
 
 # Speed of waves of tension sqrt(EA/m), m/s, from rubber to aramid: 100 to 12 000.  EA in kN is out by 30.
@@ -21,6 +21,9 @@ _TYPE_V2 = (
 )  # fmt: skip
 _ADDED_FIRST = ("can", "cat", "cdn", "cdt")  # after EI, in decks between MoorDyn 1 and 2
 _TYPE_V1 = (*_TYPE_V2[:5], ("Can", "can", "ca"), ("Cat", "cat", "caax"), ("Cdn", "cdn", "cd"), ("Cdt", "cdt", "cdax"))
+
+
+PLAIN = Stretch()
 
 
 @dataclass(frozen=True)
@@ -38,6 +41,7 @@ class LineType:
     added: tuple[float, float]
     trouble: str = ""
     instead: str = ""
+    stretch: Stretch = PLAIN
 
 
 def _types_are_old(section: Section) -> bool:
@@ -66,15 +70,15 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
         source.complain("line type", name, f"a name of its own; line {twin.line} has it already", fix, row.line)
     diameter = source.number(row, row.cells[1], "diameter (m)", above=0.0)
     mass = source.number(row, row.cells[2], "mass per length (kg/m)", above=0.0)
-    ea, trouble, instead = _stiffness(source, row, row.cells[3], notes)
-    ba = _damping(source, row, row.cells[4], notes)
+    how = stretch_of(source, row, row.cells[3], row.cells[4], notes)
+    ea, ba, trouble, instead = how.ea, how.ba, how.trouble, how.instead
     if old and ba > 0.0:
         why = "BA is taken in N s, as MoorDyn 2 does, whatever the row of units"
         notes.append(note(TAKEN, row, why, "if it is in Pa s, multiply damping.stiffness by the area of the line"))
     rest = row.cells[5:]
     ei = 0.0
     if not old:
-        if _is_word(rest[0]):
+        if is_word(rest[0]):
             trouble, instead = f"EI is read from {rest[0]}", "write EI as a number, in N m^2, in a copy of the deck"
         else:
             ei = source.number(row, rest[0], "EI (N m^2)", least=0.0)
@@ -90,38 +94,7 @@ def line_type(source: Source, row: Row, notes: list[Note]) -> LineType | None:
         why = "Cl makes lines vibrate in their own eddies; hybrid has no such force"
         notes.append(note(LEFT_OUT, row, why, "raise drag.normal of the sections by what the vibration adds"))
     _units(source, row, diameter, mass, ea)
-    return LineType(name, row, diameter, mass, ea, ba, ei, drag, added, trouble, instead)
-
-
-def _is_word(cell: str) -> bool:
-    """Whether a cell that may be a number names a file, or lists several numbers."""
-    return number(cell) is None and bool(re.search(r"[A-Za-z]{2}|\|", cell)) and cell.lower() not in ("nan", "inf")
-
-
-def _stiffness(source: Source, row: Row, cell: str, notes: list[Note]) -> tuple[float, str, str]:
-    """EA; NaN with the reason and what to do, if it is no number."""
-    if not _is_word(cell):
-        return source.number(row, cell, "EA (N)", above=0.0), "", ""
-    first, *rest = cell.split("|")
-    if rest and number(first):
-        instead = "set axial_stiffness to the dynamic one, for motion about a mean tension"
-        notes.append(note(TAKEN, row, f"of {cell} the first, static EA is taken: hybrid's EA is constant", instead))
-        return source.number(row, first, "EA (N)", above=0.0), "", ""
-    instead = "write EA as a number, in N, the slope at the tension you expect, in a copy of the deck"
-    return math.nan, f"EA is not one number but {cell}, tension over strain", instead
-
-
-def _damping(source: Source, row: Row, cell: str, notes: list[Note]) -> float:
-    if not _is_word(cell):
-        return source.number(row, cell, "BA/-zeta")
-    first, *rest = cell.split("|")
-    if rest and number(first) is not None:
-        notes.append(
-            note(TAKEN, row, f"of {cell} the first, static BA is taken", "set damping.stiffness (s) otherwise")
-        )
-        return source.number(row, first, "BA/-zeta")
-    notes.append(note(LEFT_OUT, row, f"BA is read from {cell}", "set damping.stiffness, BA/EA, in s"))
-    return 0.0
+    return LineType(name, row, diameter, mass, ea, ba, ei, drag, added, trouble, instead, how)
 
 
 def _units(source: Source, row: Row, diameter: float, mass: float, ea: float) -> None:

@@ -227,7 +227,35 @@ class _Writer:
         for name, line in self.scene.lines.items():
             if line.break_at is not None:
                 self.notes.append(f"lines.{name}.break_at is left out")
-            self._line(f"lines.{name}", name, line.cable, [made[line.start], made[line.end]])
+            ends = [self._joined(name, end, made[getattr(line, end)]) for end in ("start", "end")]
+            self._line(f"lines.{name}", name, line.cable, ends)
+
+    def _joined(self, name: str, end: str, made: str) -> str:
+        """What the end of a line is attached to: its point, which is made, or a rod that holds its direction there."""
+        held, line = self.scene.clamp(name, end), self.scene.lines[name]
+        if held is None:
+            return made
+        where, point = f"lines.{name}.connections.{end}", self.scene.points[getattr(line, end)]
+        if point.kind == "free" or held.bend_stiffness is not None:
+            expected = "a clamp without a spring at a fixed point or a fairlead, because a deck has no others"
+            self._refuse(where, "clamped", expected, "leave the clamp out, for a comparison")
+            return made
+        if not held.swivel:
+            self.notes.append(f"{where} holds the twist; MoorDyn has none")
+        if point.kind == "fixed":
+            shape = self.shapes[name]
+            kind = "Coupled" if point.motion is not None else "Fixed"
+            a = self._moved(shape.at(0.0 if end == "start" else shape.s[-1]))
+        else:
+            kind, a = f"Body{1 + list(self.bodies).index(point.body)}", point.place
+        return self._rod(kind, a, held.tangent, end)
+
+    def _rod(self, kind: str, a: Triple, tangent: Triple, end: str) -> str:
+        """A rod without segments along a tangent, and its end that holds that end of a line."""
+        size = math.hypot(*tangent)
+        b = tuple(p + t / size for p, t in zip(a, tangent, strict=True))
+        self.rods.append(f"joint {kind} {' '.join(map(_number, (*a, *b)))} 0 -")
+        return f"R{len(self.rods)}{'B' if end == 'start' else 'A'}"
 
     def _line(self, where: str, name: str, cable: Any, ends: list[str]) -> None:
         """Lines of the deck between places where sections meet or something hangs; ends: where it begins and ends."""
@@ -284,6 +312,14 @@ class _Writer:
         return point, point
 
     def _type(self, where: str, section: Section) -> str:
+        if section.curve is not None:
+            key = "dynamic_stiffness" if section.dynamic_stiffness is not None else "tension_strain"
+            fix = "give axial_stiffness alone, at the tension you expect"
+            self._refuse(f"{where}.{key}", "given", "one stiffness, which this export writes", fix)
+            return "none"
+        if section.tension_torque:
+            expected = "nothing or 0, because MoorDyn has no torsion"
+            self._refuse(f"{where}.tension_torque", section.tension_torque, expected, "leave it out, for a comparison")
         if section.axial_stiffness is None:
             expected = "a number, in N, because MoorDyn's lines are springs"
             self._refuse(
@@ -400,11 +436,7 @@ class _Writer:
             return self._point(kind, place, _Lump())
         if not end.swivel:
             self.notes.append(f"ends.{name} holds the twist; MoorDyn has none")
-        size = math.hypot(*end.tangent)
-        a = self._moved(place)
-        b = tuple(p + t / size for p, t in zip(a, end.tangent, strict=True))
-        self.rods.append(f"joint {kind} {' '.join(map(_number, (*a, *b)))} 0 -")
-        return f"R{len(self.rods)}{'B' if name == 'start' else 'A'}"
+        return self._rod(kind, self._moved(place), end.tangent, name)
 
 
 def _section_at(bounds: Sequence[float], s: float) -> int:

@@ -60,6 +60,29 @@
     return Object.fromEntries(Object.entries(x).map(([key, value]) => [key, revived(value)]));
   };
 
+  // ---- light, dark and paper -------------------------------------------------------------------
+
+  const night = matchMedia("(prefers-color-scheme: dark)");
+  let paper = false;  // while it is printed: light, and as wide as a page
+  const DARK = { "#ffffff": "#15181c", "#222222": "#e6e6e6", "#000000": "#f4f4f4", "#ededed": "#2c3238", "#e4e4e4": "#2c3238",
+    "#bdbdbd": "#59616a", "#6e6e6e": "#a9adb3", "#5f5f5f": "#a9adb3", "#555555": "#c8ccd1", "#b5b5b5": "#6b727a", "#9e9e9e": "#59616a",
+    "#eee5d0": "#4a4231", "#8c6d31": "#c9a55a", "#eff6fa": "#1b3140", "#0072b2": "#56b4e9", "#d55e00": "#ff8b3d",
+    "#009e73": "#2ecf9f", "#8e63b5": "#b594d8", "#c00000": "#ff8a80", "#b84f04": "#ff9a52", "#2c72b6": "#6fb3ee" };
+  const shade = (colour) => (night.matches && !paper && DARK[String(colour).toLowerCase()]) || colour;
+  const faded = /^rgba\((\d+),(\d+),(\d+),([\d.]+)\)$/;
+  const themed = (x, key) => {  // numbers and scales of colours stay
+    if (key === "colorscale" || key === "x" || key === "y" || key === "z" || key === "text") return x;
+    if (Array.isArray(x)) return x.map((v) => themed(v));
+    if (x !== null && typeof x === "object") return ArrayBuffer.isView(x) || x.$at !== undefined ? x
+      : Object.fromEntries(Object.entries(x).map(([name, value]) => [name, themed(value, name)]));
+    if (typeof x !== "string") return x;
+    const part = faded.exec(x);
+    if (!part) return shade(x);
+    const hex = "#" + part.slice(1, 4).map((v) => Number(v).toString(16).padStart(2, "0")).join("");
+    const [r, g, b] = [1, 3, 5].map((k) => parseInt(shade(hex).slice(k, k + 2), 16));
+    return `rgba(${r},${g},${b},${part[4]})`;
+  };
+
   // plotly's own button to upload a picture to its servers is switched off: nothing leaves this page.
   const config = { displaylogo: false, showSendToCloud: false, plotlyServerURL: "", responsive: true, displayModeBar: touch ? false : "hover",
     modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"] };
@@ -81,14 +104,15 @@
 
   const line = () => {
     const colour = scene.colours[state.colour];
-    if (!colour) return { color: scene.ink, width: 7 };
+    if (!colour) return { color: shade(scene.ink), width: 7 };
     let color = row(colour.values, state.frame);
     let [low, high] = [colour.low, colour.high];
     if (colour.log) {
       color = color.map((v) => Math.log10(Math.max(v, low)));
       [low, high] = [Math.log10(low), Math.log10(high)];
     }
-    return { color, cmin: low, cmax: high, colorscale: colour.scale, width: 7, showscale: false };
+    const colorscale = colour.scale.map(([at, tint]) => [at, shade(tint)]);
+    return { color, cmin: low, cmax: high, colorscale, width: 7, showscale: false };
   };
 
   const shape = (k) => ({ x: row(scene.x, k), y: row(scene.y, k), z: row(scene.z, k) });
@@ -117,12 +141,17 @@
     const right = [-d[1] / flatLong, d[0] / flatLong, 0];
     const up = [d[1] * right[2] - d[2] * right[1], d[2] * right[0] - d[0] * right[2], d[0] * right[1] - d[1] * right[0]];
     const reach = (axis) => size.reduce((sum, v, k) => sum + Math.abs(axis[k]) * v, 0);
-    const panel = box3d.clientWidth / box3d.clientHeight;
-    const scale = Math.min((SEEN * panel * 0.84) / reach(right), (SEEN * 0.8) / reach(up));
+    // The panel is as high as what it shows asks for, so that nothing of it is empty.
+    const wanted = (box3d.clientWidth * ACROSS * reach(up)) / (reach(right) * UP);
+    const height = Math.round(Math.min(Math.max(wanted, 240), 680, 0.85 * Math.max(innerHeight, 500)));
+    box3d.style.height = height + "px";
+    const panel = box3d.clientWidth / height;
+    const scale = Math.min((SEEN * panel * ACROSS) / reach(right), (SEEN * UP) / reach(up));
     const camera = { eye: { x: 2 * d[0], y: 2 * d[1], z: 2 * d[2] }, up: { x: 0, y: 0, z: 1 },
       center: { x: 0, y: 0, z: -0.03 }, projection: { type: "orthographic" } };
     return { camera, aspectratio: { x: size[0] * scale, y: size[1] * scale, z: size[2] * scale } };
   };
+  const ACROSS = 0.9, UP = 0.84;  // parts of the panel that are filled; numbers at the axes have the rest
   const SEEN = 2.0;  // height of the panel in units of aspectratio, measured: plotly scales orthographic views by it
 
   const sceneLayout = () => {
@@ -130,9 +159,9 @@
     const axis = (k) => {
       const drawn = (scene.box[k][1] - scene.box[k][0]) * (state.stretched ? scene.factors[k] : 1);
       return { title: { text: "" }, tickprefix: "xyz"[k] + " = ", showtickprefix: "first", ticksuffix: " m",
-        showticksuffix: "last", range: scene.box[k], backgroundcolor: "#ffffff",
-        gridcolor: "#e4e4e4", linecolor: "#bdbdbd", zeroline: false, showspikes: false, showbackground: false,
-        tickfont: { size: 11, color: "#5f5f5f" }, tickangle: 0, nticks: drawn < 0.3 * largest ? 2 : touch ? 4 : 7 };
+        showticksuffix: "last", range: scene.box[k], backgroundcolor: shade("#ffffff"),
+        gridcolor: shade("#e4e4e4"), linecolor: shade("#bdbdbd"), zeroline: false, showspikes: false, showbackground: false,
+        tickfont: { size: 11, color: shade("#5f5f5f") }, tickangle: 0, nticks: drawn < 0.3 * largest ? 2 : touch ? 4 : 7 };
     };
     const { camera, aspectratio } = view();
     return { xaxis: axis(0), yaxis: axis(1), zaxis: axis(2), aspectmode: "manual", aspectratio, camera, dragmode: "turntable" };
@@ -149,16 +178,18 @@
     const legend = byId("cable-legend");
     legend.textContent = "";
     const colour = scene.colours[state.colour];
-    if (colour && colour.legend) for (const [name, shade] of colour.legend) legend.append(swatch(name, shade));
+    if (colour && colour.legend) for (const [name, tint] of colour.legend) legend.append(swatch(name, tint));
     else if (colour) legend.append(ramp(colour.label, colour.scale.map((c) => c[1]), colour.low, colour.high, "", colour.log));
-    for (const plane of scene.planes) if (plane.x) legend.append(swatch(plane.text, plane.line));
+    for (const plane of scene.planes) if (plane.x) legend.append(swatch(plane.text, plane.line, "plane", plane.fill));
     for (const mark of scene.marks.slice(0, -2))  // without the ends
-       legend.append(swatch(mark.name, mark.colour));
+       legend.append(swatch(mark.name, mark.colour, mark.symbol));
     legend.append(swatch("first shape", "#b5b5b5"));
   };
-  const swatch = (name, colour) => {
+  const swatch = (name, colour, symbol = "", fill = colour) => {  // the shape of what it stands for
     const item = document.createElement("span"), patch = document.createElement("i");
-    patch.style.background = colour;
+    patch.style.background = shade(fill);
+    if (symbol === "plane") patch.style.borderColor = shade(colour);
+    if (symbol) patch.className = symbol;
     item.append(patch, name);
     return item;
   };
@@ -174,31 +205,35 @@
     return item;
   };
 
+  let drawn = false;
   const drawCable = async () => {
     if (!hasWebGL()) {
       byId("cable-said").textContent = "This browser has no WebGL: the cable is shown still.";
       return;
     }
-    const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: "#b5b5b5", width: 2 }, hoverinfo: "skip" }];
+    const traces = [{ type: "scatter3d", mode: "lines", ...shape(0), line: { color: shade("#b5b5b5"), width: 2 }, hoverinfo: "skip" }];
     space = { cable: 1, marks: 2 };
     traces.push({ type: "scatter3d", mode: "lines", ...shape(0), line: line(), customdata: flat(scene.s),
       hovertemplate: "s = %{customdata:.4g} m<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     const each = (value) => scene.marks.flatMap((mark) => Array(mark.x.shape[1]).fill(value(mark)));
     traces.push({ type: "scatter3d", mode: "markers", ...marks(), text: [...each((m) => m.name), "chosen"],
-      marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => m.colour), "#c00000"],
-        size: [...each((m) => 2 * m.size), 28], line: { color: [...each(() => scene.ink), "#c00000"], width: 1 }, opacity: 1 },
+      marker: { symbol: [...each((m) => m.symbol), "circle-open"], color: [...each((m) => shade(m.colour)), shade("#c00000")],
+        size: [...each((m) => 2 * m.size), 28], line: { color: [...each(() => shade(scene.ink)), shade("#c00000")], width: 1 }, opacity: 1 },
       hovertemplate: "%{text}<br>x = %{x:.4g}, y = %{y:.4g}, z = %{z:.4g} m<extra></extra>" });
     for (const plane of scene.planes) if (plane.x) {
       traces.push({ type: "mesh3d", x: plane.x, y: plane.y, z: plane.z, i: plane.i ?? [0, 0],
-        j: plane.j ?? [1, 2], k: plane.k ?? [2, 3], color: plane.fill,
+        j: plane.j ?? [1, 2], k: plane.k ?? [2, 3], color: shade(plane.fill),
         opacity: plane.solid, hoverinfo: "skip", lighting: { ambient: 1, diffuse: 0, specular: 0 } });
       const rim = plane.rim ?? [0, 1, 2, 3, 0], along = (values) => rim.map((k) => values[k]);
       traces.push({ type: "scatter3d", mode: "lines", x: along(plane.x), y: along(plane.y), z: along(plane.z),
-        line: { color: plane.line, width: 2 }, hoverinfo: "skip" });
+        line: { color: shade(plane.line), width: 2 }, hoverinfo: "skip" });
     }
-    box3d.querySelector("svg")?.remove();
-    await Plotly.newPlot(box3d, traces, { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
-      font: { family: "system-ui, sans-serif", color: scene.ink }, paper_bgcolor: "#ffffff" }, config);
+    box3d.classList.add("drawn");  // its drawing for paper stays, hidden
+    const layout = { margin: { l: 0, r: 0, t: 0, b: 0 }, showlegend: false, scene: sceneLayout(),
+      font: { family: "system-ui, sans-serif", color: shade(scene.ink) }, paper_bgcolor: shade("#ffffff") };
+    if (drawn) return Plotly.react(box3d, traces, layout, config);
+    await Plotly.newPlot(box3d, traces, layout, config);
+    drawn = true;
     let width = box3d.clientWidth;
     new ResizeObserver(() => {
       if (box3d.clientWidth === width) return;  // it also calls at the start
@@ -221,20 +256,28 @@
   const graphs = new Map();  // element -> its figure, once drawn
   const seen = new Set();
   const cursor = () => ({ type: "line", xref: "x", yref: "paper", x0: state.t, x1: state.t, y0: 0, y1: 1,
-    line: { color: "#555555", width: 1, dash: "dot" } });
+    line: { color: shade("#555555"), width: 1, dash: "dot" } });
 
-  const drawGraph = async (element, figure) => {
-    if (graphs.has(element)) return;
+  const HALF = 318, FULL = 660, HIGH = 235;  // px of a graph on paper, beside another and alone
+  const drawGraph = async (element, figure, again = false) => {
+    if (graphs.has(element) && !again) return;
+    const first = !graphs.has(element);
     graphs.set(element, figure);
-    const layout = figure.layout;
+    const layout = themed(figure.layout);
     layout.dragmode = touch ? false : "zoom";  // a finger scrolls the page
-    if (element.clientWidth < 500) layout.legend.font.size = 11;
-    if (figure.cursor && times.length > 1) layout.shapes = [cursor(), ...(layout.shapes || [])];
-    const data = revived(figure.data);
+    if (paper) {
+      const beside = element.closest(".grid") && !element.closest("figure").matches(":last-child:nth-child(odd)");
+      Object.assign(layout, { autosize: false, width: beside ? HALF : FULL, height: beside ? HIGH : HIGH * 1.25 });
+      layout.font = { ...layout.font, size: 10.5 };
+    }
+    if (element.clientWidth < 500 || paper) layout.legend.font.size = 11;
+    if (figure.cursor && times.length > 1 && !paper) layout.shapes = [cursor(), ...(layout.shapes || [])];
+    const data = revived(themed(figure.data));
     for (const trace of data) if (trace.type === "heatmap") trace.zsmooth = false;
-    await Plotly.newPlot(element, data, layout, config);
-    if (figure.cursor) element.on("plotly_click", (event) => go(event.points[0].x));
-    if (figure.now) follow(element, figure);
+    if (figure.now) data[figure.now.trace].y = row(figure.now.frames, state.frame);
+    const done = Plotly.newPlot(element, data, layout, paper ? { staticPlot: true } : config);
+    if (figure.cursor && (first || again)) done.then(() => element.on("plotly_click", (event) => go(event.points[0].x)));
+    await done;
   };
   const follow = (element, figure) => {
     if (figure.now) Plotly.restyle(element, { y: [row(figure.now.frames, state.frame)] }, [figure.now.trace]);
@@ -336,7 +379,24 @@
     }
   }, { rootMargin: "300px" });
   for (const element of places2d) watcher.observe(element);
-  addEventListener("beforeprint", () => places2d.forEach((element) => drawGraph(element, figureOf(element))));
+  const redraw = (elements) => elements.forEach((element) => drawGraph(element, figureOf(element), true));
+  const folds = [...document.querySelectorAll("details")].map((fold) => [fold, fold.open]);
+  addEventListener("beforeprint", () => {  // all graphs, light, as wide as a page; what is folded opens
+    paper = true;
+    document.documentElement.classList.add("paper");
+    folds.forEach((each) => { each[1] = each[0].open; each[0].open = true; });
+    redraw(places2d);
+  });
+  addEventListener("afterprint", () => {
+    paper = false;
+    document.documentElement.classList.remove("paper");
+    folds.forEach(([fold, open]) => { fold.open = open; });
+    redraw([...graphs.keys()]);
+  });
+  night.addEventListener("change", () => {
+    redraw([...graphs.keys()]);
+    if (box3d && scene && space) { say3d(); drawCable(); }
+  });
   performance.mark("ready");
   window.report.ready = true;
 })();

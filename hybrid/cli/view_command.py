@@ -1,0 +1,49 @@
+"""hybrid view: a page on this machine that shows a scene while it is written, or plays a result."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from hybrid.cli.app import Json, app, flag, session
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+
+
+@app.command()
+def view(
+    file: Annotated[
+        Path | None,
+        typer.Argument(
+            metavar="[SCENE.yaml|RUN.h5]", help="A scene or a result; none: a new scene.", show_default=False
+        ),
+    ] = None,
+    no_browser: Annotated[bool, flag("--no-browser", help="Print the address, and open no browser.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Show a scene while it is written, or play a result, in the browser of this machine; Ctrl-C ends it."""
+    with session(as_json, False) as console:
+        missing = [name for name in NEEDED if find_spec(name) is None]
+        if missing:
+            fix = 'pip install "hybrid-cable[view]"'
+            console.error("view", f"hybrid view needs {', '.join(missing)}\n    try:      {fix}")
+            raise typer.Exit(1)
+        from hybrid.live.server import listen, make_server
+        from hybrid.live.session import session_of
+
+        console.source = str(file or "")
+        viewed = session_of(file)
+        at = listen()
+        server, address = make_server(viewed, at)
+        console.json("view", address=address, file=str(file) if file else None)
+        console.show(lambda: f"{file or 'a new scene'}: {address}\nfor browsers of this machine alone; Ctrl-C ends it")
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(address)
+        with suppress(KeyboardInterrupt):  # the way to end it
+            server.run(sockets=[at])

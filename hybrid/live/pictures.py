@@ -1,0 +1,147 @@
+"""What a text of a scene comes to: its equilibrium as numbers to draw and what it would compute, or what is wrong."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from typing import TYPE_CHECKING, Any
+
+from hybrid.errors import Complaint, ComputationError, HybridError, SceneError
+from hybrid.kernels.cache import is_warm
+from hybrid.live import drawing
+from hybrid.model.plan import Plan, SystemPlan, plan
+from hybrid.model.resolution import first_resolution, model_is_free
+from hybrid.scene.motion_checks import check_motions
+from hybrid.scene.read import located_in, parse_either, scene_text
+from hybrid.scene.schema import Scene
+from hybrid.simulation.api import static
+from hybrid.simulation.first_use import compile_beside, kernels_of
+from hybrid.simulation.static_case import StaticCase
+from hybrid.simulation.system_run import static_system
+from hybrid.store.reader import Result, open_result, written_result
+
+if TYPE_CHECKING:
+    from hybrid.scene.system import System
+
+# Points along a line in a picture: one for each cell, as far as a screen shows them apart.
+LEAST_POINTS, MOST_POINTS = 101, 401
+SYSTEM_KERNELS = ("system.solve_system", "run.in_space", "observed_outputs.observe_outputs")
+
+
+def picture_of(text: str, file: str, compiling: Callable[[], None]) -> tuple[dict[str, Any], Result | None]:
+    """What the page shows for a text, and the result of its equilibrium.
+
+    file: the name of the scene file, in whose folder motion files are looked for.  compiling: called before kernels
+    are compiled, which takes long.  A refused text, or one without an equilibrium, has `problems` and no `frame`.
+    """
+    out: dict[str, Any] = {"problems": [], "notes": []}
+    try:
+        scene, renamed = parse_either(text, file)
+        out["notes"] = [{"line": key.line, "title": "renamed", "text": str(key)} for key in renamed]
+        out["title"], out["moves"] = scene.title or "", scene.time is not None
+        made = plan(scene)
+        out["plan"] = _plan_rows(scene, made)
+        _begin_to_compile(scene, compiling)
+        result = equilibrium(scene, made)
+    except SceneError as error:
+        out["problems"] = [_refused(complaint) for complaint in located_in(error, text, file).complaints]
+        return out, None
+    except ComputationError as error:
+        out["problems"] = [_failed(error, text, file)]
+        return out, None
+    except HybridError as error:
+        out["problems"] = [{"line": None, "where": "scene", "text": str(error)}]
+        return out, None
+    points = LEAST_POINTS if len(drawing.lines_of(result)) > 10 else MOST_POINTS
+    out |= drawing.around(result)
+    out |= {"heads": drawing.heads(result), "frame": drawing.frames(result, [0], points)[0]}
+    return out | {"facts": drawing.facts(result)}, result
+
+
+def equilibrium(scene: Scene | System, made: Plan | SystemPlan) -> Result:
+    """The equilibrium with the cells of a first run: no coarser ones to estimate its error, no pre-run for its mesh.
+
+    It is looked for as `hybrid static` does, from the scene alone: from the last picture Newton's method might find
+    another one, where there are several.
+    """
+    memory = io.BytesIO()
+    if not isinstance(scene, Scene):
+        static_system(scene, memory, scene_text(scene))
+        return open_result(memory)
+    check_motions(scene)
+    if scene.solver == "shooting":
+        return static(scene)
+    assert isinstance(made, Plan)
+    if isinstance(scene.output.points, int):
+        points = min(max(sum(made.cells) + 1, LEAST_POINTS), MOST_POINTS)
+        output = scene.output.model_copy(update={"points": points, "errors": False})
+        scene = scene.model_copy(update={"output": output})
+    StaticCase(scene).record(first_resolution(scene), memory)
+    return written_result(memory)
+
+
+def _begin_to_compile(scene: Scene | System, compiling: Callable[[], None]) -> None:
+    """Begin to compile what an equilibrium calls, once on a machine; `compiling` hears of it beforehand."""
+    names = list(SYSTEM_KERNELS) if not isinstance(scene, Scene) else kernels_of(scene, static=True)
+    if not is_warm(names):
+        compiling()
+        if isinstance(scene, Scene):
+            compile_beside(scene, static=True)
+
+
+def _refused(complaint: Complaint) -> dict[str, Any]:
+    """A complaint as the page shows it."""
+    text = f"expected: {complaint.expected}" + (f"\ntry: {complaint.fix}" if complaint.fix else "")
+    return {
+        "line": complaint.line, "column": complaint.column, "where": complaint.where, "given": complaint.value,
+        "text": text,
+    }  # fmt: skip
+
+
+def _failed(error: ComputationError, text: str, file: str) -> dict[str, Any]:
+    """An equilibrium that was not found, at the line of `initial`, or of several lines at that of `lines`."""
+    for where in ("initial", "lines"):
+        place = located_in(SceneError([Complaint(where, "", "")]), text, file).complaints[0]
+        if place.line is not None and text.splitlines()[place.line - 1].lstrip().startswith(f"{where}:"):
+            break
+    s = "" if error.s is None else f" (s = {error.s:.6g} m)"
+    what = f"no equilibrium: {error.outcome.cause}{s}"
+    detail = error.detail.strip().splitlines()
+    remedy = str(error).splitlines()[-1].strip()
+    lines = [*(f"detail: {x.strip()}" for x in detail[:1]), remedy]
+    return {"line": place.line, "column": place.column, "where": "equilibrium", "given": what, "text": "\n".join(lines)}
+
+
+def _plan_rows(scene: Scene | System, made: Plan | SystemPlan) -> list[list[str]]:
+    """What a run would compute, as rows of a name and a text."""
+    if isinstance(made, SystemPlan):
+        rows = []
+        for name, line in made.lines.items():
+            kinds = ", ".join(dict.fromkeys(zone.kind for zone in line.zones))
+            rows.append([f"line {name}", f"{kinds}, {sum(line.cells)} cells"])
+        rows.append(["in all", f"{made.cells} cells, {made.unknowns} unknowns"])
+    else:
+        rows = _zone_rows(made)
+    if isinstance(scene, Scene) and isinstance(made, Plan) and model_is_free(scene):
+        rows.insert(0, ["model", "the cheapest, by a pre-run: " + ", ".join(kind for kind, _ in made.choice)])
+    if scene.time is None:
+        rows.append(["time", "no motion (no table `time`)"])
+    else:
+        rows.append(["time", f"{scene.time.duration:.6g} s, {made.steps} steps; about {made.seconds:.2g} s to compute"])
+    return rows
+
+
+def _zone_rows(made: Plan) -> list[list[str]]:
+    cells = sum(made.cells)
+    if made.base_cells is not None:
+        rows = [["zones", "adaptive: rod where a criterion asks for it, catenary elsewhere"]]
+        rows.append(["cells", f"{made.base_cells} as catenary, {cells} if all is rod ({made.unknowns} unknowns)"])
+        return rows
+    rows = [
+        [zone.kind, f"s = {zone.s_a:.6g} to {zone.s_b:.6g} m, {n} cells"]
+        for zone, n in list(zip(made.zones, made.cells, strict=True))[:6]
+    ]
+    if len(made.zones) > 6:
+        rows.append(["..", f"and {len(made.zones) - 6} more zones"])
+    rows.append(["cells", f"{cells} ({made.unknowns} unknowns)"])
+    return rows

@@ -1,0 +1,87 @@
+"""The motion of a scene in a process of its own: `hybrid run --json`, its progress, and how it is stopped."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import signal
+import subprocess
+import sys
+from collections.abc import Callable
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from hybrid.live.workers import own_process
+
+CALL = "from hybrid.cli.commands import main; main(sys.argv[1:])"
+LONGEST_LINE = 16_000_000
+
+
+class Run:
+    """One run; `state` is what the page shows of it."""
+
+    def __init__(self, scene: Path, target: Path, changed: Callable[[], None]) -> None:
+        """changed: called when `state` has changed."""
+        self.scene, self.target, self._changed = scene, target, changed
+        self.state: dict[str, Any] = {"running": True, "file": target.name, "text": "starting", "fraction": 0.0}
+        self._child: asyncio.subprocess.Process | None = None
+        self._stopped = False
+
+    async def follow(self) -> None:
+        """Start it, and follow it to its end."""
+        new_group = getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0)  # of Windows: signals are for a group there
+        self._child = child = await asyncio.create_subprocess_exec(
+            *own_process(CALL), "run", self.scene.name, "-o", self.target.name, "--json", cwd=self.scene.parent,
+            stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, limit=LONGEST_LINE,
+            start_new_session=True, creationflags=new_group,
+        )  # fmt: skip
+        assert child.stdout is not None
+        with suppress(ValueError):
+            while line := await child.stdout.readline():
+                with suppress(json.JSONDecodeError):
+                    self._hear(json.loads(line))
+        await child.wait()
+        self.state["running"] = False
+        if "ended" not in self.state:
+            self.state |= {"ended": "failed", "text": f"the run ended with exit code {child.returncode}"}
+        self._changed()
+
+    def stop(self) -> None:
+        """Ask it to stop: its file is complete until then.  A second time ends it at once."""
+        child = self._child
+        if child is None or child.returncode is not None:
+            return
+        with suppress(ProcessLookupError):
+            if self._stopped:
+                child.kill()
+            elif sys.platform == "win32":
+                child.send_signal(signal.CTRL_BREAK_EVENT)
+            else:
+                child.send_signal(signal.SIGINT)
+        self._stopped = True
+        self.state["text"] = "stopping"
+        self._changed()
+
+    def _hear(self, event: dict[str, Any]) -> None:
+        """Take a line of the run."""
+        kind = event.get("event")
+        if kind == "compiling":
+            self.state["text"] = "compiling the kernels for this machine (first use only)"
+        elif kind == "progress":
+            self.state |= {"fraction": event["fraction"], "t": event["t"], "duration": event["duration"]}
+            several = f"run {event['run']} of {event['runs']}, {event['name']}: " if event["runs"] > 1 else ""
+            left = event["seconds_left"]
+            rest = f", {left:.2g} s left" if left is not None else ""
+            self.state["text"] = f"{several}t = {event['t']:.4g} of {event['duration']:g} s{rest}"
+        elif kind == "error":
+            self.state |= {"ended": "failed", "text": event["message"]}
+        elif kind == "done":
+            t = event.get("t")
+            texts = {"complete": "complete", "interrupted": "stopped" + (f" at t = {t:.4g} s" if t is not None else "")}
+            status = str(event.get("status"))
+            self.state |= {"ended": status, "text": texts.get(status, status)}
+            self.state["fraction"] = 1.0 if status == "complete" else self.state["fraction"]
+        else:
+            return
+        self._changed()

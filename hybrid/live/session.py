@@ -1,0 +1,395 @@
+"""One scene, or one result, that is viewed: its text, its pictures, its run, and the browsers that show them."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+import time as clock
+from collections.abc import Coroutine
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+from hybrid.errors import SceneError
+from hybrid.live.document import Document, Refused
+from hybrid.live.examples import example_text, examples
+from hybrid.live.new_scenes import new_scene, questions
+from hybrid.live.playback import Playback
+from hybrid.live.runs import Run
+from hybrid.live.workers import Workers
+from hybrid.store.hdf5_file import is_result
+from hybrid.store.lock import is_held
+
+# s between two looks at the scene file, and at a result; s after which a file that is not there is gone, and not about
+# to be replaced by an editor that saves.
+WATCH, FOLLOW, GONE = 0.02, 0.2, 1.0
+# Messages that wait for a browser that does not read: it is let go, and gets everything when it comes back.
+MOST_WAITING = 500
+STOPPING = 10.0  # s for a run to complete its file when the view ends
+
+
+class Client:
+    """A browser that is connected: what waits to be sent to it."""
+
+    def __init__(self, number: int) -> None:
+        self.number = number
+        self.waiting: asyncio.Queue[str | None] = asyncio.Queue()  # None: it is let go
+
+    def send(self, message: str) -> None:
+        """Send a message when it is read."""
+        if self.waiting.qsize() >= MOST_WAITING:
+            while not self.waiting.empty():
+                self.waiting.get_nowait()
+            self.waiting.put_nowait(None)
+            return
+        self.waiting.put_nowait(message)
+
+
+class Session:
+    """What a page shows, shared by all browsers on it."""
+
+    def __init__(self, document: Document | None, playback: Playback | None = None) -> None:
+        """document: None of a result alone, which `playback` plays."""
+        self.document, self.playback = document, playback
+        self.workers = Workers()
+        self.run: Run | None = None
+        self._clients: list[Client] = []
+        self._count = 0
+        self._wanted = asyncio.Event()  # a text waits for its picture
+        self._picture: bytes | None = None  # the last one with a frame
+        self._answer: bytes | None = None  # the last one
+        self._answered = -1  # revision of the last one
+        self._computing = 0.0  # since when (s), or 0
+        self._disk, self._gone = "", 0.0
+        self._sent_state = ""
+        self._tasks: list[asyncio.Task[None]] = []
+        self._reading = asyncio.Lock()
+
+    async def start(self) -> None:
+        """Start computing, watching and following."""
+        await self.workers.start()
+        if self.document is not None and self.document.text.strip():
+            self._wanted.set()
+        self._tasks = [asyncio.create_task(x) for x in (self._compute(), self._watch(), self._follow())]
+
+    async def stop(self) -> None:
+        """End everything; a run completes its file."""
+        if self.run is not None and self.run.state["running"]:
+            self.run.stop()
+            end = clock.monotonic() + STOPPING
+            while self.run.state["running"] and clock.monotonic() < end:
+                await asyncio.sleep(0.05)
+        for task in self._tasks:
+            task.cancel()
+        await asyncio.gather(*self._tasks, return_exceptions=True)
+        await self.workers.stop()
+        if self.playback is not None:
+            self.playback.close()
+
+    # ---- browsers -----------------------------------------------------------------------------
+
+    def connect(self) -> Client:
+        """A browser comes, or comes back: it gets everything there is."""
+        self._count += 1
+        client = Client(self._count)
+        hello = {"client": client.number, "examples": examples(), "questions": questions()}
+        client.send(_message("hello", **hello))
+        self._clients.append(client)
+        if self.document is not None:
+            client.send(self._text())
+        elif self.playback is not None:
+            client.send(_message("text", revision=0, text=self.playback.text, by=0))
+        for answer in dict.fromkeys((self._picture, self._answer)):
+            if answer is not None:
+                client.send(_picture(self._answered, answer))
+        if self.playback is not None and self.playback.head:
+            client.send(self._frames(0))
+        client.send(self._state())
+        self._tell_state()
+        return client
+
+    @property
+    def browsers(self) -> int:
+        """How many are connected."""
+        return len(self._clients)
+
+    def leave(self, client: Client) -> None:
+        """A browser goes."""
+        if client in self._clients:
+            self._clients.remove(client)
+        self._tell_state()
+
+    def tell(self, message: str, but: Client | None = None) -> None:
+        """Send a message to all, but one."""
+        for client in self._clients:
+            if client is not but:
+                client.send(message)
+
+    async def hear(self, client: Client, message: str) -> None:
+        """Do what a browser asks; what is not done it is told, with the reason."""
+        try:
+            asked = json.loads(message)
+            if not isinstance(asked, dict):
+                raise Refused("a message is a JSON object")
+            await self._do(client, asked)
+        except Refused as refused:
+            client.send(_message("refused", text=str(refused)))
+        except (ValueError, TypeError, KeyError, RecursionError, UnicodeError) as error:
+            client.send(_message("refused", text=f"not understood: {type(error).__name__}: {error}"[:500]))
+        self._tell_state()
+
+    async def _do(self, client: Client, asked: dict[str, Any]) -> None:
+        what = asked.get("do")
+        if what in ("play", "stop"):
+            await (self._play() if what == "play" else self._stop_run())
+            return
+        document = self.document
+        if document is None:
+            raise Refused("a result is shown, which cannot be changed; `hybrid view SCENE.yaml` edits a scene")
+        if what == "edit":
+            self._edit(client, document, str(asked["text"]), int(asked["base"]))
+        if what == "save":
+            name = asked.get("name")
+            document.save(None if name is None else str(name), asked.get("force") is True)
+            self._disk = ""
+            client.send(_message("saved", file=str(document.path and document.path.name)))
+        elif what == "reload":
+            document.reload()
+            self._disk = ""
+            self._changed(0)
+        elif what == "new":
+            self._replace(document, new_scene(str(asked["kind"]), dict(asked["answers"])))
+        elif what == "example":
+            self._replace(document, example_text(str(asked["name"])))
+        elif what == "run":
+            self._start_run(client, document, asked.get("replace") is True)
+        elif what != "edit":
+            raise Refused(f"unknown: {str(what)[:100]!r}")
+
+    # ---- the text -----------------------------------------------------------------------------
+
+    def _edit(self, client: Client, document: Document, text: str, base: int) -> None:
+        before = document.revision
+        taken = document.edit(text, base)
+        if document.revision != before:
+            self._wanted.set()
+            self.tell(self._text(client.number), but=client)
+        client.send(_message("taken", revision=document.revision, text=None if taken == text else taken))
+
+    def _replace(self, document: Document, text: str) -> None:
+        """Another scene in place of this one, which must not be lost."""
+        if document.path is not None:
+            raise Refused("a new scene takes the place of none: start `hybrid view` without a file")
+        document.edit(text, document.revision)
+        self._changed(0)
+
+    def _changed(self, by: int) -> None:
+        self._wanted.set()
+        self.tell(self._text(by))
+
+    def _text(self, by: int = 0) -> str:
+        assert self.document is not None
+        return _message("text", revision=self.document.revision, text=self.document.text, by=by)
+
+    async def _watch(self) -> None:
+        """Look at the file again and again."""
+        while self.document is not None:
+            await asyncio.sleep(WATCH)
+            try:
+                found = self.document.look()
+            except SceneError as error:
+                self.tell(_message("refused", text=f"the file on disk is not read: {error}"))
+                continue
+            if found == "gone":
+                self._gone = clock.monotonic()
+            elif self._gone and (found or (self.document.path and self.document.path.exists())):
+                self._gone, self._disk = 0.0, ""
+            if self._gone and clock.monotonic() - self._gone > GONE:
+                self._gone, self._disk = 0.0, "gone"
+            if found == "taken":
+                self._disk = ""
+                self._changed(0)
+            elif found == "differs":
+                self._disk = "differs"
+            if found or self._disk == "gone":
+                self._tell_state()
+
+    # ---- pictures -----------------------------------------------------------------------------
+
+    async def _compute(self) -> None:
+        """The picture of the text, whenever there is a newer one."""
+        while self.document is not None:
+            await self._wanted.wait()
+            self._wanted.clear()
+            revision, text = self.document.revision, self.document.text
+            if not text.strip():
+                continue
+            self._computing = clock.monotonic()
+            late = asyncio.get_running_loop().call_later(0.3, self._tell_state)
+            asked = {"do": "picture", "text": text, "file": self.document.name}
+            answer = await self.workers.ask(asked, self._wanted)
+            late.cancel()
+            self._computing = 0.0
+            if answer is None and self._wanted.is_set():
+                continue
+            answer = answer or _ENDED
+            self._answer, self._answered = answer, revision
+            if _has_frame(answer):
+                self._picture = answer
+            self.tell(_picture(revision, answer))
+            self._tell_state()
+
+    async def report(self, of_motion: bool) -> dict[str, Any]:
+        """The report of the equilibrium, or of the result that is played: `html`, or `refused`."""
+        if of_motion and self.playback is not None:
+            answer = await self.workers.ask_spare({"do": "report", "file": str(self.playback.path.resolve())})
+        else:
+            answer = await self.workers.ask({"do": "report", "file": None})
+        made = json.loads(answer) if answer is not None else {}
+        if "problems" in made:
+            return {"refused": made["problems"][0]["text"]}
+        return dict(made) or {"refused": "the process that makes reports has ended: try again"}
+
+    # ---- the motion ---------------------------------------------------------------------------
+
+    def _start_run(self, client: Client, document: Document, replace: bool) -> None:
+        if document.path is None or document.changed:
+            raise Refused("save the scene first: a run reads its file")
+        if self.run is not None and self.run.state["running"]:
+            raise Refused("a run is under way: stop it first")
+        target = document.path.with_suffix(".h5")
+        if is_held(target):
+            raise Refused(f"{target.name} is being written by another process")
+        if target.exists() and not replace:
+            client.send(_message("ask", what="replace", file=target.name))
+            return
+        if self.playback is not None:
+            self.playback.close()
+        self.playback = None
+        self.run = Run(document.path, target, self._tell_state)
+        self._spawn(self._run_to_end(self.run))
+
+    async def _run_to_end(self, run: Run) -> None:
+        before = run.target.stat().st_mtime_ns if run.target.exists() else 0
+        following = asyncio.ensure_future(run.follow())
+        while not following.done():
+            await asyncio.wait([following], timeout=0.1)
+            begun = run.target.exists() and run.target.stat().st_mtime_ns != before and is_held(run.target)
+            if begun and self.playback is None:
+                self.playback = Playback(run.target)
+        await following
+        if self.playback is None and run.target.exists() and run.target.stat().st_mtime_ns != before:
+            self.playback = Playback(run.target)
+        await self._read(again=True)
+
+    async def _stop_run(self) -> None:
+        if self.run is None or not self.run.state["running"]:
+            raise Refused("no run is under way")
+        self.run.stop()
+
+    async def _play(self) -> None:
+        """Play the result that lies beside the scene."""
+        document = self.document
+        if self.playback is None and document is not None and document.path is not None:
+            target = document.path.with_suffix(".h5")
+            if not await asyncio.to_thread(is_result, target):
+                raise Refused(f"there is no result {target.name}: run the scene first")
+            self.playback = Playback(target)
+        await self._read(again=True)
+
+    async def _follow(self) -> None:
+        """Read what is new in the result that is played."""
+        while True:
+            if self.playback is not None and (self._clients or not self.playback.head) and self.playback.due:
+                await self._read()
+            await asyncio.sleep(FOLLOW)
+
+    async def _read(self, again: bool = False) -> None:
+        """Read it once; again: send all frames, also those that the page has."""
+        playback = self.playback
+        if playback is None:
+            return
+        async with self._reading:
+            was = playback.running, playback.problem
+            before, new = await asyncio.to_thread(playback.read)
+            if new and playback.problem:
+                self.tell(_message("refused", text=playback.problem))
+            elif (new or again) and playback.head:
+                self.tell(self._frames(0 if again else before))
+            if was != (playback.running, playback.problem):
+                self._tell_state()
+
+    def _frames(self, begin: int) -> str:
+        """Frames from that number on; those before it the page has."""
+        assert self.playback is not None
+        return _message(
+            "frames", begin=begin, frames=self.playback.frames[begin:], head=self.playback.head,
+            running=self.playback.running, status=self.playback.status,
+        )  # fmt: skip
+
+    # ---- what stands above the pictures -------------------------------------------------------
+
+    def _state(self) -> str:
+        document, playback = self.document, self.playback
+        path = document.path if document is not None else playback.path if playback is not None else None
+        result = path.with_suffix(".h5") if path is not None else None
+        state = {
+            "file": path.name if path else None,
+            "folder": str(document.folder if document is not None else path.parent if path else ""),
+            "editable": document is not None, "changed": document is not None and document.changed,
+            "disk": self._disk, "run": self.run.state if self.run is not None else None,
+            "result": result.name if result is not None and result.exists() else None,
+            "playing": playback.path.name if playback is not None else None,
+            "computing": self._computing > 0.0 and clock.monotonic() - self._computing > 0.25,
+            "compiling": self.workers.compiling, "browsers": len(self._clients),
+        }  # fmt: skip
+        return _message("state", **state)
+
+    def _tell_state(self) -> None:
+        state = self._state()
+        if state != self._sent_state:
+            self._sent_state = state
+            self.tell(state)
+
+    def _spawn(self, work: Coroutine[Any, Any, None]) -> None:
+        self._tasks = [task for task in self._tasks if not task.done()] + [asyncio.create_task(work)]
+
+
+_ENDED = json.dumps(
+    {
+        "problems": [{"line": None, "where": "process", "given": "", "text": "the process that computes was ended"}],
+        "notes": [],
+    }
+).encode()
+
+
+def _message(kind: str, /, **content: Any) -> str:
+    return json.dumps({"is": kind} | content)
+
+
+def _picture(revision: int, answer: bytes) -> str:
+    return f'{{"is": "picture", "revision": {revision}, "picture": {answer.decode()}}}'
+
+
+def _has_frame(answer: bytes) -> bool:
+    """Whether an answer has a frame: within a text the quotes of a key would be escaped."""
+    return b'"frame": {' in answer
+
+
+def session_of(path: Path | None) -> Session:
+    """The session of a scene file, of a result file, or, without a file, of a scene that is still to be written.
+
+    SceneError or ResultError where the file cannot be read.
+    """
+    from hybrid.scene.read import text_of
+    from hybrid.store.reader import open_result
+
+    if path is None:
+        return Session(Document(""))
+    path = path.expanduser().absolute()
+    if path.suffix.lower() in (".h5", ".hdf5") or is_result(path):
+        if not is_held(path):
+            with suppress(KeyError):
+                open_result(path).close()
+        return Session(None, Playback(path))
+    return Session(Document(text_of(path), path))

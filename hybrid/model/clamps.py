@@ -1,0 +1,124 @@
+"""Ends of lines that are clamped to points and bodies: frames in axes of these, springs, axes of free points."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from hybrid.kernels.carried_frames import SEAT, TURNS, WITH_BODY
+from hybrid.kernels.state import Floats, Line
+from hybrid.model.build import Model
+from hybrid.model.ends import first_director, transported
+from hybrid.scene.ends import Triple
+from hybrid.scene.system import System
+
+# Stiffness of an angular spring of bend_stiffness 0, as a part of that of a cell: nothing, but a number.
+NO_SPRING = 1e-12
+STRAIGHT = (1.0, 0.0, 0.0)  # direction of a line through a free point in axes of that, where none is given
+SECOND = 1e-3  # weight of the material axis of the first line at a free point against directions of lines
+
+OPPOSITE = -0.9  # cosine of the angle of tangents that count as opposite
+
+Ends = tuple[str, str]  # name of a line, and `start` or `end`
+Held = tuple[Triple, Triple | None]  # inertial tangent and material axis a1 of an end
+
+
+def directions_at_rigid(system: System, point: str) -> dict[Ends, tuple[Floats, Floats]]:
+    """Tangent and material axis a1 (3,) of each line that is clamped to a free point, in axes of the point."""
+    found: dict[Ends, tuple[Floats, Floats]] = {}
+    here = system.clamped_at(point)
+    for name, end in here:
+        held = system.clamp(name, end)
+        assert held is not None
+        tangent = np.array(held.tangent or STRAIGHT)
+        if held.tangent is None and (name, end) != here[0] and end == here[0][1]:
+            tangent = -tangent  # both lines run to the point, or from it
+        tangent = tangent / np.linalg.norm(tangent)
+        found[name, end] = tangent, first_director(tangent, held.normal)
+    return found
+
+
+def axes_of_point(
+    directions: Mapping[Ends, tuple[Floats, Floats]], models: Mapping[str, Model], far: Held | None
+) -> Floats:
+    """Axes (3, 3) of a free point that fit best to how the lines that are clamped to it lie.
+
+    far: tangent and material axis at the other end of the first line, so that this is not twisted; None: it may be.
+    """
+    H = np.zeros((3, 3))
+    for k, ((name, end), (tangent, director)) in enumerate(directions.items()):
+        cell = 0 if end == "start" else -1
+        d = models[name].start.e[cell] / np.linalg.norm(models[name].start.e[cell])
+        H += np.outer(d, tangent)
+        if k == 0:
+            a1 = models[name].start.a1[cell] if far is None else brought(far, tuple(d.tolist()))
+            H += SECOND * np.outer(a1, director)
+    U, _, V = np.linalg.svd(H)
+    return np.asarray(U @ np.diag([1.0, 1.0, np.linalg.det(U @ V)]) @ V)
+
+
+def brought(held: Held, tangent: Triple) -> Floats:
+    """The material axis (3,) of one end at the other, whose tangent is given, of a line bent the short way between."""
+    first = first_director(held[0], held[1])
+    return np.asarray(transported(first, np.array([held[0], tangent], float))[-1])
+
+
+def untwisted(start: Held, end: Held) -> tuple[Held, Held]:
+    """Both ends with material axes: what is not given is that of a line without twist, bent the short way from tangent
+
+    to tangent.  (First shapes of lines are far from where they come to rest, and may be folded.)  Tangents that are
+    nearly opposite know no such way: they stay as they are.
+    """
+    a, b = (np.array(x[0], float) / np.linalg.norm(x[0]) for x in (start, end))
+    if a @ b < OPPOSITE or (start[1] is not None and end[1] is not None):
+        return start, end
+    if start[1] is None and end[1] is not None:
+        return (start[0], _triple(brought(end, start[0]))), end
+    first = start[0], _triple(first_director(start[0], start[1]))
+    return first, (end[0], _triple(brought(first, end[0])))
+
+
+def _triple(x: Floats) -> Triple:
+    return float(x[0]), float(x[1]), float(x[2])
+
+
+def seat_of(frame: Floats, axes: Floats, kind: float = WITH_BODY) -> Floats:
+    """(SEAT,) of an end whose frame (9,) turns with axes (3, 3); kind: of a body or of a point."""
+    seat = np.zeros(SEAT)
+    seat[:TURNS] = (axes.T @ frame.reshape(3, 3)).ravel()
+    seat[TURNS] = kind
+    return seat
+
+
+def seated(seat: Floats, axes: Floats) -> tuple[Triple, Triple]:
+    """Inertial tangent and material axis a1 of an end with a seat, in axes (3, 3)."""
+    frame = (axes @ seat[:TURNS].reshape(3, 3)).tolist()
+    tangent, director = ((frame[0][i], frame[1][i], frame[2][i]) for i in (2, 0))
+    return tangent, director
+
+
+def with_springs(model: Model, springs: Sequence[float | None]) -> Model:
+    """The model with angular springs (N m/rad; None: rigid) between its clamps and the cells there, in series with half
+    a cell: `hn` is the length of line that would bend as much, so that kb hn stays the bending stiffness."""
+    if all(x is None for x in springs):
+        return model
+    kb, hn = model.line.kb.copy(), model.line.hn.copy()
+    for k, spring in enumerate(springs):
+        if spring is not None:
+            half, node = hn[-k], -k
+            own = kb[node, :2].copy()
+            kb[node, :2] = 1.0 / (1.0 / own + 1.0 / max(spring, NO_SPRING * own.max()))
+            hn[node] = half * own.mean() / kb[node, :2].mean()
+    return replace(model, line=model.line._replace(kb=kb, hn=hn))
+
+
+def with_clamps(model: Model, clamped: Line, ends: Sequence[int]) -> Model:
+    """The model with the elements that another line has at these ends."""
+    line = model.line
+    new = {name: getattr(line, name).copy() for name in ("element", "kb", "k0", "hn")}
+    for k in ends:
+        for name, values in new.items():
+            values[-k] = getattr(clamped, name)[-k]
+    return replace(model, line=line._replace(**new))

@@ -1,0 +1,111 @@
+"""Wall tension and von Mises stress of pipes, of a batch of states: docs/theory.md, section on pipes."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from hybrid.kernels.state import Floats
+from hybrid.model.payout import whole_scene
+from hybrid.outputs.probes import Probe
+
+if TYPE_CHECKING:
+    from hybrid.outputs.observation import Observation
+    from hybrid.scene.schema import Scene
+
+
+class Walls(NamedTuple):
+    """Of sections: arrays (sections,); of those without a pipe `inner` is 0 and `modulus` NaN."""
+
+    outer: Floats  # m
+    inner: Floats  # m
+    modulus: Floats  # Pa
+    pressure: Floats  # Pa, inside, at pressure_z
+    pressure_z: Floats  # m
+    content: Floats  # kg/m3
+
+
+class Pipes:
+    """The pipes of one line.  Only for a scene that has some."""
+
+    def __init__(self, scene: Scene) -> None:
+        fluid = scene.environment.fluid
+        self._gravity = scene.environment.gravity
+        self._density = fluid.density if fluid is not None else 0.0
+        self._surface = 0.0 if fluid is None or fluid.surface is None else fluid.surface
+        whole, begin = whole_scene(scene)
+        sections = whole.cable.sections
+        self._bounds = begin + np.cumsum([x.length for x in sections])[:-1]
+        self._near = 1e-9 * sum(x.length for x in sections)
+        rows = []
+        for x in sections:
+            p = x.pipe
+            if p is None:
+                rows.append((x.diameter or 0.0, 0.0, np.nan, 0.0, 0.0, 0.0))
+                continue
+            outer = p.outer_diameter or x.diameter or np.nan
+            z = self._surface if p.pressure_z is None else p.pressure_z
+            rows.append((outer, outer - 2.0 * p.wall, p.modulus, p.pressure, z, p.content_density))
+        self._walls = Walls(*np.array(rows, float).T)
+        limits = [x.pipe.max_stress if x.pipe is not None else None for x in sections]
+        self.limits = np.array([np.nan if x is None else x for x in limits], float)
+
+    def probes(self) -> dict[str, Probe]:
+        """Probes by name."""
+        text = "tension in the wall: tension, plus pressure inside on the bore, less pressure outside on the pipe"
+        stress = "largest von Mises stress in the wall of a pipe; NaN: no pipe"
+        return {
+            "wall_tension": Probe("N", text, ("s",), self.wall_tension),
+            "von_mises": Probe("Pa", stress, ("s",), self.von_mises),
+        }
+
+    def largest_allowed(self, s: Floats, after: bool) -> Floats:
+        """Largest stress (ns,) Pa allowed at arc lengths s (m), after or before where sections meet; NaN: any."""
+        return self.limits[self._sections(s, after)]
+
+    def _sections(self, s: Floats, after: bool) -> np.ndarray:
+        return np.searchsorted(self._bounds, s + (self._near if after else -self._near))
+
+    def _pressures(self, v: Observation) -> tuple[Walls, Floats, Floats]:
+        """Walls at the output points, and the pressures (ns, nb) Pa over that of the air outside and inside."""
+        walls = Walls(*(x[self._sections(v.grid.points, v.grid.after)] for x in self._walls))
+        z = (v.grid.nodes @ v.r)[:, 2]
+        outside = self._density * self._gravity * np.maximum(self._surface - z, 0.0)
+        inside = np.maximum(walls.pressure + walls.content * self._gravity * (walls.pressure_z - z), 0.0)
+        return walls, outside, np.where(walls.inner > 0.0, inside, 0.0)
+
+    def wall_tension(self, v: Observation) -> Floats:
+        """(ns, nb) N."""
+        walls, outside, inside = self._pressures(v)
+        return np.asarray(v.tension + 0.25 * np.pi * (inside * walls.inner**2 - outside * walls.outer**2))
+
+    def von_mises(self, v: Observation) -> Floats:
+        """(ns, nb) Pa: the largest of the four points where stress is largest, by Lame, bending and torsion."""
+        walls, outside, inside = self._pressures(v)
+        force = self.wall_tension(v)
+        curvature, torque = v.curvature_twist[:, 0], v.torque
+        return largest_stress(walls, outside, inside, force, curvature, torque)
+
+
+def largest_stress(
+    walls: Walls, outside: Floats, inside: Floats, force: Floats, curvature: Floats, torque: Floats
+) -> Floats:
+    """Largest von Mises stress (Pa) of pipes under pressures (Pa), wall tension (N), curvature (1/m), torque (N m).
+
+    Taken at both surfaces of the wall, on both sides of the bend: what lies between is less.  Shear across is left out.
+    """
+    o2, i2 = walls.outer**2, walls.inner**2
+    area, polar = 0.25 * np.pi * (o2 - i2), np.pi / 32.0 * (walls.outer**4 - walls.inner**4)
+    mean = (inside * i2 - outside * o2) / (o2 - i2)
+    swing = (inside - outside) * o2 * i2 / (o2 - i2)
+    most = np.zeros(np.broadcast_shapes(force.shape, curvature.shape, walls.outer.shape))
+    for d in (walls.inner, walls.outer):
+        d2 = np.where(d > 0.0, d * d, np.nan)
+        radial, hoop = mean - swing / d2, mean + swing / d2
+        shear = 0.5 * torque * d / polar
+        for side in (-0.5, 0.5):
+            axial = force / area + side * walls.modulus * curvature * d
+            square = 0.5 * ((axial - hoop) ** 2 + (hoop - radial) ** 2 + (radial - axial) ** 2) + 3.0 * shear**2
+            most = np.maximum(most, np.sqrt(square))
+    return np.where(np.isnan(walls.modulus), np.nan, most)

@@ -1,0 +1,175 @@
+"""Quantities that a scene asks for by name, of a batch of states: angles and forces at ends, layback, clearance."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import partial
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from hybrid.kernels.bed import planes_under
+from hybrid.kernels.state import Floats
+from hybrid.model.payout import whole_scene
+from hybrid.model.sections import outer_diameter
+from hybrid.outputs.distance import nearest
+from hybrid.outputs.observation import Observation
+from hybrid.outputs.pipe import Pipes
+from hybrid.outputs.probes import Probe
+
+if TYPE_CHECKING:
+    from hybrid.scene.quantities import Quantity
+    from hybrid.scene.schema import Scene
+
+END = {"start": 0, "end": 1}
+# Where a clearance is least: name of that field, after the name of the clearance.
+WHERE = "_at"
+
+
+def quantities_of(scene: Scene) -> Quantities | None:
+    """What a scene asks for beside the usual outputs; None: nothing."""
+    pipes = any(x.pipe is not None for x in scene.cable.sections)
+    return Quantities(scene, scene.output.quantities) if pipes or scene.output.quantities else None
+
+
+class Quantities:
+    """The quantities of one line as probes, and the places from which excursions count."""
+
+    def __init__(self, scene: Scene, wanted: Mapping[str, Quantity]) -> None:
+        self.wanted = dict(wanted)
+        self.pipes = Pipes(scene) if any(x.pipe is not None for x in scene.cable.sections) else None
+        self._scene, self._begin = whole_scene(scene)
+        self._seabed = scene.environment.seabed is not None
+        # nodes (m+1, 3) m and radii of cells (m,) m of other lines at this moment, by name
+        self.others: dict[str, tuple[Floats, Floats]] = {}
+        # (n, 2) m, of the excursions in their order; NaN until there is a touchdown
+        self.first = np.array([
+            q.reference or (np.nan, np.nan) for q in self.wanted.values() if q.kind == "touchdown_excursion"
+        ]).reshape(-1, 2)  # fmt: skip
+
+    def probes(self) -> dict[str, Probe]:
+        """Probes by name."""
+        found, excursions = self.pipes.probes() if self.pipes is not None else {}, 0
+        for name, q in self.wanted.items():
+            if q.kind == "touchdown_excursion":
+                value = partial(self._excursion, q, excursions)
+                excursions += 1
+            elif q.kind == "clearance":
+                value = partial(self._clearance, q, 0)
+                text = f"arc length at which {name} is least"
+                found[name + WHERE] = Probe("m", text, (), partial(self._clearance, q, 1))
+            else:
+                value = partial(getattr(self, f"_{q.kind}"), q)
+            found[name] = Probe(q.unit, q.description(self._seabed), (), value)
+        return found
+
+    # --- at the ends ---------------------------------------------------------------------------------
+
+    def _horizontal_force(self, q: Quantity, v: Observation) -> Floats:
+        x, y, _ = pull(v, q)
+        return np.asarray(np.hypot(x, y))
+
+    def _vertical_force(self, q: Quantity, v: Observation) -> Floats:
+        return pull(v, q)[2]
+
+    def _force_along(self, q: Quantity, v: Observation) -> Floats:
+        return np.asarray(unit(q) @ pull(v, q))
+
+    def _declination(self, q: Quantity, v: Observation) -> Floats:
+        x, y, z = pull(v, q)
+        return known(np.degrees(np.arctan2(np.hypot(x, y), z)), v, q)
+
+    def _azimuth(self, q: Quantity, v: Observation) -> Floats:
+        x, y, _ = pull(v, q)
+        return known(np.degrees(np.arctan2(y + 0.0, x)), v, q)  # no -0, which is half a turn away
+
+    def _end_angle(self, q: Quantity, v: Observation) -> Floats:
+        along, force = unit(q), pull(v, q)
+        aside = np.linalg.norm(np.cross(force, along, axis=0), axis=0)
+        return known(np.degrees(np.arctan2(aside, along @ force)), v, q)
+
+    def _uplift(self, q: Quantity, v: Observation) -> Floats:
+        return np.maximum(_normal(v, q)[0], 0.0)
+
+    def _uplift_angle(self, q: Quantity, v: Observation) -> Floats:
+        up, along = _normal(v, q)
+        return np.degrees(np.arctan2(np.maximum(up, 0.0), along))
+
+    # --- on the seabed -------------------------------------------------------------------------------
+
+    def _touchdown(self, q: Quantity, v: Observation) -> Floats:
+        return v.touchdown.edges[END[str(q.end)]]
+
+    def _excursion(self, q: Quantity, k: int, v: Observation) -> Floats:
+        x, y, _ = v.touchdown.places[END[str(q.end)]]
+        if np.isnan(self.first[k, 0]) and np.isfinite(x).any():
+            first = int(np.isfinite(x).argmax())
+            self.first[k] = x[first], y[first]
+        return np.asarray(np.hypot(x - self.first[k, 0], y - self.first[k, 1]))
+
+    def _layback(self, q: Quantity, v: Observation) -> Floats:
+        k = END[str(q.end)]
+        here = v.r[-k]
+        there = v.touchdown.places[k] if q.ends_at(self._seabed) == "touchdown" else v.r[k - 1]
+        return np.asarray(np.hypot(there[0] - here[0], there[1] - here[1]))
+
+    # --- clearance -----------------------------------------------------------------------------------
+
+    def _clearance(self, q: Quantity, what: int, v: Observation) -> Floats:
+        if q.other is not None:
+            b, rb = self.others[q.other]
+        else:
+            other = q.path if q.path is not None else (q.point,)
+            b, rb = np.array(other, float), np.full(max(len(other) - 1, 1), 0.5 * q.diameter)
+        first, last, radius = self.cells(q, v)
+        nodes, found = v.of_line("s", slice(None)), []
+        for output, r in enumerate(v.r[first : last + 1].transpose(2, 0, 1)):
+            s = nodes[:, min(output, nodes.shape[1] - 1)]
+            if q.normal is not None:
+                n = np.array(q.normal) / np.linalg.norm(q.normal)
+                height = (r - b[0]) @ n
+                height = np.minimum(height[:-1], height[1:]) - radius
+                k = int(height.argmin())
+                least, part = float(height[k]), float((r[k + 1] - r[k]) @ n < 0.0)
+            else:
+                least, k, part = nearest(r, b, radius, rb)
+            found.append((least, s[first + k] + part * (s[first + k + 1] - s[first + k]))[what])
+        return np.array(found)
+
+    def cells(self, q: Quantity, v: Observation) -> tuple[int, int, Floats]:
+        """First and last node, and radii (m) of the cells between, of the part of a line that counts."""
+        s = v.line.s
+        first, last = 0, s.size - 1
+        if q.range is not None:
+            first, last = (int(np.abs(s - x).argmin()) for x in q.range)
+            first, last = min(first, s.size - 2), max(last, first + 1)
+        return first, last, self.radii(s[first : last + 1])
+
+    def radii(self, nodes: Floats) -> Floats:
+        """Radii (n,) m of the cells between nodes (n+1,), m; 0 where no diameter is given."""
+        return 0.5 * np.nan_to_num(outer_diameter(self._scene, 0.5 * (nodes[1:] + nodes[:-1]) - self._begin))
+
+
+def pull(v: Observation, q: Quantity) -> Floats:
+    """Force (3, nb) N with which the line pulls at what holds an end; none where nothing holds it."""
+    k = END[str(q.end)]
+    force = v.reaction(k)
+    return np.asarray(np.where((v.batch.held[:, k] != 0) | v.loaded(k), -force, 0.0))
+
+
+def known(angle: Floats, v: Observation, q: Quantity) -> Floats:
+    """An angle (nb,) of the pull; NaN where there is none."""
+    return np.where((pull(v, q) ** 2).sum(axis=0) > 0.0, angle, np.nan)
+
+
+def unit(q: Quantity) -> Floats:
+    """The direction of a quantity as a unit vector."""
+    return np.array(q.direction, float) / np.linalg.norm(np.array(q.direction, float))
+
+
+def _normal(v: Observation, q: Quantity) -> tuple[Floats, Floats]:
+    """Parts (nb,) N of the pull along the normal of the seabed under the end, and along the seabed."""
+    force = pull(v, q)
+    n = planes_under(v.sea, np.ascontiguousarray(v.r[-END[str(q.end)]].T))[0]
+    up = np.einsum("bi,ib->b", n, force)
+    return up, np.linalg.norm(force - up * n.T, axis=0)

@@ -1,0 +1,128 @@
+"""How a section stretches where tension is no multiple of strain: a table, and the dynamic stiffness of fibre ropes."""
+
+from __future__ import annotations
+
+import os
+from bisect import bisect_right
+from functools import lru_cache
+from itertools import pairwise
+from typing import Annotated
+
+from pydantic import Discriminator, Field, Tag, model_validator
+
+from hybrid.scene.base import Finding, NonNegative, Pair, Positive, Table, Text, refuse, value_or_table
+
+Curve = tuple[tuple[float, float], ...]  # rows of strain and tension, N
+COLUMNS = ["strain", "tension"]
+
+
+def _findings(rows: Curve) -> list[Finding]:
+    """What is wrong with a table of strain and tension."""
+    if len(rows) < 2:
+        return [
+            Finding((), "at least two rows [strain, tension]", "one number is axial_stiffness", f"{len(rows)} rows")
+        ]
+    if tuple(rows[0]) != (0.0, 0.0):
+        fix = "begin with [0, 0]: lengths are those without tension"
+        return [Finding((0,), "no strain without tension, [0, 0]", fix)]
+    for k, ((x, T), (y, U)) in enumerate(pairwise(rows), start=1):
+        if not y > x:
+            return [
+                Finding((k, 0), f"a strain above that of the row before, {x:g}", "sort the rows; strain comes first")
+            ]
+        if not U > T:
+            fix = "sort the rows, and smooth what was measured: a rope that slackens as it stretches has no answer"
+            return [Finding((k, 1), f"a tension above that of the row before, {T:g} N", fix)]
+    return []
+
+
+class CurveFile(Table):
+    """A table of tension over strain in a file."""
+
+    file: Text = Field(
+        min_length=1,
+        description="CSV file with columns strain,tension (-, N), rising, from 0,0 on; relative to the scene file",
+    )
+
+    @property
+    def rows(self) -> Curve:
+        """Strain and tension (N).  Only after validation: the file is readable then."""
+        status = os.stat(self.file)
+        return _from_file(self.file, status.st_mtime_ns, status.st_size)
+
+    @model_validator(mode="after")
+    def _readable(self) -> CurveFile:
+        from hybrid.scene.motion_file import RecordRefused, check_file
+
+        try:
+            check_file(self.file)
+            assert self.rows
+        except RecordRefused as refused:
+            refuse([refused.finding])
+        return self
+
+
+@lru_cache(maxsize=16)
+def _from_file(path: str, _changed: int, _size: int) -> Curve:
+    """Rows of a file, read once for as long as that does not change; RecordRefused."""
+    from hybrid.scene.motion_file import RecordRefused, read_table
+
+    name = os.path.basename(path)
+    header, table, lines = read_table(path, _header)
+    at = [header.index(x) for x in COLUMNS]
+    rows = tuple((float(x), float(y)) for x, y in table[:, at])
+    for found in _findings(rows):
+        where = f"{name}, line {lines[int(found.at[0])]}" if found.at else name
+        given = found.given or ", ".join(f"{x:g}" for x in rows[int(found.at[0])])
+        raise RecordRefused(found.expected, found.fix, f"{where}: {given}")
+    return rows
+
+
+def _header(name: str, header: list[str]) -> list[str]:
+    from hybrid.scene.motion_file import RecordRefused
+
+    if sorted(header) == COLUMNS:
+        return header
+    given = f"{name} with columns {', '.join(header)[:60]}"
+    raise RecordRefused("columns strain,tension", "name the columns in the first line of the file", given)
+
+
+TensionStrain = Annotated[
+    Annotated[tuple[Pair, ...], Tag("<value>")] | Annotated[CurveFile, Tag("<table>")], Discriminator(value_or_table)
+]
+
+
+class DynamicStiffness(Table):
+    """Stiffness of a fibre rope against changes of tension faster than its relaxation: constant + per_tension x mean
+    tension. What is slower follows axial_stiffness, or tension_strain."""
+
+    constant: Positive = Field(description="dynamic stiffness without mean tension, above the static one [N]")
+    per_tension: NonNegative = Field(default=0.0, description="by how much it grows with the mean tension: N per N [-]")
+    relaxation_time: Positive = Field(
+        description="time over which tension is averaged, and the rope creeps to its static strain: long beside waves, "
+        "short beside a storm [s]"
+    )
+
+
+def rows_of(given: tuple[tuple[float, float], ...] | CurveFile) -> Curve:
+    """The rows of a table, given or in a file."""
+    return given.rows if isinstance(given, CurveFile) else given
+
+
+def refuse_rows(given: tuple[tuple[float, float], ...] | CurveFile, key: str) -> None:
+    """Refuse a table, given under a key, that is no rising curve from [0, 0] on."""
+    if not isinstance(given, CurveFile):
+        refuse(Finding((key, *x.at), x.expected, x.fix, x.given) for x in _findings(given))
+
+
+def slopes(rows: Curve) -> list[float]:
+    """Stiffness (N) of each piece of a table."""
+    return [(U - T) / (y - x) for (x, T), (y, U) in pairwise(rows)]
+
+
+def interpolated(rows: Curve, x: float, over_tension: bool = False) -> float:
+    """Tension (N) at a strain; or the strain at a tension.  Beyond the table its last piece goes on."""
+    a, b = (1, 0) if over_tension else (0, 1)
+    k = min(max(bisect_right([row[a] for row in rows], x) - 1, 0), len(rows) - 2)
+    low, high = rows[k], rows[k + 1]
+    return low[b] + (x - low[a]) * (high[b] - low[b]) / (high[a] - low[a])

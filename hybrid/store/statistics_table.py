@@ -1,0 +1,57 @@
+"""Statistics of a result as rows: what `hybrid stats` prints and a report shows."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.statistics.extremes import THREE_HOURS, of_record
+from hybrid.statistics.moments import summary
+from hybrid.store.histories import Window, history_of, lies_along, usual_names
+
+if TYPE_CHECKING:
+    from hybrid.store.reader import Result
+
+
+def rows_of(
+    result: Result, names: Sequence[str] | None = None, at: Sequence[float] | None = None, times: Window | None = None,
+    duration: float = THREE_HOURS,
+) -> list[dict[str, Any]]:  # fmt: skip
+    """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
+
+    names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
+    where the quantity is largest; times: from and to, s.
+    """
+    rows = []
+    for name in usual_names(result) if names is None else names:
+        history = history_of(result, name, times, at if lies_along(result, name) else None)
+        values = history.values.reshape(history.t.size, -1)
+        known = np.isfinite(values).all(axis=0)
+        if names is None and not (known.any() and values[:, known].any()):
+            continue
+        if history.s is None:
+            picked: list[tuple[float | None, int]] = [(None, k) for k in range(values.shape[1])]
+        elif at is None:
+            k = int(np.where(known, values.max(axis=0), -np.inf).argmax())
+            picked = [(float(history.s[k]), k)]
+        else:
+            picked = [(float(s), k) for k, s in enumerate(history.s)]
+        for s, k in picked:
+            found = summary(history.t, values[:, k])
+            row: dict[str, Any] = {"quantity": name, "unit": history.unit, "s": s, "of": history.basis}
+            row |= {key: _number(value) for key, value in found._asdict().items()}
+            row["extreme"] = None
+            try:
+                row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
+            except ResultError as error:
+                row["no_extreme"] = str(error).splitlines()[0]
+            rows.append(row)
+    return rows
+
+
+def _number(value: Any) -> float | None:
+    x = float(value)
+    return x if np.isfinite(x) else None

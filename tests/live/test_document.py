@@ -1,0 +1,131 @@
+"""The text of a scene with its revisions, its file, and two people who change it."""
+
+from __future__ import annotations
+
+import random
+from pathlib import Path
+
+import pytest
+
+from hybrid.live.document import Document, Refused, merged
+
+BASE = "a\nb\nc\nd\ne\n"
+
+
+@pytest.mark.parametrize(
+    ("mine", "theirs", "both"),
+    [
+        ("A\nb\nc\nd\ne\n", "a\nb\nc\nd\nE\n", "A\nb\nc\nd\nE\n"),
+        ("a\nb\nc\nd\ne\n", "x\n", "x\n"),
+        ("new\na\nb\nc\nd\ne\n", "a\nb\nd\ne\n", "new\na\nb\nd\ne\n"),
+        ("a\nB\nc\nd\ne\n", "a\nother\nc\nd\nE\n", "a\nB\nc\nd\nE\n"),
+        ("a\nb\nc\nd\ne\nf\n", "0\na\nb\nc\nd\ne\n", "0\na\nb\nc\nd\ne\nf\n"),
+        ("a\nb\nc\n", "a\nb\nc\nd\ne\n", "a\nb\nc\n"),
+        ("a\nb\nx\nc\nd\ne\n", "a\nb\nc\ny\nd\ne\n", "a\nb\nx\nc\ny\nd\ne\n"),
+        ("", "a\nb\nc\nd\ne\n", ""),
+    ],
+)
+def test_changes_of_both_are_kept(mine: str, theirs: str, both: str) -> None:
+    assert merged(BASE, mine, theirs) == both
+
+
+def test_changes_of_different_lines_are_always_kept() -> None:
+    """Random texts: every line that one of two changed, in places that do not touch, is in what comes out."""
+    rng = random.Random(1)
+    for _ in range(300):
+        base = [f"line {k}\n" for k in range(30)]
+        mine, theirs, expected = base.copy(), base.copy(), base.copy()
+        for k in rng.sample(range(0, 30, 2), 8):
+            who = rng.choice((mine, theirs))
+            text = rng.choice(("", f"new {k}\n", f"two {k}\nlines {k}\n"))
+            who[k] = expected[k] = text
+        assert merged("".join(base), "".join(mine), "".join(theirs)) == "".join(expected)
+
+
+def test_an_edit_of_an_older_revision_keeps_what_others_did() -> None:
+    document = Document(BASE)
+    document.edit("A\nb\nc\nd\ne\n", 0)
+    assert document.edit("a\nb\nc\nd\nE\n", 0) == "A\nb\nc\nd\nE\n"
+    assert document.revision == 2
+
+
+def test_saving_writes_the_file_and_keeps_its_permissions(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text(BASE)
+    file.chmod(0o640)
+    document = Document(BASE, file)
+    document.edit("x\nµ\n", 0)
+    assert document.changed
+    document.save()
+    assert file.read_bytes() == "x\nµ\n".encode()
+    assert file.stat().st_mode & 0o777 == 0o640
+    assert not document.changed
+    assert list(tmp_path.iterdir()) == [file]
+    assert document.look() == ""
+
+
+def test_ends_of_lines_stay_those_of_the_file(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_bytes(b"a\r\nb\r\n")
+    document = Document(file.read_bytes().decode(), file)
+    assert document.text == "a\nb\n"
+    document.edit("a\nc\n", 0)
+    document.save()
+    assert file.read_bytes() == b"a\r\nc\r\n"
+    file.write_bytes(b"a\r\nd\r\n")
+    assert (document.look(), document.text) == ("taken", "a\nd\n")
+
+
+def test_a_file_changed_by_another_program_is_not_replaced_unasked(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text(BASE)
+    document = Document(BASE, file)
+    document.edit("mine\n", 0)
+    file.write_text("theirs\n")
+    with pytest.raises(Refused, match="changed on disk"):
+        document.save()
+    assert file.read_text() == "theirs\n"
+    assert document.look() == "differs"
+    assert document.text == "mine\n"
+    document.save(force=True)
+    assert file.read_text() == "mine\n"
+
+
+def test_a_change_on_disk_is_taken_where_nothing_is_unsaved(tmp_path: Path) -> None:
+    file = tmp_path / "scene.yaml"
+    file.write_text(BASE)
+    document = Document(BASE, file)
+    file.write_text("other text\n")
+    assert document.look() == "taken"
+    assert document.text == "other text\n"
+    assert not document.changed
+    file.unlink()
+    assert document.look() == "gone"
+    assert document.text == "other text\n"
+
+
+@pytest.mark.parametrize(
+    "name", ["../a.yaml", "a/b.yaml", "/etc/a.yaml", "..", ".hidden.yaml", "", "a\0.yaml", "C:a.yaml", "a\\b"]
+)
+def test_new_files_have_plain_names_in_the_folder(tmp_path: Path, name: str) -> None:
+    document = Document(BASE, folder=tmp_path)
+    with pytest.raises(Refused):
+        document.save(name)
+    assert not list(tmp_path.iterdir())
+
+
+def test_a_new_file_replaces_no_other(tmp_path: Path) -> None:
+    (tmp_path / "a.yaml").write_text("there")
+    document = Document(BASE, folder=tmp_path)
+    with pytest.raises(Refused, match="exists"):
+        document.save("a")
+    assert (tmp_path / "a.yaml").read_text() == "there"
+    document.save("b")
+    assert (tmp_path / "b.yaml").read_text() == BASE
+
+
+def test_a_text_too_large_is_refused() -> None:
+    document = Document(BASE)
+    with pytest.raises(Refused, match="4 MB"):
+        document.edit("x" * 4_000_001, 0)
+    assert document.text == BASE

@@ -1,0 +1,81 @@
+"""Runs from the live view: progress, frames as they come, stop, an older result that is not replaced unasked; results."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
+from viewed import SCENE, Page, served
+
+import hybrid
+from hybrid.live import playback as playing
+from hybrid.live.playback import Playback
+
+
+def test_a_run_is_followed_stopped_and_played(tmp_path: Path) -> None:
+    scene, result = tmp_path / "scene.yaml", tmp_path / "scene.h5"
+    scene.write_text(
+        SCENE.replace("duration: 4.0, step: 0.05", "duration: 4000.0, step: 0.01") + "output: {every: 1}\n"
+    )
+    with served(scene) as (address, _):
+        page = Page(address)
+        page.hear("picture")
+        page.ask(do="stop")
+        assert "no run" in page.hear("refused")["text"]
+        page.ask(do="run")
+        first = page.hear("frames")
+        assert first["begin"] == 0 and first["running"] and len(first["head"]["heads"]) == 1
+        page.ask(do="run", replace=True)
+        assert "under way" in page.hear("refused")["text"]
+        more = page.hear(lambda m: m["is"] == "frames" and m["begin"] + len(m["frames"]) > 5)
+        times = [frame["t"] for frame in more["frames"]]
+        assert times == sorted(times) and times[-1] >= 5.0
+        page.ask(do="stop")
+        ended = page.hear(lambda m: m["is"] == "state" and m["run"] is not None and not m["run"]["running"])
+        assert ended["run"]["ended"] == "interrupted"
+        last = page.hear(lambda m: m["is"] == "frames" and not m["running"])
+        with hybrid.open(result) as stored:
+            assert stored.status == "interrupted" and len(stored.times) > 5
+            assert last["frames"][-1]["t"] == pytest.approx(stored.times[-1])
+        before = result.stat().st_mtime_ns
+        page.ask(do="run")
+        assert page.hear("ask")["file"] == "scene.h5"
+        assert result.stat().st_mtime_ns == before
+        page.edit(SCENE + "# changed\n")
+        page.ask(do="run", replace=True)
+        assert "save" in page.hear("refused")["text"], "a run reads the file"
+        page.close()
+    with served(result) as (address, _):
+        page = Page(address)
+        found = page.hear("frames")
+        assert not found["running"] and found["head"]["title"] == "A line"
+        page.ask(do="edit", text="x", base=0)
+        assert "cannot be changed" in page.hear("refused")["text"]
+        page.close()
+    assert sorted(x.name for x in tmp_path.iterdir()) == ["scene.h5", "scene.yaml"]
+
+
+def test_frames_of_a_long_run_are_every_second_or_fourth(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    file = tmp_path / "run.h5"
+    hybrid.run(hybrid.parse_scene(SCENE + "output: {every: 0.1}\n"), file)
+    with hybrid.open(file) as result:
+        times = result.times
+    assert len(times) == 41
+    every = Playback(file)
+    assert every.read() == (0, True)
+    assert [frame["t"] for frame in every.frames] == pytest.approx(times)
+    assert every.read() == (41, False), "nothing is new"
+    monkeypatch.setattr(playing, "MOST_FRAMES", 12)
+    few = Playback(file)
+    few.read()
+    assert [frame["t"] for frame in few.frames] == pytest.approx(times[::4])
+    assert few.head["facts"] and few.status.startswith("complete")
+
+
+def test_what_is_no_result_is_said(tmp_path: Path) -> None:
+    file = tmp_path / "run.h5"
+    file.write_bytes(b"\x89HDF\r\n\x1a\n nothing")
+    broken = Playback(file)
+    assert broken.read()[1] and "run.h5" in broken.problem and not broken.frames

@@ -1,0 +1,313 @@
+"""The server of `hybrid view`: for its own page alone, two pages on one scene, and what it survives."""
+
+from __future__ import annotations
+
+import json
+import random
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
+from viewed import LINES, SCENE, Page, exchange, random_edit, served
+from websockets.exceptions import ConnectionClosed, InvalidHandshake
+
+from hybrid.live.pictures import picture_of
+from hybrid.live.server import LARGEST_MESSAGE
+from hybrid.live.session import Session
+
+
+@pytest.fixture(scope="module")
+def viewed(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[str, Session, Path]]:
+    file = tmp_path_factory.mktemp("view") / "scene.yaml"
+    file.write_text(SCENE)
+    with served(file) as (address, session):
+        yield address, session, file
+
+
+@pytest.fixture
+def page(viewed: tuple[str, Session, Path]) -> Iterator[Page]:
+    opened = Page(viewed[0])
+    opened.hear("state")
+    opened.edit(SCENE)
+    yield opened
+    opened.close()
+
+
+def request(
+    address: str, path: str | None = None, method: str = "GET", host: str | None = None, more: str = ""
+) -> bytes:
+    """The status line and head of an answer."""
+    _, _, at, token, _ = address.split("/")
+    path = f"/{token}/" if path is None else path.replace("TOKEN", token)
+    head = f"{method} {path} HTTP/1.1\r\nHost: {at if host is None else host}\r\nConnection: close\r\n{more}\r\n"
+    return exchange(address, head.encode())
+
+
+# ---- who is served ----------------------------------------------------------------------------------
+
+
+def test_the_page_is_served_and_keeps_to_itself(viewed: tuple[str, Session, Path]) -> None:
+    answer = request(viewed[0])
+    assert answer.startswith(b"HTTP/1.1 200")
+    head = answer.split(b"\r\n\r\n")[0].lower()
+    assert b"default-src 'none'" in head and b"frame-ancestors 'none'" in head and b"no-referrer" in head
+    for name in (
+        "page.js",
+        "space.js",
+        "codemirror/codemirror.js",
+        "live.css",
+        "schema.json",
+        "codemirror/LICENSE.txt",
+    ):
+        assert request(viewed[0], f"/TOKEN/{name}").startswith(b"HTTP/1.1 200"), name
+    assert b"http://" not in answer and b"https://" not in answer  # nothing of other hosts
+
+
+@pytest.mark.parametrize(
+    "host",
+    [
+        "evil.example",
+        "evil.example:PORT",
+        "127.0.0.1.evil.example:PORT",
+        "127.0.0.1:1",
+        "",
+        "0.0.0.0:PORT",
+        "[::1]:PORT",
+    ],
+)
+def test_other_hosts_are_refused(viewed: tuple[str, Session, Path], host: str) -> None:
+    port = viewed[0].split("/")[2].split(":")[1]
+    answer = request(viewed[0], host=host.replace("PORT", port))
+    assert answer.split()[1] in (b"403", b"400")
+    assert b"<html" not in answer
+
+
+@pytest.mark.parametrize(
+    "origin",
+    [
+        "http://evil.example",
+        "https://127.0.0.1:PORT",
+        "http://127.0.0.1:1",
+        "null",
+        "http://127.0.0.1:PORT.evil.example",
+    ],
+)
+def test_other_origins_are_refused(viewed: tuple[str, Session, Path], origin: str) -> None:
+    origin = origin.replace("PORT", viewed[0].split("/")[2].split(":")[1])
+    assert request(viewed[0], more=f"Origin: {origin}\r\n").startswith(b"HTTP/1.1 403")
+    assert request(viewed[0], more="Sec-Fetch-Site: cross-site\r\n").startswith(b"HTTP/1.1 403")
+    with pytest.raises((InvalidHandshake, ConnectionClosed)):
+        Page(viewed[0], origin=origin).hear("hello", 5.0)
+
+
+def test_a_websocket_without_an_origin_is_refused(viewed: tuple[str, Session, Path]) -> None:
+    with pytest.raises((InvalidHandshake, ConnectionClosed)):
+        Page(viewed[0], origin=None).hear("hello", 5.0)
+
+
+@pytest.mark.parametrize("token", ["", "wrong", "TOKENx", "TOKE"])
+def test_nobody_is_served_without_the_token(viewed: tuple[str, Session, Path], token: str) -> None:
+    real = viewed[0].split("/")[3]
+    wrong = token.replace("TOKENx", real + "x").replace("TOKE", real[:-1])
+    for path in (f"/{wrong}/", f"/{wrong}", f"/{wrong}/page.js", f"/{wrong}/report"):
+        answer = request(viewed[0], path)
+        assert answer.startswith(b"HTTP/1.1 403"), path
+        assert real.encode() not in answer
+    with pytest.raises((InvalidHandshake, ConnectionClosed)):
+        Page(viewed[0].replace(real, wrong)).hear("hello", 5.0)
+
+
+PATHS = [
+    "/TOKEN/../../../../etc/passwd", "/TOKEN/%2e%2e/%2e%2e/etc/passwd", "/TOKEN/codemirror/../../session.py", "/TOKEN//etc/passwd",
+    "/TOKEN/..%2f..%2fsession.py", "/TOKEN/..\\..\\session.py", "/TOKEN/scene.yaml", "/TOKEN/page.js%00.css", "/TOKEN/codemirror",
+    "/TOKEN/file:///etc/passwd", "/TOKEN/./session.py", "/../TOKEN/../etc/passwd", "/TOKEN/page.js/../../server.py",
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("path", PATHS)
+def test_no_path_leads_to_other_files(viewed: tuple[str, Session, Path], path: str) -> None:
+    answer = request(viewed[0], path)
+    assert answer.split()[1] in (b"404", b"403", b"400", b"307")
+    assert b"root:" not in answer and b"import" not in answer and b"sections" not in answer
+
+
+def test_it_listens_at_this_machine_alone(viewed: tuple[str, Session, Path]) -> None:
+    assert viewed[0].startswith("http://127.0.0.1:")
+    assert len(viewed[0].split("/")[3]) >= 30
+
+
+def test_messages_that_are_too_large_end_the_connection_and_nothing_else(
+    viewed: tuple[str, Session, Path], page: Page
+) -> None:
+    other = Page(viewed[0])
+    with pytest.raises(ConnectionClosed):
+        other.ask(do="edit", text="x" * (LARGEST_MESSAGE + 1), base=0)
+        while True:
+            other.hear("taken")
+    page.ask(do="edit", text="x" * 4_000_001, base=page.revision)
+    assert "4 MB" in page.hear("refused")["text"]
+    assert page.picture(page.edit(SCENE + "# on\n"))["problems"] == []
+
+
+@pytest.mark.parametrize(
+    "message",
+    ["", "no json", "[]", "7", "null", '{"do": "shutdown"}', '{"do": "edit"}', '{"do": "edit", "text": 3, "base": "x"}', "[" * 5000, '{"do": "new", "kind": "mooring", "answers": 3}', '{"do": "example", "name": "../../pyproject"}', '{"do": "stop"}', '{"do": "edit", "text": "\\ud800", "base": 0}'],
+)  # fmt: skip
+def test_messages_that_are_no_sense_are_refused_in_words(page: Page, message: str) -> None:
+    page.socket.send(message)
+    assert len(page.hear("refused", 10.0)["text"]) < 600
+    assert page.edit(SCENE) >= 0
+
+
+def test_bytes_that_are_no_http_do_no_harm(viewed: tuple[str, Session, Path], page: Page) -> None:
+    rng = random.Random(2)
+    for size in (1, 100, 10_000):
+        exchange(viewed[0], rng.randbytes(size) + b"\r\n\r\n")
+    exchange(viewed[0], b"GET /" + b"a" * 200_000 + b" HTTP/1.1\r\n\r\n")
+    assert page.edit(SCENE + "# still there\n") >= 0
+
+
+@pytest.mark.parametrize("name", ["../outside.yaml", "/tmp/outside.yaml", "a/b.yaml", "..", "x\0.yaml"])
+def test_nothing_is_written_outside_the_folder(viewed: tuple[str, Session, Path], page: Page, name: str) -> None:
+    before = sorted(viewed[2].parent.parent.rglob("*.yaml"))
+    page.ask(do="save", name=name)
+    assert "no name of a file" in page.hear("refused")["text"]
+    assert sorted(viewed[2].parent.parent.rglob("*.yaml")) == before
+
+
+# ---- the scene ----------------------------------------------------------------------------------------
+
+
+def test_a_picture_has_everything_and_an_error_keeps_the_last_one(
+    viewed: tuple[str, Session, Path], page: Page
+) -> None:
+    picture = page.picture(page.edit(SCENE.replace("title: A line", "title: Another")))
+    assert picture["title"] == "Another" and picture["problems"] == []
+    line = picture["frame"]["lines"][0]
+    assert {"tension", "bending_moment", "curvature", "clearance"} <= set(line["along"])
+    assert len(line["nodes"]) == line["cells"] + 1 == 41
+    assert line["zones"][0][:3] == ["rod", 0.0, 30.0]
+    assert min(line["along"]["clearance"][1]) == pytest.approx(0.0, abs=0.05)
+    assert ["cells", "40 (202 unknowns)"] in picture["plan"] or any("40" in row[1] for row in picture["plan"])
+    broken = page.picture(page.edit(SCENE.replace("mass: 2.0", "mass: -2.0")))
+    assert broken["problems"][0]["line"] == 6 and "frame" not in broken
+    late = Page(viewed[0])  # one that comes now gets the last good picture, and what is wrong
+    late.hear("state")
+    pictures = [m["picture"] for m in late.got if m["is"] == "picture"]
+    assert pictures[0]["title"] == "Another" and "frame" in pictures[0]
+    assert pictures[1]["problems"] == broken["problems"]
+    late.close()
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "line", "words"),
+    [
+        ("mass: 2.0", "mass: two", 6, "number"),
+        ("initial: equilibrium", "initial: [", 12, ""),
+        ("kind: pinned, position: [14, 0, 0]", "kind: pined, position: [14, 0, 0]", 9, "pinned"),
+        ("time: {duration: 4.0, step: 0.05}", "time: {duration: 4.0, steps: 0.05}", 13, "step"),
+        ("length: 30", "length: 20", None, ""),
+    ],
+)
+def test_problems_stand_at_their_line(page: Page, old: str, new: str, line: int | None, words: str) -> None:
+    found = page.picture(page.edit(SCENE.replace(old, new)))["problems"]
+    assert line in [x["line"] for x in found] or line is None
+    assert found and any(words in x["text"] + x["given"] for x in found)
+
+
+def test_an_equilibrium_that_is_not_found_stands_at_initial() -> None:
+    scene = SCENE.replace("end: {kind: pinned, position: [14, 0, 0]", "end: {kind: free").replace(
+        ", motion: {heave: {amplitude: 0.5, period: 4}, ramp: 4}", ""
+    )
+    text = scene.replace("environment:\n  seabed: {z: -20, stiffness: 2.0e+3}", "environment: {gravity: 0}").replace(
+        "start: {kind: pinned, position: [0, 0, -20]}", "start: free"
+    )
+    picture, _ = picture_of(text, "", lambda: None)
+    assert len(picture["problems"]) == 1
+    assert picture["problems"][0]["line"] in (8, 9, None)
+
+
+def test_several_lines_are_drawn(page: Page) -> None:
+    picture = page.picture(page.edit(LINES))
+    assert picture["problems"] == []
+    assert [head["name"] for head in picture["heads"]] == ["a", "b"]
+    assert len(picture["frame"]["lines"]) == 2
+    assert "point buoy" in [mark["name"] for mark in picture["frame"]["marks"]]
+
+
+def test_the_file_is_watched_and_saving_asks_where_it_was_changed(
+    viewed: tuple[str, Session, Path], page: Page
+) -> None:
+    file = viewed[2]
+    page.ask(do="save", force=True)
+    page.hear("saved")
+    file.write_text(SCENE.replace("A line", "From outside"))
+    assert "From outside" in page.hear(lambda m: m["is"] == "text" and "From outside" in m["text"])["text"]
+    assert page.picture(page.revision)["title"] == "From outside"
+    page.edit(SCENE.replace("A line", "Mine"))
+    file.write_text(SCENE.replace("A line", "Theirs"))
+    page.hear(lambda m: m["is"] == "state" and m["disk"] == "differs")
+    page.ask(do="reload")
+    assert "Theirs" in page.hear(lambda m: m["is"] == "text" and "Theirs" in m["text"])["text"]
+    assert "Theirs" in file.read_text()
+
+
+def test_two_pages_see_each_other_and_lose_nothing(viewed: tuple[str, Session, Path], page: Page) -> None:
+    other = Page(viewed[0])
+    other.hear("text")
+    base = page.revision
+    page.edit(SCENE.replace("title: A line", "title: One"), base)
+    other.edit(SCENE.replace("duration: 4.0", "duration: 5.0"), base)  # it had not seen the other's
+    assert "title: One" in other.text and "duration: 5.0" in other.text
+    page.hear(lambda m: m["is"] == "text" and m["revision"] >= other.revision)
+    assert page.text == other.text
+    other.close()
+
+
+def test_who_comes_back_loses_nothing(viewed: tuple[str, Session, Path], page: Page) -> None:
+    base, mine = page.revision, SCENE.replace("mass: 2.0", "mass: 2.5")
+    away = Page(viewed[0])
+    away.hear("state")
+    away.close()  # a closed lid
+    page.edit(SCENE.replace("title: A line", "title: Meanwhile"))
+    back = Page(viewed[0])
+    back.hear("state")
+    back.edit(mine, base)
+    assert "mass: 2.5" in back.text and "title: Meanwhile" in back.text
+    back.edit(mine, base)  # sent again, as it was not known whether it had arrived
+    assert "mass: 2.5" in back.text and "title: Meanwhile" in back.text
+    back.close()
+
+
+def test_random_edits_are_answered(viewed: tuple[str, Session, Path], page: Page) -> None:
+    """The page may send whatever a hand types: every text gets a picture or words, and none a traceback."""
+    rng = random.Random(5)
+    text, last = SCENE, 0
+    for _ in range(100):
+        text = random_edit(rng, text if rng.random() < 0.6 and text else SCENE)
+        if text.strip():
+            last = page.edit(text)
+    last = page.edit(SCENE + "# the end\n")
+    picture = page.picture(last)
+    assert picture["problems"] == [] and "frame" in picture
+    answers = [m["picture"] for m in page.got if m["is"] == "picture"]
+    assert not [x for x in answers if x.get("bug") or "Traceback" in json.dumps(x["problems"])]
+
+
+def test_a_newer_text_does_not_wait_for_an_older_one(viewed: tuple[str, Session, Path], page: Page) -> None:
+    """A text that takes seconds (a mesh of 400 000 cells in space) is given up when another one comes."""
+    session = viewed[1]
+    page.picture(page.edit(SCENE + "# ready\n"))
+    killed = session.workers.killed
+    page.edit(SCENE.replace("cells: 40", "cells: 400000").replace("[14, 0, 0]", "[14, 3, 0]"))
+    time.sleep(0.1)
+    begin = time.monotonic()
+    picture = page.picture(page.edit(SCENE.replace("A line", "The newer")))
+    assert picture["title"] == "The newer" or time.monotonic() - begin < 10.0
+    if picture["title"] != "The newer":
+        picture = page.picture(page.revision)
+    assert picture["title"] == "The newer"
+    assert session.workers.killed >= killed

@@ -1,0 +1,341 @@
+"""Quantities that a scene asks for by name: against closed forms, geometry and balances of their own."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import hybrid
+from hybrid.outputs.distance import FEW, between, nearest
+from hybrid.outputs.pipe import Walls, largest_stress
+from hybrid.outputs.probes import PROBES
+from hybrid.scene.quantities import TAKEN
+from hybrid.scene.read import parse_either
+from hybrid.store.limits import held_of
+
+MASS, DIAMETER, DEPTH, LENGTH, SPAN = 141.0, 0.151, 88.0, 700.0, 655.0
+W = (MASS - 1025.0 * math.pi / 4 * DIAMETER**2) * 9.81  # N/m
+
+
+def chain(quantities: dict[str, Any], **changes: Any) -> hybrid.Result:
+    """A chain from an anchor to a fairlead that lies 40 degrees off the x axis, at rest on a hard bed."""
+    x, y = SPAN * math.cos(math.radians(40.0)), SPAN * math.sin(math.radians(40.0))
+    data: dict[str, Any] = {
+        "environment": {"fluid": {"density": 1025, "surface": 0}, "seabed": {"z": -100, "stiffness": 1e6}},
+        "cable": {"sections": [{"length": LENGTH, "mass": MASS, "diameter": DIAMETER, "axial_stiffness": 1e12}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, -100]}, "end": {"kind": "pinned", "position": [x, y, -12]},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 700},
+        "output": {"points": 11, "quantities": quantities},
+    }  # fmt: skip
+    return hybrid.static(data | changes)
+
+
+def closed_form() -> tuple[float, float, float]:
+    """Horizontal force N, suspended length m and its horizontal reach m, of an inextensible chain on a rigid bed."""
+
+    def over(h: float) -> float:
+        a = h / W
+        suspended = math.sqrt(DEPTH * (DEPTH + 2.0 * a))
+        return a * math.asinh(suspended / a) + LENGTH - suspended - SPAN
+
+    h = brentq(over, 1e3, 1e6)
+    suspended = math.sqrt(DEPTH * (DEPTH + 2.0 * h / W))
+    return h, suspended, h / W * math.asinh(suspended / (h / W))
+
+
+def test_forces_angles_touchdown_and_layback_of_a_catenary() -> None:
+    ends = {"end": "end"}
+    result = chain({
+        "horizontal": {"kind": "horizontal_force", **ends}, "vertical": {"kind": "vertical_force", **ends},
+        "along": {"kind": "force_along", "direction": [2, 0, 0], **ends}, "declination": {"kind": "declination", **ends},
+        "azimuth": {"kind": "azimuth", **ends}, "anchor_azimuth": {"kind": "azimuth", "end": "start"},
+        "hang_off": {"kind": "end_angle", "direction": [0, 0, -3], **ends}, "lift": {"kind": "uplift", "end": "start"},
+        "lift_angle": {"kind": "uplift_angle", "end": "start"}, "tdp": {"kind": "touchdown", **ends},
+        "layback": {"kind": "layback", **ends}, "reach": {"kind": "layback", "to": "end", **ends},
+        "moved": {"kind": "touchdown_excursion", "reference": [0, 0], **ends},
+    })  # fmt: skip
+    h, suspended, reach = closed_form()
+    angle = math.degrees(math.atan2(h, W * suspended))
+    assert result.horizontal[0] == pytest.approx(h, rel=2e-3)
+    assert result.vertical[0] == pytest.approx(-W * suspended, rel=1e-3)
+    assert result.along[0] == pytest.approx(-h * math.cos(math.radians(40.0)), rel=2e-3)
+    assert result.hang_off[0] == pytest.approx(angle, abs=0.05)
+    assert result.declination[0] == pytest.approx(180.0 - angle, abs=0.05)
+    assert result.azimuth[0] == pytest.approx(-140.0, abs=1e-6)
+    assert result.anchor_azimuth[0] == pytest.approx(40.0, abs=1e-6)
+    assert result.tdp[0] == pytest.approx(LENGTH - suspended, abs=1.5)  # a bed of 1 MN/m per m takes it up over 0.4 m
+    assert result.layback[0] == pytest.approx(reach, abs=1.5)
+    assert result.reach[0] == pytest.approx(SPAN, abs=1e-9)
+    assert result.moved[0] == pytest.approx(result.tdp[0], abs=0.05)
+    assert result.lift[0] == 0.0 and result.lift_angle[0] == 0.0
+    assert [result.units[x] for x in ("horizontal", "hang_off", "tdp", "layback")] == ["N", "deg", "m", "m"]
+
+
+def test_uplift_is_that_of_the_method_of_results() -> None:
+    x = 658.5
+    taut = chain(
+        {"lift": {"kind": "uplift", "end": "start"}, "angle": {"kind": "uplift_angle", "end": "start"}},
+        cable={"sections": [{"length": 655.0, "mass": MASS, "diameter": DIAMETER, "axial_stiffness": 6e8}]},
+        ends={
+            "start": {"kind": "pinned", "position": [0, 0, -100]},
+            "end": {"kind": "pinned", "position": [x, 0, -12]},
+        },
+    )
+    force, angle = taut.uplift("start")
+    assert force[0] > 1e4
+    assert taut.lift[0] == pytest.approx(force[0], rel=1e-12) and taut["angle"][0] == pytest.approx(angle[0], rel=1e-12)
+
+
+def test_clearances_of_a_straight_line() -> None:
+    """A taut line along x without weight: distances are those of the axis less both radii."""
+    scene = {
+        "environment": {"gravity": 0.0},
+        "cable": {"sections": [{"length": 10, "mass": 1, "diameter": 0.02, "axial_stiffness": 1e5}]},
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [10.001, 0, 0]},
+        },
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 7},
+        "output": {"points": 3, "quantities": {
+            "point": {"kind": "clearance", "point": [4.0, 3.0, 4.0], "diameter": 1.0},
+            "beyond": {"kind": "clearance", "point": [14.001, 3.0, 0.0]},
+            "wall": {"kind": "clearance", "point": [13.001, 0, 0], "normal": [-2, 0, 0]},
+            "path": {"kind": "clearance", "path": [[2, -5, 1], [2, 5, 1], [2, 5, 9]], "diameter": 0.2},
+            "part": {"kind": "clearance", "point": [0, 1, 0], "range": [5, 10]},
+        }},
+    }  # fmt: skip
+    result = hybrid.static(scene)
+    assert result.point[0] == pytest.approx(5.0 - 0.5 - 0.01, abs=1e-9)
+    assert result.point_at[0] == pytest.approx(4.0 / 1.0001, rel=1e-9)
+    assert result.beyond[0] == pytest.approx(5.0 - 0.01, abs=1e-9) and result.beyond_at[0] == 10.0
+    assert result.wall[0] == pytest.approx(3.0 - 0.01, abs=1e-9) and result.wall_at[0] == 10.0
+    assert result.path[0] == pytest.approx(1.0 - 0.1 - 0.01, abs=1e-9)
+    begin = 10.001 * 4 / 7  # cells are taken whole
+    assert result.part[0] == pytest.approx(math.hypot(begin, 1.0) - 0.01, abs=1e-6)
+
+
+def test_distances_of_chords() -> None:
+    """Never more than between any two of many points of them, and attained; many pairs give what all give."""
+    rng = np.random.default_rng(1)
+    a0, a1, b0, b1 = rng.normal(size=(4, 200, 3))
+    b1[:20] = b0[:20] + (a1 - a0)[:20]  # parallel
+    b1[20:30] = b0[20:30]  # points
+    a1[30:35] = a0[30:35]
+    distance, part = between(a0, a1, b0, b1)
+    x = np.linspace(0.0, 1.0, 101)
+    first, second = (p[:, None] + x[:, None] * (q - p)[:, None] for p, q in ((a0, a1), (b0, b1)))
+    sampled = np.linalg.norm(first[:, :, None] - second[:, None], axis=3)
+    least = sampled.min(axis=(1, 2))
+    assert (distance <= least + 1e-12).all() and distance == pytest.approx(least, abs=0.03)
+    there = a0 + part[:, None] * (a1 - a0)
+    assert np.linalg.norm(there[:, None] - second, axis=2).min(axis=1) == pytest.approx(distance, abs=0.02)
+    a, b = (np.cumsum(rng.normal(size=(150, 3)), axis=0) + shift for shift in (0.0, 15.0))
+    ra, rb = rng.uniform(0.0, 0.3, 149), rng.uniform(0.0, 0.3, 149)
+    assert FEW < 149**2
+    i, j = (k.ravel() for k in np.indices((149, 149)))
+    every = between(a[i], a[i + 1], b[j], b[j + 1])[0] - ra[i] - rb[j]
+    found, cell, _ = nearest(a, b, ra, rb)
+    assert found == pytest.approx(every.min(), rel=1e-12) and cell == i[every.argmin()]
+
+
+# --- pipes ---------------------------------------------------------------------------------------------
+
+OUTER, WALL = 0.4, 0.02
+INNER = OUTER - 2 * WALL
+STEEL_AREA, BORE = math.pi / 4 * (OUTER**2 - INNER**2), math.pi / 4 * INNER**2
+CONTENT, PRESSURE = 800.0, 2e7
+
+
+def hanging_pipe() -> hybrid.Result:
+    """A closed pipe of steel, full of oil, that hangs from z = -20 m into the sea."""
+    mass = 7850.0 * STEEL_AREA + CONTENT * BORE
+    pipe = {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT, "max_stress": 2e8}
+    section = {"mass": mass, "diameter": OUTER, "axial_stiffness": 1e12, "pipe": pipe}
+    return hybrid.static({
+        "environment": {"fluid": {"density": 1025, "surface": 0}},
+        "cable": {"sections": [{**section, "length": 300}, {**section, "length": 200, "pipe": None}]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20]}, "end": "free"},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100}, "output": {"points": 51},
+    })  # fmt: skip
+
+
+def test_wall_tension_balances_a_pipe_cut_open() -> None:
+    """Weight of the wall below, less the pressure outside and more the pressure inside on the cap that closes it."""
+    section = {
+        "length": 500, "mass": 7850.0 * STEEL_AREA + CONTENT * BORE, "diameter": OUTER, "axial_stiffness": 1e12,
+        "pipe": {"wall": WALL, "pressure": PRESSURE, "pressure_z": 5.0, "content_density": CONTENT},
+    }  # fmt: skip
+    result = hybrid.static({
+        "environment": {"fluid": {"density": 1025, "surface": 0}}, "cable": {"sections": [section]},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, -20]}, "end": "free"},
+        "initial": "equilibrium", "model": "catenary", "mesh": {"cells": 100}, "output": {"points": 51},
+    })  # fmt: skip
+    s, bottom = result.s, -520.0
+    inside, outside = PRESSURE + CONTENT * 9.81 * (5.0 - bottom), -1025.0 * 9.81 * bottom
+    cap = inside * BORE - outside * math.pi / 4 * OUTER**2
+    wall = 7850.0 * STEEL_AREA * 9.81 * (500.0 - s) + cap
+    assert result.wall_tension[0] == pytest.approx(wall, rel=1e-6)
+
+
+def test_a_section_without_pipe_has_no_stress_and_the_limit_is_judged() -> None:
+    result = hanging_pipe()
+    assert np.isnan(result.von_mises[0, result.s > 300.0]).all() and np.isfinite(result.von_mises[0, :31]).all()
+    at = int(np.flatnonzero(result["right/s"] == 300.0)[0])
+    assert np.isnan(result["right/von_mises"][0, at])
+    (held,) = held_of(result)
+    k = int(np.nanargmax(result.von_mises[0]))
+    assert (held.limit, held.value, held.s) == ("max_stress", result.von_mises[0, k], result.s[k])
+    assert held.broken == (held.value > 2e8) and held.allowed == 2e8
+
+
+def stress(**given: float) -> float:
+    one = np.ones((1, 1))
+    walls = Walls(OUTER * one, INNER * one, 2e11 * one, 0 * one, 0 * one, 0 * one)
+    values = {"outside": 0.0, "inside": 0.0, "force": 0.0, "curvature": 0.0, "torque": 0.0} | given
+    return float(largest_stress(walls, **{name: x * one for name, x in values.items()})[0, 0])
+
+
+def test_von_mises_of_single_loads() -> None:
+    """Tension, bending, torque, pressure alone: the formulas of the books."""
+    assert stress(force=1e6) == pytest.approx(1e6 / STEEL_AREA, rel=1e-12)
+    assert stress(curvature=1e-3) == pytest.approx(2e11 * 1e-3 * OUTER / 2, rel=1e-12)
+    polar = math.pi / 32 * (OUTER**4 - INNER**4)
+    assert stress(torque=1e5) == pytest.approx(math.sqrt(3.0) * 1e5 * OUTER / 2 / polar, rel=1e-12)
+    closed = stress(inside=1e7, force=1e7 * BORE)  # Lame, closed ends, at the bore
+    assert closed == pytest.approx(math.sqrt(3.0) * 1e7 * OUTER**2 / (OUTER**2 - INNER**2), rel=1e-12)
+    deep = stress(inside=1e7, outside=1e7, force=-1e7 * STEEL_AREA)  # the same pressure on all sides
+    assert deep == pytest.approx(0.0, abs=1.0)
+    assert stress(force=1e6, curvature=1e-3) == pytest.approx(1e6 / STEEL_AREA + 4e7, rel=1e-12)
+
+
+# --- where else they are ---------------------------------------------------------------------------------
+
+SWINGING = """
+environment: {seabed: {z: -20, stiffness: 1.0e4}}
+cable: {sections: [{length: 60, mass: 5, axial_stiffness: 1.0e6, diameter: 0.05, damping: 0.5}]}
+ends:
+  start: {kind: pinned, position: [0, 0, -20]}
+  end: {kind: pinned, position: [50, 0, 0], motion: {surge: {amplitude: 0.5, period: 4.0}, ramp: 4.0}}
+initial: equilibrium
+model: catenary
+mesh: {cells: 30}
+time: {duration: 4, step: 0.1}
+output:
+  every: 0.2
+  quantities:
+    moved: {kind: touchdown_excursion, end: end}
+    gap: {kind: clearance, point: [30, 0, -5], smallest: 4}
+    hang_off: {kind: end_angle, end: end, direction: [0, 0, -1], largest: 90}
+"""
+
+
+def test_in_files_statistics_tables_and_after_a_resume(tmp_path: Path) -> None:
+    scene = hybrid.parse_scene(SWINGING)
+    result = hybrid.run(scene, tmp_path / "all.h5")
+    listed = {x.name: x for x in hybrid.listed_outputs(scene)}
+    over_time = {x for x in result.names if result.dims(x)[:1] in (("t",), ("steps/t",)) and "right/" not in x}
+    assert set(listed) == over_time - {"t"} | {"steps/t"}
+    assert all(x.unit == result.units[name] for name, x in listed.items())
+    assert result.moved[0] == 0.0 and result.moved.max() > 0.2
+    found = result.statistics(["gap"])["gap"]
+    assert found.minimum == result.gap.min()
+    table = hybrid.export(result, tmp_path / "gap.csv", names=["gap", "hang_off"]).files[0].read_text()
+    assert "gap (m)" in table and "hang_off (deg)" in table
+    held = {x.name: x for x in held_of(result)}
+    assert held["gap"].value == result.gap.min() and held["gap"].broken == (result.gap.min() < 4.0)
+    assert held["hang_off"].value == result.hang_off.max() and not held["hang_off"].broken
+    half = hybrid.parse_scene(SWINGING.replace("duration: 4", "duration: 2"))
+    hybrid.run(half, tmp_path / "half.h5").close()
+    gone_on = hybrid.resume(tmp_path / "half.h5", tmp_path / "rest.h5", until=4.0)
+    assert np.array_equal(gone_on.moved, result.moved) and np.array_equal(gone_on.gap, result.gap)
+
+
+SYSTEM = """
+environment: {gravity: 0.0}
+points:
+  a: {kind: fixed, position: [0, 0, 0]}
+  b: {kind: fixed, position: [10.01, 0, 0]}
+  c: {kind: fixed, position: [3, -5, 2]}
+  d: {kind: fixed, position: [3, 5.01, 2], motion: {travel: {by: [0, 0, -1.0], over: 2.0}}}
+lines:
+  one: {start: a, end: b, sections: [{length: 10, mass: 1, axial_stiffness: 1.0e5, diameter: 0.2}]}
+  two: {start: c, end: d, sections: [{length: 10, mass: 1, axial_stiffness: 1.0e5, diameter: 0.1}]}
+output:
+  every: 0.5
+  quantities:
+    gap: {kind: clearance, line: one, other: two, smallest: 1.9}
+    pull: {kind: horizontal_force, line: two, end: start}
+"""
+
+
+def test_clearance_of_two_lines(tmp_path: Path) -> None:
+    still = hybrid.static(_system(SYSTEM))
+    assert still.gap[0] == pytest.approx(2.0 - 0.15, abs=1e-9) and still.gap_at[0] == pytest.approx(3 / 1.001, rel=1e-6)
+    assert still.pull[0] == pytest.approx(1e5 * 0.001, rel=1e-6)
+    assert [x.broken for x in held_of(still)] == [True]
+    moving = _system(SYSTEM + "time: {duration: 2, step: 0.05}\n")
+    result = hybrid.run(moving, tmp_path / "two.h5")
+    one, two = result.lines["one"], result.lines["two"]
+    for k in (1, len(result.times) - 1):
+        i, j = (x.ravel() for x in np.indices((100, 100)))
+        a, b = one.position[k], two.position[k]
+        every = between(a[i], a[i + 1], b[j], b[j + 1])[0]
+        assert result.gap[k] == pytest.approx(every.min() - 0.15, abs=5e-4)
+    assert {x.name for x in hybrid.listed_outputs(moving)} >= {"gap", "gap_at", "pull", "lines/one/tension"}
+
+
+def _system(text: str) -> hybrid.System:
+    found, _ = parse_either(text)
+    assert isinstance(found, hybrid.System)
+    return found
+
+
+@pytest.mark.parametrize(("change", "match"), [
+    ("{kind: end_angle, end: end}", "direction(.|\n)*needs it"),
+    ("{kind: uplift}", "end(.|\n)*start or end"),
+    ("{kind: layback, end: end, direction: [1, 0, 0]}", "has no direction"),
+    ("{kind: clearance}", "one of point, path and other"),
+    ("{kind: clearance, point: [0, 0, 0], other: two}", "one of point, path and other"),
+    ("{kind: clearance, other: two}", "the scene has one line"),
+    ("{kind: clearance, path: [[0, 0, 0], [1, 0, 0]], normal: [0, 0, 1]}", "without a point"),
+    ("{kind: clearance, point: [0, 0, 0], range: [10, 70]}", "length of the line, 60 m"),
+    ("{kind: declination, end: end, line: one}", "the scene has one line"),
+    ("{kind: declination, end: end, smallest: 3, largest: 2}", "at most largest"),
+])  # fmt: skip
+def test_refused(change: str, match: str) -> None:
+    text = SWINGING[: SWINGING.index("    moved:")] + f"    moved: {change}\n"
+    with pytest.raises(hybrid.SceneError, match=match):
+        hybrid.parse_scene(text)
+
+
+def test_names_and_seabed_that_are_refused() -> None:
+    with pytest.raises(hybrid.SceneError, match=r"quantities\.tension(.|\n)*results do not have already"):
+        hybrid.parse_scene(SWINGING.replace("    moved:", "    tension:"))
+    with pytest.raises(hybrid.SceneError, match="without a seabed"):
+        hybrid.parse_scene(SWINGING.replace("environment: {seabed: {z: -20, stiffness: 1.0e4}}", ""))
+    with pytest.raises(hybrid.SceneError, match="gap_at is the arc length"):
+        hybrid.parse_scene(SWINGING.replace("    moved:", "    gap_at:"))
+
+
+def test_names_of_results_are_taken() -> None:
+    result = hybrid.run(hybrid.parse_scene(SWINGING))
+    own = {"moved", "gap", "gap_at", "hang_off"}
+    assert {x.partition("/")[0] for x in PROBES} <= set(TAKEN)
+    assert {x.partition("/")[0] for x in result.names} - own <= set(TAKEN)
+
+
+@pytest.mark.parametrize(("change", "match"), [
+    ("{kind: clearance, line: one, other: too}", "one, two"),
+    ("{kind: clearance, line: one, other: one}", "a line other than"),
+    ("{kind: declination, end: end}", "line(.|\n)*name of a line"),
+    ("{kind: touchdown, line: one, end: end}", "without a seabed"),
+])  # fmt: skip
+def test_refused_of_several_lines(change: str, match: str) -> None:
+    with pytest.raises(hybrid.SceneError, match=match):
+        _system(SYSTEM[: SYSTEM.index("    gap:")] + f"    gap: {change}\n")

@@ -1,0 +1,158 @@
+"""Torque of tension (`tension_torque`): closed forms of straight and hanging lines, energy, zones against rods."""
+
+import numpy as np
+import pytest
+
+import hybrid
+
+C, EA, GJ, L, G = 2e-3, 1e5, 20.0, 200.0, 9.81
+W = 2.0 * G  # N/m
+ZONES = {"kind": "zones", "zones": [{"rod": 50.0}, {"catenary": 100.0}, {"rod": 50.0}]}
+DOWN = {"tangent": [0, 0, -1], "normal": [1, 0, 0]}
+
+
+def section(**more):
+    return {
+        "length": L, "mass": 2.0, "diameter": 0.03, "axial_stiffness": EA, "max_strain": 0.2, "bending_stiffness": 50.0,
+        "torsional_stiffness": GJ, "tension_torque": C,
+    } | more  # fmt: skip
+
+
+def hanging(model, end, force, **more):
+    sections = more.pop("sections", [section()])
+    return hybrid.validate_scene(
+        {
+            "environment": {"gravity": more.pop("gravity", G)},
+            "cable": {"sections": sections},
+            "ends": {
+                "start": {"kind": "clamped", "position": [0, 0, 0], **DOWN},
+                "end": {"kind": end, "force": [0, 0, -force], **(DOWN if end == "guided" else {})},
+            },
+            "initial": "equilibrium", "model": model, "mesh": {"cells": 200}, "output": {"points": 41}, **more,
+        }
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary", ZONES], ids=["rod", "catenary", "zones"])
+def test_a_line_that_is_held_has_the_torque_of_its_mean_tension(model):
+    found = hybrid.static(hanging(model, "guided", 500.0))
+    mean = 500.0 + 0.5 * W * L
+    np.testing.assert_allclose(found["torque"][0], C * mean, rtol=1e-9)
+    assert -found["position"][0, -1, 2] == pytest.approx(L * (1.0 + mean / EA), rel=1e-12)
+    s = found["s"]
+    turn = (C * mean * s - C * (500.0 * s + W * (L * s - 0.5 * s * s))) / GJ  # a parabola
+    if model == "rod":
+        twist = found["twist"][0]
+        np.testing.assert_allclose(np.gradient(turn, s, edge_order=2), twist, atol=1e-9)
+
+
+@pytest.mark.parametrize("model", ["rod", "catenary", ZONES], ids=["rod", "catenary", "zones"])
+def test_a_line_that_turns_freely_has_none_and_is_softer(model):
+    found = hybrid.static(hanging(model, "free", 500.0))
+    mean = 500.0 + 0.5 * W * L
+    assert -found["position"][0, -1, 2] == pytest.approx(L * (1.0 + mean * (1.0 / EA + C * C / GJ)), rel=1e-12)
+    if model == "rod":
+        assert np.abs(found["torque"][0]).max() < 1e-9 * C * mean
+        T = 500.0 + W * (L - found["s"])
+        np.testing.assert_allclose(found["twist"][0], -C * T / GJ, rtol=1e-9)
+        turns = np.trapezoid(found["twist"][0], found["s"]) / (2.0 * np.pi)
+        assert turns == pytest.approx(-C * mean * L / GJ / (2.0 * np.pi), rel=1e-9)
+
+
+def test_of_two_armours_laid_against_each_other_one_turns_the_other():
+    """Sections with opposite torque share the twist by their compliances: Q (1/GJ1 + 1/GJ2) = T (c1/GJ1 + c2/GJ2)."""
+    sections = [section(length=100.0), section(length=100.0, tension_torque=-1e-3, torsional_stiffness=5.0)]
+    T = 3000.0
+    found = hybrid.static(hanging("rod", "guided", T, sections=sections, gravity=0.0))
+    torque = T * (C / GJ - 1e-3 / 5.0) / (1.0 / GJ + 1.0 / 5.0)
+    np.testing.assert_allclose(found["torque"][0], torque, rtol=1e-9)
+    assert found["twist"][0, 5] == pytest.approx((torque - C * T) / GJ, rel=1e-9)
+
+
+def sag(model, step, turns=0.0, **more):
+    """60 m between clamps, the second of which swings."""
+    swing = {"sway": {"amplitude": 1.5, "period": 6.0}, "surge": {"amplitude": 0.5, "period": 4.0}, "ramp": 4.0}
+    ends = [{"kind": "clamped", "tangent": [0.6, 0, z], "normal": [0, 1, 0]} for z in (-0.8, 0.8)]
+    part = section(length=60.0, mass=0.6, diameter=0.02, bending_stiffness=2.0, torsional_stiffness=8.0,
+                   axial_stiffness=5e4, tension_torque=5e-3)  # fmt: skip
+    return hybrid.validate_scene(
+        {
+            "environment": {"gravity": G},
+            "cable": {"sections": [part]},
+            "ends": {
+                "start": {**ends[0], "position": [0, 0, 0]},
+                "end": {**ends[1], "position": [52, 0, 0], "motion": swing, "turns": turns},
+            },
+            "initial": "equilibrium", "model": model, "mesh": {"cells": 120},
+            "time": {"duration": 6.0, "step": step, "rho_inf": 0.9}, "output": {"every": 0.5, "points": 61}, **more,
+        }
+    )  # fmt: skip
+
+
+def test_energy_balances_to_second_order_and_zones_are_rods():
+    rods = [hybrid.run(sag("rod", step)) for step in (0.02, 0.01)]
+    left = [float(found["work/scheme"][-1]) for found in rods]
+    assert left[0] / left[1] == pytest.approx(4.0, abs=0.4)
+    assert abs(left[1]) < 1e-4 * float(rods[1]["work/end"][-1])
+    zones = {"kind": "zones", "zones": [{"rod": 12.0}, {"catenary": 36.0}, {"rod": 12.0}]}
+    mixed = hybrid.run(sag(zones, 0.01))
+    torque, other = rods[1]["torque"][:, 30], mixed["torque"][:, 30]
+    assert np.abs(other - torque).max() < 1e-3 * np.abs(torque).max()
+    assert np.abs(torque).max() > 0.8
+    assert float(mixed["work/scheme"][-1]) == pytest.approx(left[1], rel=0.1)
+
+
+def test_zones_that_move_carry_it():
+    """Cells that come and go keep the torque of the tension: against rods with the same tension."""
+    found = hybrid.run(sag({"kind": "adaptive", "force_rod": [[20, 30]]}, 0.02, turns=1.5))
+    rods = hybrid.run(sag("rod", 0.02, turns=1.5))
+    tension = found["tension"][:].mean(axis=1) - rods["tension"][:].mean(axis=1)
+    torque = found["torque"][:, 30] - rods["torque"][:, 30]
+    assert np.abs(torque - 5e-3 * tension).max() < 1e-3 * np.abs(rods["torque"][:]).max()
+    assert np.abs(found["turns/link"][:] - found["turns/link"][0]).max() < 0.3
+
+
+def test_it_is_left_out_where_nothing_has_it():
+    plain = section()
+    plain.pop("tension_torque")
+    none = hybrid.static(hanging("rod", "guided", 500.0, sections=[plain]))
+    assert np.abs(none["torque"][0]).max() < 1e-12
+
+
+@pytest.mark.parametrize(
+    ("change", "where"),
+    [
+        ({"axial_stiffness": None}, "axial_stiffness"),
+        ({"torsional_stiffness": None}, "torsional_stiffness"),
+        ({"tension_torque": 2.0}, "tension_torque"),
+        ({"tension_strain": [[0, 0], [0.1, 1e4]], "axial_stiffness": None}, "axial_stiffness"),
+    ],
+)
+def test_what_it_needs(change, where):
+    given = {key: value for key, value in (section() | change).items() if value is not None}
+    with pytest.raises(hybrid.SceneError, match=where):
+        hanging("rod", "guided", 500.0, sections=[given])
+
+
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        ({"dimension": 2}, "tension_torque"),
+        ({"solver": "shooting"}, "shooting knows no torque of tension"),
+        ({"model": {"kind": "adaptive", "curvature_error": 0.05}}, "cells follow the curvature"),
+    ],
+)
+def test_what_it_does_not_go_with(more, words):
+    model = more.pop("model", "rod")
+    with pytest.raises(hybrid.SceneError, match=words):
+        hanging(model, "guided", 500.0, **more)
+
+
+def test_a_line_that_is_paid_out_refuses_it():
+    end = {"kind": "pinned", "position": [0, 0, -L], "payout": {"rate": 0.1, "ramp": 1.0, "longest": L + 5.0}}
+    scene = {
+        "environment": {"gravity": G}, "cable": {"sections": [section()]}, "initial": "equilibrium", "model": "rod",
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": end}, "time": {"duration": 1.0, "step": 0.1},
+    }  # fmt: skip
+    with pytest.raises(hybrid.SceneError, match=r"line is paid out \(ends.end.payout\) and its twist"):
+        hybrid.validate_scene(scene)

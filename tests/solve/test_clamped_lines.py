@@ -1,0 +1,432 @@
+"""Lines that are clamped to points and bodies: a cut rod is the same rod, closed forms, moments on bodies, momentum."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq
+
+import hybrid
+from hybrid.errors import SceneError
+from hybrid.kernels.newton import TOLERANCE
+from hybrid.model.bodies import frame_of
+from hybrid.model.build import build
+from hybrid.simulation.system_run import SystemRun
+from hybrid.solve.statics import solve_statics
+
+LENGTH, CELLS, A, B = 100.0, 40, [0.0, 0.0, 0.0], [70.0, 10.0, -20.0]
+SECTION = {
+    "mass": 2.0, "diameter": 0.03, "axial_stiffness": 1e6, "bending_stiffness": 200.0, "torsional_stiffness": 150.0,
+    "drag": {"normal": 1.2}, "added_mass": {"normal": 1},
+}  # fmt: skip
+WATER = {"fluid": {"density": 1025, "current": [0.3, 0.2, 0]}}
+START = {"tangent": [1, 0, 0], "normal": [0, 0, 1]}
+TWISTED, UNTWISTED = [0.0, 1.0, 0.0], None  # normal at the end: with it a torque passes
+
+
+def end_of(normal: list[float] | None) -> dict[str, Any]:
+    return {"tangent": [1, 0.3, 0.2]} | ({"normal": normal} if normal else {"swivel": True})
+
+
+def in_one_piece(normal: list[float] | None, motion: dict[str, Any] | None = None) -> dict[str, Any]:
+    end = {"kind": "clamped", "position": B, **end_of(normal)} | ({"motion": motion} if motion else {})
+    return {
+        "environment": WATER, "cable": {"sections": [SECTION | {"length": LENGTH}]}, "initial": "equilibrium",
+        "ends": {"start": {"kind": "clamped", "position": A, **START}, "end": end}, "model": "rod",
+        "mesh": {"cells": CELLS}, "output": {"points": CELLS + 1},
+    }  # fmt: skip
+
+
+def in_pieces(
+    cuts: Sequence[int], flips: Sequence[int], normal: list[float] | None, motion: dict[str, Any] | None = None
+) -> dict[str, Any]:
+    """The same line cut at nodes and joined by free points; flips: pieces that run the other way."""
+    points: dict[str, Any] = {"a": {"position": A}, "b": {"position": B} | ({"motion": motion} if motion else {})}
+    for c in cuts:
+        guess = np.array(A) + (np.array(B) - A) * c / CELLS + [0, 0, -15]
+        points[f"cut{c}"] = {"initial_guess": guess.tolist()}
+    edges, names, lines = [0, *cuts, CELLS], ["a", *(f"cut{c}" for c in cuts), "b"], {}
+    for i, flipped in enumerate(flips):
+        ends: list[Any] = [START if i == 0 else "clamped", end_of(normal) if i == len(cuts) else "clamped"]
+        at = names[i : i + 2]
+        if flipped:
+            at = at[::-1]
+            ends = [x if x == "clamped" else x | {"tangent": [-c for c in x["tangent"]]} for x in ends[::-1]]
+        cells = edges[i + 1] - edges[i]
+        lines[f"line{i}"] = {
+            "start": at[0], "end": at[1], "connections": {"start": ends[0], "end": ends[1]}, "model": "rod",
+            "sections": [SECTION | {"length": LENGTH * cells / CELLS}], "mesh": {"cells": cells},
+        }  # fmt: skip
+    return {"environment": WATER, "points": points, "lines": lines, "output": {"points": 2}}
+
+
+def equilibrium(tables: dict[str, Any]) -> SystemRun:
+    return SystemRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
+
+
+@pytest.mark.parametrize("normal", [TWISTED, UNTWISTED])
+@pytest.mark.parametrize(("cuts", "flips"), [([16], (0, 0)), ([16], (1, 1)), ([8, 16, 30], (0, 1, 1, 0))])
+def test_a_rod_cut_at_any_node_is_the_same_rod(cuts: list[int], flips: tuple[int, ...], normal: Any) -> None:
+    """Points are first looked for 15 m and more beside their places; the axes of points are found as well."""
+    model = build(hybrid.validate_scene(in_one_piece(normal)))
+    ends = model.ends.at(np.inf)
+    whole = solve_statics(
+        model.line, model.sea.at(np.inf), ends, model.start, LENGTH, model.tension_scale
+    ).state  # fmt: skip
+    found = equilibrium(in_pieces(cuts, flips, normal)).found
+    assert found is not None and found.iterations <= 20 and len(found.path) == 1
+    edges = [0, *cuts]
+    for name, scale in (("r", LENGTH), ("T", np.abs(whole.T).max())):
+        for i, state in enumerate(found.state.lines):
+            mine, theirs = getattr(state, name), getattr(whole, name)[edges[i] :]
+            apart = np.abs((mine[::-1] if flips[i] else mine) - theirs[: len(mine)]).max()
+            # two elements of half a cell in series are one but for the square of bend times twist
+            assert apart < (1e-9 if normal else 2e-11) * scale
+
+
+@pytest.mark.parametrize("flips", [(0, 0), (1, 0)])
+def test_a_cut_rod_moves_as_the_rod(flips: tuple[int, ...]) -> None:
+    motion = {"sway": {"amplitude": 2.0, "period": 2.0}, "roll": {"amplitude": 40, "period": 2.0},
+              "pitch": {"amplitude": 25, "period": 2.5}, "ramp": 2.0}  # fmt: skip
+    time = {"time": {"duration": 4.0, "step": 0.05, "rho_inf": 0.8}}
+    whole = hybrid.run(in_one_piece(TWISTED, motion) | time)
+    pieces = hybrid.run(in_pieces([16], flips, TWISTED, motion) | time)
+    joint = whole["position"][:, 16]
+    assert np.abs(joint - joint[0]).max() > 0.3
+    assert np.abs(pieces["points/cut16/position"] - joint).max() < 10 * TOLERANCE * LENGTH
+    alone = hybrid.run(in_pieces([], (0,), TWISTED, motion) | time)
+    for name in ("a/force", "a/moment", "b/force", "b/moment"):
+        apart = np.abs(pieces[f"points/{name}"] - alone[f"points/{name}"]).max()
+        assert apart < 1e-4 * np.abs(alone[f"points/{name}"]).max()
+    steps = [np.mean(x["steps/iterations"]) for x in (whole, pieces.lines["line0"])]
+    assert steps[1] < steps[0] + 0.2
+
+
+# --- bodies ----------------------------------------------------------------------------------------------
+
+STRIP = {"length": 10.0, "mass": 3.0, "diameter": 0.05, "bending_stiffness": 400.0, "axial_stiffness": 1e6}
+MOTION = {"heave": {"amplitude": 0.3, "period": 2.0}, "pitch": {"amplitude": 20, "period": 3.0},
+          "yaw": {"amplitude": 10, "period": 3.0}, "ramp": 3.0}  # fmt: skip
+
+
+@pytest.mark.parametrize("holder", ["body", "point"])
+def test_a_cantilever_on_a_body_or_point_is_the_clamped_line(holder: str) -> None:
+    """Held, and moved and turned; the moment on the body is about its origin."""
+    line = {"start": "root", "end": "tip", "connections": {"start": {"tangent": [1, 0, 0]}}, "sections": [STRIP],
+            "mesh": {"cells": 20}}  # fmt: skip
+    points: dict[str, Any] = {"tip": {"initial_guess": [9, 0, -3], "mass": 2.0}}
+    tables: dict[str, Any] = {"points": points, "lines": {"line": line}}
+    if holder == "body":  # turned by -90 deg of yaw at rest, so that its own axis is another
+        line["connections"] = {"start": {"tangent": [0, 1, 0]}}
+        points["root"] = {"body": "body", "place": [0, 0, 0]}
+        tables["bodies"] = {"body": {"position": [0, 0, 0], "rotation": [0, 0, -90]}}
+    else:
+        points["root"] = {"position": [0, 0, 0]}
+    clamp: dict[str, Any] = {"kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, 0]}
+    one = {"cable": {"sections": [STRIP]}, "ends": {"start": clamp, "end": {"kind": "body", "mass": 2.0}},
+           "initial": "equilibrium", "model": "rod", "mesh": {"cells": 20}}  # fmt: skip
+    alone, joined = hybrid.static(one), hybrid.static(tables)
+    assert np.abs(joined.lines["line"]["position"] - alone["position"]).max() < 1e-9 * STRIP["length"]
+    moment = joined["points/root/moment"][-1]
+    assert np.abs(moment + alone["moment_start"][-1]).max() < 1e-9 * np.abs(moment).max()
+    if holder == "body":
+        tables["points"]["root"]["place"] = [0, 2, 0]
+        tables["bodies"]["body"]["position"] = [-2, 0, 0]
+        moved = hybrid.static(tables)
+        about = np.cross([2, 0, 0], moved["points/root/force"][-1]) + moment
+        assert np.abs(moved["bodies/body/moment"][-1] - about).max() < 1e-8 * np.abs(about).max()
+        tables["points"]["root"]["place"], tables["bodies"]["body"]["position"] = [0, 0, 0], [0, 0, 0]
+    (tables["bodies"]["body"] if holder == "body" else points["root"])["motion"] = MOTION
+    clamp["motion"] = MOTION
+    time = {"time": {"duration": 2.0, "step": 0.02}, "output": {"every": 0.1}}
+    alone, joined = hybrid.run(one | time), hybrid.run(tables | time)
+    assert np.abs(alone["position"] - alone["position"][0]).max() > 0.15
+    assert np.abs(joined.lines["line"]["position"] - alone["position"]).max() < 1e-7 * STRIP["length"]
+
+
+WEIGHT, ARM, EI, SPAN = 30.0 * 9.81, 0.4, 400.0, 2.0
+
+
+def hung(flipped: bool = False, **more: Any) -> dict[str, Any]:
+    """A heavy body that hangs from a light rod which is clamped at both ends, with its centre beside it."""
+    section = {"length": SPAN, "mass": 1e-3, "diameter": 0.008, "bending_stiffness": EI, "axial_stiffness": 1e7}
+    section |= {"torsional_stiffness": 300.0} | more
+    ends, along = ("lug", "top") if flipped else ("top", "lug"), [0, 0, 1 if flipped else -1]
+    line = {
+        "start": ends[0], "end": ends[1], "connections": {"start": {"tangent": along}, "end": {"tangent": along}},
+        "sections": [section], "mesh": {"cells": 40}, "model": "rod",
+    }  # fmt: skip
+    body = {"initial_guess": [0, 0, -SPAN], "mass": 30.0, "centre": [ARM, 0, 0], "inertia": [20, 30, 25]}
+    points = {"top": {"position": [0, 0, 0]}, "lug": {"body": "body", "place": [0, 0, 0]}}
+    return {"points": points, "bodies": {"body": body}, "lines": {"line": line}}
+
+
+def elastica() -> tuple[float, float, float]:
+    """Shift and drop of the body and its pitch (rad) of an inextensible rod without weight: EI phi'' = W sin phi."""
+
+    def path(bend: float) -> np.ndarray:
+        def slope(_: float, y: np.ndarray) -> list[float]:
+            return [y[1], WEIGHT * np.sin(y[0]) / EI, -np.sin(y[0]), -np.cos(y[0])]
+
+        return np.asarray(solve_ivp(slope, (0, SPAN), [0, bend, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1])
+
+    def left(bend: float) -> float:
+        y = path(bend)
+        return float(EI * y[1] - WEIGHT * ARM * np.cos(y[0]))
+
+    y = path(brentq(left, 0.0, 1.0, xtol=1e-14))
+    return float(y[2]), float(y[3]), float(y[0])
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_a_body_on_a_clamped_rod_hangs_as_the_elastica(flipped: bool) -> None:
+    x, z, pitch = elastica()
+    errors = []
+    for cells in (20, 40):
+        tables = hung(flipped)
+        tables["lines"]["line"]["mesh"]["cells"] = cells
+        result = hybrid.static(tables)
+        place, turned = result["bodies/body/position"][-1], result["bodies/body/rotation"][-1]
+        errors.append([place[0] - x, place[2] - z, np.radians(turned[1]) - pitch])
+        moment = result["points/lug/moment"][-1]
+        assert abs(moment[1] + WEIGHT * ARM * np.cos(np.radians(turned[1]))) < 1e-6  # the body's own weight
+        bend = result.lines["line"]["bending_moment"][-1][0 if flipped else -1]
+        assert abs(bend - abs(moment[1])) < 1e-6
+    assert np.abs(errors[1]).max() < 2e-4 * SPAN
+    ratio = np.array(errors[0][:1] + errors[0][2:]) / (errors[1][:1] + errors[1][2:])
+    assert (ratio > 3.5).all() and (ratio < 4.5).all()
+
+
+def test_what_is_turned_altogether_stays_the_same() -> None:
+    """Without weight, a force and a moment on the body: turned with all else, everything turns with them."""
+
+    def found(turn: list[float]) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        R, tables = frame_of((turn[0], turn[1], turn[2])), hung()
+        tables["environment"] = {"gravity": 0.0}
+        body, ends = tables["bodies"]["body"], tables["lines"]["line"]["connections"]
+        body |= {"initial_guess": (R @ [0, 0, -SPAN]).tolist(), "initial_rotation": turn}
+        body |= {"force": (R @ [30, 20, -90]).tolist(), "moment": (R @ [20, -30, 50]).tolist()}
+        ends["start"] = {"tangent": (R @ [0, 0, -1]).tolist(), "normal": (R @ [1, 0, 0]).tolist()}
+        ends["end"] = {"tangent": [0, 0, -1], "normal": [1, 0, 0]}
+        result = hybrid.static(tables)
+        moment = result["points/top/moment"][-1]
+        return result["bodies/body/position"][-1] @ R, moment @ R, result.lines["line"]["torque"][-1]
+
+    for mine, theirs in zip(found([0, 0, 0]), found([40, -25, 70]), strict=True):
+        assert np.abs(mine).max() > 0.1
+        assert np.abs(mine - theirs).max() < 1e-7 * np.abs(mine).max()
+
+
+def momenta(step: float, flipped: bool, tau: float = 0.0) -> tuple[float, float, float, float]:
+    """Errors of the balances of energy of body and line and of the angular momentum of both, and iterations a step."""
+    tables = hung(flipped, mass=0.05, damping={"stiffness": tau})
+    tables["environment"] = {"gravity": 0.0}
+    tables["lines"]["line"]["mesh"]["cells"] = 20
+    tables["bodies"]["body"]["moment"] = {"value": [30, 20, 60], "until": 0.2}
+    tables["bodies"]["body"]["force"] = {"value": [0, 0, -60]}
+    tables |= {"time": {"duration": 1.2, "step": step, "rho_inf": 0.9}, "output": {"every": step, "points": 21}}
+    result = hybrid.run(tables)
+    line, t, of = result.lines["line"], result.times, "bodies/body"
+    kinetic = result[f"{of}/energy/kinetic"]
+    works = sum(result[f"{of}/work/{x}"] for x in ("lines", "damping", "loads"))
+    energy = kinetic + result[f"{of}/energy/potential"] - works
+    passed = line["work/start" if flipped else "work/end"] + result[f"{of}/work/lines"]
+    r, v, w = (result[f"{of}/{x}"] for x in ("position", "velocity", "angular_velocity"))
+    L = np.zeros((t.size, 3))
+    for k, (place, speed, spin, turn) in enumerate(zip(r, v, w, result[f"{of}/rotation"], strict=True)):
+        R = frame_of(tuple(turn))
+        arm = R @ [ARM, 0, 0]
+        L[k] = np.cross(place + arm, 30.0 * (speed + np.cross(spin, arm))) + R @ (np.array([20, 30, 25]) * (spin @ R))
+    mass = np.full(21, 0.05 * SPAN / 20)
+    mass[[0, -1]] *= 0.5
+    L += np.einsum("n,tni->ti", mass, np.cross(line["position"], line["velocity"]))
+    after = t >= 0.2 - 1e-9  # the moment that is given has stopped, the force goes on
+    rate = np.cross(r, [0, 0, -60.0]) - result["points/top/moment"]
+    given = np.cumsum(0.5 * (rate[after][1:] + rate[after][:-1]) * np.diff(t[after])[:, None], axis=0)
+    momentum = np.abs(L[after][1:] - L[after][0] - given).max() / np.abs(L).max()
+    most = kinetic.max()
+    return (
+        float(np.abs(energy - energy[0]).max() / most), float(np.abs(passed).max() / most), float(momentum),
+        float(line["steps/iterations"].mean()),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("flipped", [False, True])
+def test_moments_on_a_body_keep_energy_and_angular_momentum_to_second_order(flipped: bool) -> None:
+    coarse, fine = momenta(0.02, flipped), momenta(0.01, flipped)
+    assert coarse[3] < 3.0 and max(fine[:3]) < 1e-3
+    assert fine[1] < 1e-6  # what the line does to the body, the body does to the line
+    for a, b in ((coarse[0], fine[0]), (coarse[2], fine[2])):
+        assert 3.2 < a / b < 5.0
+
+
+def test_damping_of_a_clamp_has_its_exact_derivative() -> None:
+    """Newton's method takes no more iterations with damping, and the energy that it takes is booked."""
+    energy, passed, momentum, iterations = momenta(0.01, True, tau=0.05)
+    assert iterations <= momenta(0.01, True)[3] + 0.1
+    assert energy < 1e-3 and passed < 1e-3 and momentum < 1e-3
+
+
+def test_stiffness_of_a_body_on_a_clamped_rod_is_that_of_differences() -> None:
+    tables = hung()
+    tables["lines"]["line"]["connections"]["start"]["normal"] = [1, 0, 0]
+    tables["lines"]["line"]["connections"]["end"]["normal"] = [1, 0, 0]
+    C = np.linalg.inv(hybrid.stiffness(hybrid.System.model_validate(tables), "body:body").matrix)
+    for k, (key, size) in enumerate((("force", 0.05),) * 3 + (("moment", 0.05),) * 3):
+        rows = []
+        for sign in (1, -1):
+            load = [sign * size * (i == k % 3) for i in range(3)]
+            moved = dict(tables, bodies={"body": tables["bodies"]["body"] | {key: load}})
+            result = hybrid.static(moved)
+            rows.append(np.append(result["bodies/body/position"][-1], result["bodies/body/rotation"][-1]))
+        change = (rows[0] - rows[1])[:3] / (2 * size)
+        assert np.abs(change - C[:3, k]).max() < 2e-5 * np.abs(C[:3, k]).max() + 1e-9
+
+
+# --- angular springs, torque -------------------------------------------------------------------------------
+
+
+def sprung(spring: float | None, swivel: bool = True, **more: Any) -> dict[str, Any]:
+    held: dict[str, Any] = {"tangent": [1, 0, 0], "swivel": swivel}
+    held |= {} if spring is None else {"bend_stiffness": spring}
+    section = {"length": 5.0, "mass": 1.0, "diameter": 0.02, "bending_stiffness": 400.0, "axial_stiffness": 1e8}
+    line = {"start": "root", "end": "tip", "connections": {"start": held}, "sections": [section], "mesh": {"cells": 20}}
+    points = {"root": {"position": [0, 0, 0]}, "tip": {"initial_guess": [5, 0, 0]} | more}
+    return {"environment": {"gravity": 0.0}, "points": points, "lines": {"line": line}}
+
+
+@pytest.mark.parametrize("spring", [50.0, 3000.0])
+def test_an_angular_spring_turns_by_its_moment(spring: float) -> None:
+    """Of a cantilever under a small force: F L^2/k more at the tip; the line bends as the moment says."""
+    force = 1e-3
+    loose, rigid = (hybrid.static(sprung(x, force=[0, 0, -force])) for x in (spring, None))
+    more = rigid["points/tip/position"][-1, 2] - loose["points/tip/position"][-1, 2]
+    assert more == pytest.approx(force * 25.0 / spring, rel=1e-5)
+    line = loose.lines["line"]
+    assert line["bending_moment"][-1][0] == pytest.approx(5.0 * force, rel=1e-6)
+    assert line["curvature"][-1][0] == pytest.approx(5.0 * force / 400.0, rel=1e-6)
+
+
+def test_springs_go_from_a_pin_to_a_clamp() -> None:
+    def between(connection: Any) -> Any:
+        tables = sprung(None)
+        tables["environment"] = {}
+        tables["points"]["tip"] = {"position": [4.9, 0, 0.3]}
+        tables["lines"]["line"]["connections"]["start"] = connection
+        return hybrid.static(tables).lines["line"]["position"][-1]
+
+    pinned, clamped = between("pinned"), between({"tangent": [1, 0, 0]})
+    assert np.abs(pinned - clamped).max() > 1e-3
+    assert np.abs(between({"tangent": [1, 0, 0], "bend_stiffness": 1e-7}) - pinned).max() < 5e-9
+    assert np.abs(between({"tangent": [1, 0, 0], "bend_stiffness": 1e13}) - clamped).max() < 5e-9
+
+
+@pytest.mark.parametrize(("joint", "passes"), [("hinge", True), ("swivel", False)])
+def test_torque_passes_through_a_point_that_says_so(joint: str, passes: bool) -> None:
+    """A taut line cut in its middle, its far end turned by a third of a turn: GJ times the twist, through a hinge too."""
+    GJ, turn = 30.0, 2.0 * np.pi / 3.0
+    section = {
+        "mass": 1.0,
+        "diameter": 0.02,
+        "bending_stiffness": 40.0,
+        "torsional_stiffness": GJ,
+        "axial_stiffness": 1e6,
+    }
+    held = {"tangent": [1, 0, 0]} | ({"bend_stiffness": 0} if joint == "hinge" else {"swivel": True})
+    far = {"tangent": [1, 0, 0], "normal": [0, -np.sin(turn), np.cos(turn)]}
+    lines = {
+        "one": {"start": "a", "end": "cut", "connections": {"start": {"tangent": [1, 0, 0], "normal": [0, 0, 1]},
+                "end": {"tangent": [1, 0, 0]}}, "sections": [section | {"length": 4.0}], "mesh": {"cells": 16}},
+        "two": {"start": "cut", "end": "b", "connections": {"start": held, "end": far},
+                "sections": [section | {"length": 6.0}], "mesh": {"cells": 24}},
+    }  # fmt: skip
+    points = {"a": {"position": [0, 0, 0]}, "b": {"position": [10.02, 0, 0]}, "cut": {"initial_guess": [4, 0, 0]}}
+    result = hybrid.static({"environment": {"gravity": 0.0}, "points": points, "lines": lines})
+    torque = GJ * turn / 10.0 if passes else 0.0
+    for name in ("one", "two"):
+        assert np.abs(np.abs(result.lines[name]["torque"][-1]) - torque).max() < 1e-5
+    points["cut"]["force"] = [0, 0, -40]
+    result = hybrid.static({"environment": {"gravity": 0.0}, "points": points, "lines": lines})
+    one, two = result.lines["one"], result.lines["two"]
+    torques, moments = [[x[key][-1][k] for x, k in ((one, -1), (two, 0))] for key in ("torque", "bending_moment")]
+    assert np.abs(np.abs(torques) - torque).max() < 1e-4
+    before, after = (x["position"][-1][b] - x["position"][-1][a] for x, a, b in ((one, -2, -1), (two, 0, 1)))
+    angle = np.arccos(before @ after / np.linalg.norm(before) / np.linalg.norm(after))
+    if passes:  # as through a constant-velocity joint, along the bisector of both directions
+        assert angle > 0.01 and moments == pytest.approx([torque * np.tan(angle / 2)] * 2, rel=0.05)
+
+
+# --- points to which several lines are clamped ----------------------------------------------------------------
+
+
+def test_three_rods_that_meet_rigidly_balance_their_moments() -> None:
+    points: dict[str, Any] = {"knot": {"initial_guess": [1, 0, -8]}}
+    lines = {}
+    for k, name in enumerate("abc"):
+        x, y = np.cos(2 * np.pi * k / 3), np.sin(2 * np.pi * k / 3)
+        points[name] = {"position": [15 * x, 15 * y, 0]}
+        held = {"start": {"tangent": [x, y, 0.0]}}
+        lines[name] = {"start": "knot", "end": name, "connections": held, "sections": [SECTION | {"length": 20.0}],
+                       "mesh": {"cells": 20}}  # fmt: skip
+    tables = {"environment": {"fluid": {"density": 1025}}, "points": points, "lines": lines}
+    result = hybrid.static(tables)
+    moments = [result.lines[x]["moment_start"][-1] for x in "abc"]
+    assert np.abs(moments[0]).max() > 1.0
+    assert np.abs(sum(moments)).max() < 1e-6 * np.abs(moments[0]).max()
+    place, turned = result["points/knot/position"][-1], result["points/knot/rotation"][-1]
+    assert np.abs(place[:2]).max() < 1e-6 and np.abs(turned[:2]).max() < 1e-4  # symmetric
+    point = hybrid.stiffness(hybrid.System.model_validate(tables), "point:knot").matrix
+    tables["points"]["knot"]["force"] = [0.1, 0, 0]
+    moved = hybrid.static(tables)["points/knot/position"][-1] - place
+    assert moved[0] == pytest.approx(0.1 * np.linalg.inv(point)[0, 0], rel=1e-3)
+
+
+def test_rods_that_may_all_spin_find_their_equilibrium_at_once() -> None:
+    """Two rods through a point, pinned at their far ends: nothing holds them against spinning about themselves."""
+    tables = in_pieces([16], (0, 0), UNTWISTED)
+    tables["lines"]["line0"]["connections"]["start"] = "pinned"
+    tables["lines"]["line1"]["connections"]["end"] = "pinned"
+    found = equilibrium(tables).found
+    assert found is not None and len(found.path) == 1 and found.iterations <= 12
+
+
+# --- what is refused ----------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("where", "change", "expected"),
+    [
+        ("lines.line0.connections.start.tangent", lambda t: t["lines"]["line0"]["connections"].update(start="clamped"), "direction"),
+        ("lines.line0.connections.start", lambda t: t["lines"]["line0"].update(model="catenary"), "catenary"),
+        ("lines.line1.connections.start", lambda t: t["lines"]["line0"]["connections"].update(end="pinned"), "another line"),
+        ("lines.line0.connections.end.tangent", lambda t: t["lines"]["line1"]["connections"].update(start={"tangent": [1, 0, 0]}), "axes of point"),
+        ("lines.line0.break_at", lambda t: t["lines"]["line0"].update(break_at={"time": 1.0, "end": "start"}), "clamped at point a"),
+        ("points.b.break_at", lambda t: t["points"]["b"].update(break_at={"time": 1.0}), "clamped"),
+        ("lines.line0.connections.start.swivel", lambda t: t["lines"]["line0"]["connections"].update(
+            start={"tangent": [1, 0, 0], "swivel": True, "bend_stiffness": 0}), "nothing is left"),
+        ("lines.line0.connections.start.normal", lambda t: t["lines"]["line0"]["connections"].update(
+            start={"tangent": [1, 0, 0], "normal": [2, 0, 0]}), "across"),
+        ("lines.line0.connections.start.tangent", lambda t: t["lines"]["line0"]["connections"].update(
+            start={"normal": [2, 0, 0]}), "direction"),
+    ],
+)  # fmt: skip
+def test_connections_that_make_no_sense_are_refused(where: str, change: Any, expected: str) -> None:
+    tables = in_pieces([16], (0, 0), UNTWISTED) | {"time": {"duration": 4.0, "step": 0.05}}
+    change(tables)
+    with pytest.raises(SceneError) as refused:
+        hybrid.plan(tables)
+    assert where in str(refused.value) and expected in str(refused.value)
+
+
+def test_a_point_that_turns_must_turn_something() -> None:
+    turning = {"pitch": {"amplitude": 5, "period": 4}, "ramp": 8}
+    tables = in_pieces([16], (0, 0), UNTWISTED, turning) | {"time": {"duration": 4.0, "step": 0.05}}
+    hybrid.plan(tables)
+    tables["lines"]["line1"]["connections"]["end"] = "pinned"
+    with pytest.raises(SceneError, match="lines turn freely at a point"):
+        hybrid.plan(tables)

@@ -1,0 +1,82 @@
+"""Runs laid over each other: numbers, curves, differences, and what of their scenes is different."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+
+import numpy as np
+import pytest
+from reported import reported
+
+import hybrid
+from hybrid.cli.commands import main
+from hybrid.errors import ResultError
+from hybrid.view.comparison import _differences, _ranges, _table
+
+SCENE = """
+title: {title}
+cable:
+  sections: [{{length: 60, mass: 8, diameter: 0.04, axial_stiffness: 1.0e+7}}]
+ends:
+  start: {{kind: pinned, position: [0, 0, -40]}}
+  end: {{kind: pinned, position: [{x}, 0, 0]}}
+initial: equilibrium
+model: catenary
+mesh: {{cells: 16}}
+"""
+
+
+def command(*arguments: str) -> int | str | None:
+    with pytest.raises(SystemExit) as left:
+        main([*arguments, "--quiet"])
+    return left.value.code
+
+
+def test_differences_are_those_at_the_same_instant_and_place() -> None:
+    """Tension of the made-up run with a dip of 500 N at one instant and place: that is the difference."""
+    runs = {"a": reported(scene="x: 1\n"), "b": reported(scene="x: 2\n", dip=500.0), "c": reported(outputs=41)}
+    panels = {panel.key: panel for panel in _differences(runs)}
+    over = {line.label: line for line in panels["tension-over"].items}
+    along = {line.label: line for line in panels["tension-along"].items}
+    factor = 500.0 / over["b"].y.max()
+    assert factor in (pytest.approx(1.0), pytest.approx(1000.0)) and over["b"].x[over["b"].y.argmax()] == 5.0
+    assert along["b"].x[along["b"].y.argmax()] == 50.0 and np.count_nonzero(over["b"].y) == 1
+    assert over["c"].x.size == 21 and over["c"].y.max() < 1e-9  # twice as many outputs: those in common are the same
+    ranges = {panel.key: panel for panel in _ranges(runs)}["range-tension"]
+    assert [line.label for line in ranges.items if line.label] == ["a", "b", "c"]
+
+
+def test_the_table_has_differences_in_percent() -> None:
+    table = _table({"a": reported(), "b": reported(dip=12000.0)})
+    row = re.search(r"<tr><td>lowest tension</td>(.*?)</tr>", table)
+    assert row is not None
+    cells = re.findall(r"<td[^>]*>(.*?)</td>", row[1])
+    assert cells[0] == "9 kN" and cells[1] == "3 kN (-66.7 %)"
+
+
+def test_a_page_of_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    for name, x in (("near", 35), ("far", 40)):
+        (tmp_path / f"{name}.yaml").write_text(SCENE.format(title=name, x=x))
+        assert not command("static", str(tmp_path / f"{name}.yaml"), "-o", str(tmp_path / f"{name}.h5"))
+    files = [str(tmp_path / "near.h5"), str(tmp_path / "far.h5")]
+    assert not command("report", *files)
+    page = (tmp_path / "near_far.html").read_text()
+    assert "near, far: compared" in page and "What far has another way than near" in page
+    assert "+    position: [40.0, 0.0, 0.0]" in page and "largest tension" in page
+    figures = json.loads(re.search(r'id="index">(.*?)</script>', page, re.S)[1])["figures"]  # type: ignore[index]
+    assert [trace["name"] for trace in figures[0]["data"]] == ["near", "far"]
+    capsys.readouterr()
+    assert command("report", files[0], files[0]) == 2
+    assert "compared with itself" in capsys.readouterr().err
+
+
+def test_what_cannot_be_compared_is_refused(tmp_path: Path) -> None:
+    one = reported()
+    for runs in ({"a": one}, {str(k): one for k in range(7)}):
+        with pytest.raises(ResultError, match="2 to 6 results"):
+            hybrid.compare(runs, tmp_path / "x.html")
+    with pytest.raises(ResultError, match="one has none"):
+        hybrid.compare({"a": one, "b": reported(outputs=0, status="failed", message="no")}, tmp_path / "x.html")
+    assert not (tmp_path / "x.html").exists()
