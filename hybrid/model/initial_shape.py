@@ -157,9 +157,14 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
             else:
                 lift = float(line.point_buoy[floating])
                 found = moored(loads + drag, lift, sea.surface, line.h, line.ck, held, place, on_bed)
-        if found is None:
-            break
+        if found is None or not _has_directions(found.r):
+            return None
     return found
+
+
+def _has_directions(r: Floats) -> bool:
+    """Whether every cell between nodes (N+1, 3) has a length: a line of hardly any stiffness falls into a point."""
+    return bool((np.linalg.norm(np.diff(r, axis=0), axis=1) > 0.0).all())  # False for what is not finite, too
 
 
 def _floating_end(scene: Scene, line: Line) -> int | None:

@@ -59,3 +59,22 @@ def test_drag_on_the_first_shape_is_that_of_the_kernels():
         expected[i] += drag_of_a_body(u[i], line.point_drag[i])
     assert line.point_drag.any() and np.abs(expected).min(axis=0)[0] > 0
     assert current_drag(line, sea, r) == pytest.approx(expected, rel=1e-12, abs=1e-12)
+
+
+def test_a_line_that_falls_into_a_point_has_no_first_shape_of_loads():
+    """Hardly any axial stiffness, a current: the catenary stretches until its cells have no directions."""
+    section = {"length": 800, "mass": 1.5, "diameter": 0.03, "axial_stiffness": 1e-30, "drag": {"normal": 1.2}}
+    scene = hybrid.validate_scene(
+        {
+            "environment": {
+                "fluid": {"density": 1025, "surface": 0, "current": [-2, 0, 0]},
+                "seabed": {"z": -200, "stiffness": 2000},
+            },
+            "cable": {"sections": [section]},
+            "ends": {"start": "free", "end": {"kind": "pinned", "position": [0, 0, 0]}},
+            "initial": "equilibrium",
+            "model": "catenary",
+            "mesh": {"cells": 16},
+        }
+    )
+    assert np.isfinite(build(scene).start.r).all()
