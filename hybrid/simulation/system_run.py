@@ -354,7 +354,8 @@ class SystemRun:
                 line.books.velocity[:] = model.ends.velocity
             self.model.load_bodies(t, solver.bodies, self.loaded)
             self.model.stir(t, self.state.bodies, t - self.t, solver.bodies)
-            taken = solver.step(self.state, self._other, t - self.t, rho, self.last_step, t)
+            before = self.last_step or t - self.t  # a start counts as a step of fixed length does (kernels.run)
+            taken = solver.step(self.state, self._other, t - self.t, rho, before, t)
             if taken.outcome != Outcome.OK:
                 dt, repeats = 0.5 * dt, repeats + 1
                 if dt < shortest:
