@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -22,6 +23,8 @@ from hybrid.solve.statics import Equilibrium, solve_statics
 
 # Turns that close the frames of the initial shape, at most, and round-off; the twist of a cell, rad, that is resolved.
 CLOSING, MOST_TWIST = 0.5 + 1e-6, 1.0
+# Cells from which on the equilibrium of a coarser mesh is sought first.
+MANY = 1000
 
 
 def equilibrium_of(scene: Scene, model: Model, t: float) -> Equilibrium:
@@ -122,19 +125,24 @@ def _settling(scene: Scene) -> str:
 def _by_coarser(scene: Scene, model: Model, t: float) -> Equilibrium | None:
     """The equilibrium of a line of many cells: by Newton at once, or from that of a coarser mesh, easier to find.
 
+    Of very many the coarser one comes first: where Newton fails at once, that costs more than all the rest.
     None: neither is, or there are few cells.
     """
     fewer = coarser(model)
     if fewer is None or _settles(scene, model, t):
         return None
-    try:
-        return _statics(scene, model, t, quick=True)
-    except ComputationError:
-        pass
-    try:
-        coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
-        start = refined(coarse.state, fewer.line, model.line)
-        shape = f"the equilibrium with {fewer.cells} cells"
-        return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
-    except ComputationError:
-        return None
+    ways = [partial(_statics, scene, model, t, quick=True), partial(_from_coarser, scene, model, fewer, t)]
+    for way in ways if model.cells <= MANY else ways[::-1]:
+        try:
+            return way()
+        except ComputationError:
+            pass
+    return None
+
+
+def _from_coarser(scene: Scene, model: Model, fewer: Model, t: float) -> Equilibrium:
+    """From the equilibrium of the model with fewer cells; ComputationError: there is none, or it leads to none."""
+    coarse = _by_coarser(scene, fewer, t) or _statics(scene, fewer, t)
+    start = refined(coarse.state, fewer.line, model.line)
+    shape = f"the equilibrium with {fewer.cells} cells"
+    return _statics(scene, replace(model, start=start, start_shape=shape, other_starts=()), t, quick=True)
