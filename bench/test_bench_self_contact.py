@@ -14,7 +14,8 @@ import pytest
 
 import hybrid
 from hybrid.kernels.energies import observe
-from hybrid.kernels.newton import NEAR
+from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, TOUCH
+from hybrid.kernels.self_contact import contact_task
 from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, TRIED
 from hybrid.kernels.self_distance import LEAST_DISTANCE, LEAST_OTHER, LEAST_S
 from hybrid.simulation.transient import Transient
@@ -149,3 +150,60 @@ def test_throws() -> None:
     assert values["energy"].max() <= 1.001
     assert values["momentum"].max() < 1e-13
     assert touched.min() > 0.0
+
+
+def hanging(cells: int, span: float) -> hybrid.Simulation:
+    """A rod of 5 cm cells between two ends, one of which sways, with contact that it never comes to; span: of length."""
+    length = 0.05 * cells
+    section = {
+        "length": length, "mass": 2.0, "diameter": 0.02, "axial_stiffness": 1e6, "bending_stiffness": 10.0,
+        "torsional_stiffness": 8.0,
+    }  # fmt: skip
+    sway = {"sway": {"amplitude": 1.0, "period": 8.0}, "ramp": 0.5}
+    return hybrid.Simulation(hybrid.validate_scene({
+        "environment": {"gravity": 9.81}, "cable": {"sections": [section]}, "contact": {"self": True},
+        "ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
+                 "end": {"kind": "pinned", "position": [span * length, 0, 0], "motion": sway}},
+        "initial": "equilibrium", "model": "rod", "mesh": {"cells": cells}, "dimension": 3,
+        "time": {"duration": 40.0, "step": 0.02}, "output": {"every": 1000.0, "points": 5},
+    }))  # fmt: skip
+
+
+def coil(cells: int) -> hybrid.Simulation:
+    """A helix of 2.5 cm cells that falls: turns of 1 m diameter, 10 cm apart, of a cable of 2 cm."""
+    s = 0.025 * np.arange(cells + 1)
+    turn = s / np.hypot(0.5, 0.1 / (2.0 * np.pi))
+    r = np.column_stack([0.5 * np.cos(turn), 0.5 * np.sin(turn), 0.1 * turn / (2.0 * np.pi)])
+    return flying(r, 0.02, 0.001, 10.0, 0.0, 0.5)
+
+
+@pytest.mark.parametrize("shape", ["hanging", "slack", "coil"])
+def test_search_for_contact_that_is_not_there(shape: str) -> None:
+    """What a step spends on it, beside the whole step: the calls that a step makes, repeated at its end."""
+    print(f"\n{shape}: cells, step (us), Newton iterations, search for contact (us), % of the step")
+    for cells in (200, 1000, 5000, 20_000):
+        simulation = coil(cells) if shape == "coil" else hanging(cells, 0.8 if shape == "hanging" else 0.2)
+        step = simulation.scene.time.step
+        simulation.advance(3.0 * step)
+        run = simulation._loop.run
+        contact, count = run.run.contact, max(5, 20_000 // cells)
+        spent, solves = [], 0
+        for _ in range(10):
+            simulation.advance(simulation.t + step)
+            solves += run.iterations
+        each = solves / 10.0
+        for _ in range(3):
+            before, begin = run.steps, time.process_time()
+            simulation.advance(simulation.t + count * step)
+            whole = (time.process_time() - begin) / (run.steps - before)
+            assert contact.contact.counts[POINTS] == 0
+            found = 0.0
+            for what, times in ((PREPARE, 1.0), (TOUCH, each), (LIMIT, each), (FINISH, 1.0)):
+                contact.call[ASKED], begin = what, time.process_time()
+                for _ in range(10 * count):
+                    contact_task(contact._table)
+                found += times * (time.process_time() - begin) / (10 * count)
+            spent.append((found / whole, whole, found))
+        share, whole, found = sorted(spent)[1]
+        print(f"{cells:6} {1e6 * whole:9.0f} {each:5.2f} {1e6 * found:8.1f} {100.0 * share:6.2f} %")
+        assert share < 0.05
