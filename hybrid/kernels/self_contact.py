@@ -23,7 +23,7 @@ from hybrid.kernels.compile import inner, kernel
 from hybrid.kernels.generalized_alpha import scheme
 from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, REST, TOUCH
 from hybrid.kernels.references import reader
-from hybrid.kernels.report import SELF_FRICTION_WORK
+from hybrid.kernels.report import FORCE_A, SELF_FRICTION_WORK
 from hybrid.kernels.self_contact_friction import (
     GRIP,
     add_held,
@@ -351,6 +351,26 @@ def press(line, contact, touch, row):
         touch[row, i] *= 2.0 / (b - a)
 
 
+@inner
+def load_ends(line, ends, contact, report):
+    """Add the force of contact on the end nodes that are held to what the report says these bear."""
+    y, n = contact.y, line.h.shape[0]
+    for k in range(2):
+        for j in range(3):
+            y[k * n, j] = 0.0
+    for i in range(contact.counts[POINTS]):
+        point = contact.points[i]
+        p, q = int(point[P]), int(point[Q])
+        if min(p, q) == 1 or max(p, q) == n - 1:
+            add_gradient(point, y)
+            if contact.numbers[FRICTION] > 0.0:
+                add_held(line, contact, i, y)
+    for k in range(2):
+        if ends.held[k] != 0:
+            for j in range(3):
+                report[FORCE_A + 3 * k + j] -= y[k * n, j]
+
+
 @kernel
 def contact_task(table):
     """What is asked by `call[ASKED]` of the configuration old.r + work.u.
@@ -391,6 +411,8 @@ def contact_task(table):
         work.report[SELF_FRICTION_WORK] = numbers[SLIP_WORK] + numbers[TRIED] - numbers[STORED]
     if numbers[HORIZON] > 0.0 and phase in (FINISH, REST):
         look_ahead(line, ends, contact, new.v if phase == FINISH else old.v)
+    if phase == FINISH:
+        load_ends(line, ends, contact, work.report)
     if phase in (FINISH, REST):
         press(line, contact, job.touch, 2 if phase == FINISH else 0)
     if phase != TOUCH:

@@ -22,17 +22,19 @@ from hybrid.kernels.rotations import add, cross, dot, scale, sub
 from hybrid.kernels.self_contact_law import (
     ALONG,
     DISTANCE,
+    FOOT_PLACE,
     FORCE,
     NORMAL,
     PLACE,
-    RATES,
     SPRING,
     WX,
     WY,
     P,
     Q,
+    end_slopes,
     slope,
     spline_point,
+    spline_weights,
 )
 
 SAME_PLACE = 1e-6  # diameters between sample points that are the same
@@ -49,7 +51,8 @@ GRIP = 6
 @inner
 def arc_length(line, p, u):
     """Arc length, m, at u of piece p."""
-    return line.s[p] + 0.5 * (u * (line.s[p + 1] - line.s[p]) - (1.0 - u) * (line.s[p] - line.s[p - 1]))
+    w = spline_weights(line.h.shape[0], p, u)
+    return w[0] * line.s[p - 1] + w[1] * line.s[p] + w[2] * line.s[p + 1]
 
 
 @inner
@@ -72,7 +75,7 @@ def shift_of(contact, row, x):
     apart = sub(
         spline_point(x, p, (row[WX], row[WX + 1], row[WX + 2])), spline_point(x, q, (row[WY], row[WY + 1], row[WY + 2]))
     )
-    turned = add(turn_of(contact.at, x, p, row[PLACE]), turn_of(contact.at, x, q, row[RATES + 2]))
+    turned = add(turn_of(contact.at, x, p, row[PLACE]), turn_of(contact.at, x, q, row[FOOT_PLACE]))
     g = sub(apart, scale(0.5 * row[DISTANCE], cross(turned, n)))
     return sub(g, scale(dot(g, n), n)), dot(apart, n)
 
@@ -102,7 +105,7 @@ def load(line, contact, row, f, out):
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     m = scale(-0.5 * row[DISTANCE], cross(n, f))
     load_turn(line, contact.at, m, p, row[PLACE], out)
-    load_turn(line, contact.at, m, q, row[RATES + 2], out)
+    load_turn(line, contact.at, m, q, row[FOOT_PLACE], out)
 
 
 @inner
@@ -111,7 +114,8 @@ def directions(contact, row):
     p = int(row[P])
     n = (row[NORMAL], row[NORMAL + 1], row[NORMAL + 2])
     at = contact.at
-    t = slope(sub(get3(at, p), get3(at, p - 1)), sub(get3(at, p + 1), get3(at, p)), row[PLACE])
+    before, after = end_slopes(at, p)
+    t = slope(before, after, row[PLACE])
     size = math.sqrt(dot(t, t))
     t = sub(t, scale(dot(t, n), n))
     if not dot(t, t) > 1e-6 * size * size:  # the strand ends on the other: any direction does
@@ -125,7 +129,7 @@ def find_grip(line, contact, row):
     """The travel kept of a point, along and across strand p, from the nearest that was on the same strand; 0: none."""
     p, width = int(row[P]), contact.width[int(row[P])]
     at = arc_length(line, p, row[PLACE])
-    foot = arc_length(line, int(row[Q]), row[RATES + 2])
+    foot = arc_length(line, int(row[Q]), row[FOOT_PLACE])
     along, across, least = 0.0, 0.0, FOLLOWED * width
     k = contact.heads[p]
     while k >= 0:
@@ -183,7 +187,7 @@ def keep_grips(line, contact, count):
     for k in range(count):
         row, hold, grip = contact.points[k], contact.holds[k], contact.fresh[k]
         grip[PIECE], grip[AT] = row[P], arc_length(line, int(row[P]), row[PLACE])
-        grip[FOOT] = arc_length(line, int(row[Q]), row[RATES + 2])
+        grip[FOOT] = arc_length(line, int(row[Q]), row[FOOT_PLACE])
         grip[TRAVELLED], grip[TRAVELLED + 1], grip[KEPT_SPRING] = hold[TRAVEL], hold[TRAVEL + 1], row[SPRING]
 
 

@@ -3,7 +3,9 @@
 The curve is the quadratic B-spline whose control points are the nodes: one piece for every inner node p, from the
 middle of the cell before it to the middle of the cell after it, with a tangent that has no jumps,
 
-    x(u) = (1-u)^2/2 r_{p-1} + (1/2 + u - u^2) r_p + u^2/2 r_{p+1},    0 <= u <= 1
+    x(u) = a (1-u)^2/2 r_{p-1} + (1 - a (1-u)^2/2 - b u^2/2) r_p + b u^2/2 r_{p+1},    0 <= u <= 1
+
+with a = b = 1.  The first piece begins at the first node, with a = 2, and the last one ends at the last node, b = 2.
 
 A point of contact is a sample point of one piece p and its foot on another piece q, where their distance d is smallest
 along q.  With J the derivative of x - y by the six nodes and n = (x - y)/d, the energy phi(d) of a point has the
@@ -19,7 +21,7 @@ import math
 
 from hybrid.kernels.compile import inner
 from hybrid.kernels.node_forces import get3
-from hybrid.kernels.rotations import dot, sub
+from hybrid.kernels.rotations import dot, scale, sub
 
 # Distances, in diameters, at which the force of contact begins and becomes infinite: strands stay 0.94 to 1.02 apart.
 OUTER, INNER = 1.05, 0.85
@@ -29,9 +31,24 @@ FOOT_TOLERANCE = 1e-14
 
 
 @inner
-def spline_weights(u):
-    """Weights of the three nodes of a piece at u."""
-    return (0.5 * (1.0 - u) * (1.0 - u), 0.5 + u - u * u, 0.5 * u * u)
+def end_factors(n, p):
+    """The factors a and b of piece p of the curve of n cells."""
+    return 2.0 if p == 1 else 1.0, 2.0 if p == n - 1 else 1.0
+
+
+@inner
+def spline_weights(n, p, u):
+    """Weights of the three nodes of piece p of n - 1 at u."""
+    a, b = end_factors(n, p)
+    before, after = 0.5 * a * (1.0 - u) * (1.0 - u), 0.5 * b * u * u
+    return (before, 1.0 - before - after, after)
+
+
+@inner
+def end_slopes(r, p):
+    """Derivatives by u of piece p at its beginning and at its end."""
+    a, b = end_factors(r.shape[0] - 1, p)
+    return scale(a, sub(get3(r, p), get3(r, p - 1))), scale(b, sub(get3(r, p + 1), get3(r, p)))
 
 
 @inner
@@ -46,7 +63,7 @@ def spline_point(r, p, w):
 
 @inner
 def slope(before, after, v):
-    """Derivative by v of a piece between two chords."""
+    """Derivative by v of a piece with those at its beginning and at its end."""
     return (
         (1.0 - v) * before[0] + v * after[0],
         (1.0 - v) * before[1] + v * after[1],
@@ -60,10 +77,11 @@ def foot(r, q, x):
 
     smallest distance of the curve, else 0.
     """
-    before, after = sub(get3(r, q), get3(r, q - 1)), sub(get3(r, q + 1), get3(r, q))
-    bend = sub(after, before)
-    at_start = dot(sub(spline_point(r, q, (0.5, 0.5, 0.0)), x), before)  # half the derivative of the square
-    at_end = dot(sub(spline_point(r, q, (0.0, 0.5, 0.5)), x), after)
+    before, after = end_slopes(r, q)
+    bend, n = sub(after, before), r.shape[0] - 1
+    # half the derivative of the square
+    at_start = dot(sub(spline_point(r, q, spline_weights(n, q, 0.0)), x), before)
+    at_end = dot(sub(spline_point(r, q, spline_weights(n, q, 1.0)), x), after)
     if at_start >= 0.0:
         return 0.0, -1
     if at_end < 0.0:
@@ -71,7 +89,7 @@ def foot(r, q, x):
     low, high = 0.0, 1.0
     v = at_start / (at_start - at_end)
     for _ in range(FOOT_STEPS):
-        away = sub(spline_point(r, q, spline_weights(v)), x)
+        away = sub(spline_point(r, q, spline_weights(n, q, v)), x)
         along = slope(before, after, v)
         g = dot(away, along)
         if g < 0.0:
@@ -108,10 +126,10 @@ def barrier(d, width, size):
 
 # A point of contact, one row of numbers: its pieces; weights of the nodes of x and of y; n; what the law leaves across
 # n and along it; y'/d; weights of y'; phi'; 1/c, 0 where the foot stays at an end of the cable; u; d, m; spring of its
-# friction, N/m.
+# friction, N/m; v of the foot.
 P, Q, WX, WY, NORMAL, ALONG, ACROSS, SLOPE, RATES, FORCE, FOLLOWS = 0, 1, 2, 5, 8, 11, 12, 13, 16, 19, 20
-PLACE, DISTANCE, SPRING = 21, 22, 23
-POINT = 24
+PLACE, DISTANCE, SPRING, FOOT_PLACE = 21, 22, 23, 24
+POINT = 25
 
 
 @inner
@@ -120,15 +138,17 @@ def note_point(r, p, u, q, v, stays, width, size, weight, row):
 
     weight: m, length that the point stands for; stays: whether the foot is kept at an end of the cable.
     """
-    w, wy = spline_weights(u), spline_weights(v)
+    n = r.shape[0] - 1
+    w, wy = spline_weights(n, p, u), spline_weights(n, q, v)
     away = sub(spline_point(r, p, w), spline_point(r, q, wy))
     d = math.sqrt(dot(away, away))
     energy, first, second = barrier(d, width, size)
     first, second = weight * first, weight * second
-    before, after = sub(get3(r, q), get3(r, q - 1)), sub(get3(r, q + 1), get3(r, q))
+    before, after = end_slopes(r, q)
     along, bend = slope(before, after, v), sub(after, before)
     row[P], row[Q] = p, q
-    rates = (v - 1.0, 1.0 - 2.0 * v, v)
+    a, b = end_factors(n, q)
+    rates = (a * (v - 1.0), a * (1.0 - v) - b * v, b * v)
     for k in range(3):
         row[WX + k], row[WY + k] = w[k], wy[k]
         row[NORMAL + k], row[SLOPE + k], row[RATES + k] = away[k] / d, along[k] / d, rates[k]
@@ -138,6 +158,7 @@ def note_point(r, p, u, q, v, stays, width, size, weight, row):
     if not stays and first != 0.0 and curved > 0.0:
         row[FOLLOWS] = d / (first * curved)
     row[PLACE], row[DISTANCE], row[SPRING] = u, d, weight * STICKS * size / (width * width)
+    row[FOOT_PLACE] = v
     return weight * energy
 
 

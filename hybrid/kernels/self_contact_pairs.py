@@ -13,7 +13,18 @@ from hybrid.kernels.newton import LIMIT, TOUCH
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.rotations import add, dot, scale, sub
 from hybrid.kernels.self_contact_friction import GRIP, HOLD
-from hybrid.kernels.self_contact_law import INNER, OUTER, POINT, P, Q, foot, note_point, spline_point, spline_weights
+from hybrid.kernels.self_contact_law import (
+    INNER,
+    OUTER,
+    POINT,
+    P,
+    Q,
+    end_factors,
+    foot,
+    note_point,
+    spline_point,
+    spline_weights,
+)
 from hybrid.kernels.self_distance import (
     DEPTH,
     LEAF,
@@ -107,6 +118,14 @@ def blank_contact(cells: int, points: int = 1, friction: bool = False) -> Contac
 
 
 @inner
+def hull(r, p, k):
+    """Coordinate k of the three points in whose triangle piece p lies."""
+    first = r[p - 1, k] if p == 1 else 0.5 * (r[p - 1, k] + r[p, k])
+    last = r[p + 1, k] if p == r.shape[0] - 2 else 0.5 * (r[p, k] + r[p + 1, k])
+    return first, r[p, k], last
+
+
+@inner
 def fill_tree(tree, r):
     """Boxes of the pieces of nodes at r, a leaf for LEAF nodes."""
     leaves, n = tree.shape[0] // 2, r.shape[0] - 1
@@ -123,7 +142,7 @@ def fill_tree(tree, r):
                     t = f * e[k]
                     tree[leaf, 6 + k], tree[leaf, 9 + k] = min(tree[leaf, 6 + k], t), max(tree[leaf, 9 + k], t)
             for k in range(3):
-                a, b, c = 0.5 * (r[i - 1, k] + r[i, k]), r[i, k], 0.5 * (r[i, k] + r[i + 1, k])
+                a, b, c = hull(r, i, k)
                 tree[leaf, k] = min(tree[leaf, k], min(a, min(b, c)))
                 tree[leaf, 3 + k] = max(tree[leaf, 3 + k], max(a, max(b, c)))
     fill_parents(tree)
@@ -131,15 +150,35 @@ def fill_tree(tree, r):
 
 @inner
 def hull_distance(r, p, q):
-    """Distance, m, of the boxes of two pieces."""
+    """Distance, m, of the boxes of two pieces: at most their own, and the less the more a line lies across the axes."""
     square = 0.0
     for k in range(3):
-        a, b, c = 0.5 * (r[p - 1, k] + r[p, k]), r[p, k], 0.5 * (r[p, k] + r[p + 1, k])
-        d, e, f = 0.5 * (r[q - 1, k] + r[q, k]), r[q, k], 0.5 * (r[q, k] + r[q + 1, k])
+        a, b, c = hull(r, p, k)
+        d, e, f = hull(r, q, k)
         x = max(min(a, min(b, c)) - max(d, max(e, f)), min(d, min(e, f)) - max(a, max(b, c)))
         if x > 0.0:
             square += x * x
     return math.sqrt(square)
+
+
+@inner
+def chord_of(r, p):
+    """Where piece p begins and ends, and how far, m, it is from the line between these at most."""
+    x, y, z = hull(r, p, 0), hull(r, p, 1), hull(r, p, 2)
+    a, b, c = (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+    bend = sub(add(a, c), scale(2.0, b))
+    return a, c, 0.25 * math.sqrt(dot(bend, bend))
+
+
+@inner
+def least_distance(r, p, q):
+    """What two pieces are apart at least, m, however the line lies."""
+    a, c, bow = chord_of(r, p)
+    b, d, other = chord_of(r, q)
+    along, across = sub(c, a), sub(d, b)
+    x, y = nearest_feet(a, along, b, across)
+    away = sub(add(a, scale(x, along)), add(b, scale(y, across)))
+    return math.sqrt(dot(away, away)) - bow - other
 
 
 @inner
@@ -171,13 +210,13 @@ def limit_part(line, ends, contact, p, q, width, moved):
     r, numbers = contact.at, contact.numbers
     n, count = line.h.shape[0], contact.samples[p]
     for g in range(count):
-        x = spline_point(r, p, spline_weights((g + 0.5) / count))
+        x = spline_point(r, p, spline_weights(n, p, (g + 0.5) / count))
         v, side = foot(r, q, x)
         if side != 0 and 0 < q + side < n:
             beside = q + side
             if not may_touch(line, ends, contact.width, min(p, beside), max(p, beside)):
                 continue
-        away = sub(x, spline_point(r, q, spline_weights(v)))
+        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
         room = max(SAFE * (math.sqrt(dot(away, away)) - INNER * width), 0.0)
         if room < numbers[PART] * moved:
             numbers[PART] = room / moved
@@ -188,22 +227,23 @@ def gather(line, contact, p, q, width):
     """Keep the points of contact of piece p with their feet on piece q."""
     r, counts, numbers = contact.at, contact.counts, contact.numbers
     n, count, nearest = line.h.shape[0], contact.samples[p], OUTER * width
-    length = 0.25 * (line.h[p - 1] + line.h[p]) / count  # half: each strand has sample points
+    a, b = end_factors(n, p)
     fast = IMPACT * numbers[SPEED] * numbers[SPEED]
     size = 0.5 * (max(contact.stiff[p], fast * contact.mass[p]) + max(contact.stiff[q], fast * contact.mass[q]))
     for g in range(count):
         u = (g + 0.5) / count
-        x = spline_point(r, p, spline_weights(u))
+        x = spline_point(r, p, spline_weights(n, p, u))
         v, side = foot(r, q, x)
         if side != 0 and 0 < q + side < n:
             continue
-        away = sub(x, spline_point(r, q, spline_weights(v)))
+        away = sub(x, spline_point(r, q, spline_weights(n, q, v)))
         if not dot(away, away) < nearest * nearest:
             continue
         if counts[POINTS] == contact.points.shape[0]:
             counts[OVERFLOW] = 1
             return
         row = contact.points[counts[POINTS]]
+        length = 0.5 * ((1.0 - u) * a * line.h[p - 1] + u * b * line.h[p]) / count  # half: each strand has points
         numbers[ENERGY] += note_point(r, p, u, q, v, side != 0, width, size, length, row)
         counts[POINTS] += 1
 
@@ -252,7 +292,7 @@ def look_at_pair(line, ends, contact, phase, p, q):
         if SAFE * (apart - INNER * width) < contact.numbers[PART] * moved:
             limit_part(line, ends, contact, p, q, width, moved)
             limit_part(line, ends, contact, q, p, width, moved)
-        if apart - moved < OUTER * width:
+        if apart - moved < OUTER * width and least_distance(contact.at, p, q) - moved < OUTER * width:
             contact.numbers[SPEED] = max(contact.numbers[SPEED], moved)
     elif apart < OUTER * width:
         gather(line, contact, p, q, width)

@@ -54,7 +54,9 @@ class SelfContact:
         """
         n = line.h.size
         widths, pieces, bends = (mean_beside(x) for x in (width, np.diff(line.s), bending))
-        samples = np.maximum(np.ceil(pieces / (SPACING * widths)), 1)
+        lengths = pieces.copy()
+        lengths[[1, -2]] = np.maximum(lengths[[1, -2]], 2.0 * np.diff(line.s)[[0, -1]])  # begin and end at the nodes
+        samples = np.maximum(np.ceil(lengths / (SPACING * widths)), 1)
         contact = blank_contact(n, int(np.clip(2 * samples.sum(), LEAST_POINTS, MOST_POINTS)), friction > 0.0)
         contact.width[:], contact.samples[:] = widths, samples
         contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))

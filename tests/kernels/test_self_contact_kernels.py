@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from hybrid.kernels import self_contact as k
-from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE
+from hybrid.kernels.books import CLOCK_SIZE, COUNT_SIZE, TRY_END
 from hybrid.kernels.compile import kernel
 from hybrid.kernels.entry import workspace
-from hybrid.kernels.newton import ASKED, LIMIT, REST
+from hybrid.kernels.newton import ASKED, LIMIT, PREPARE, REST
 from hybrid.kernels.self_contact_law import INNER, OUTER, add_gradient, add_product
-from hybrid.kernels.self_contact_pairs import POINTS
+from hybrid.kernels.self_contact_pairs import POINTS, SPEED
 from hybrid.kernels.state import blank_line, blank_state, no_ends
 from hybrid.solve.self_contact import SelfContact
 
@@ -52,8 +52,9 @@ class Tangle:
         self.contact = SelfContact(line, np.full(n, width), np.ones(n), 1.0, friction)
         ends = no_ends()
         ends.held[:] = 0
-        clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
-        self.table = self.contact.attach(line, ends, states, self.work, clock, counts, np.zeros((3, n + 1)))
+        self.clock, counts = np.zeros(CLOCK_SIZE), np.zeros(COUNT_SIZE, np.int64)
+        self.states = states
+        self.table = self.contact.attach(line, ends, states, self.work, self.clock, counts, np.zeros((3, n + 1)))
 
     def energy(self, u: np.ndarray) -> float:
         """Energy (J) with the nodes displaced by u, m; the points of contact are then those."""
@@ -77,6 +78,14 @@ class Tangle:
         self.work.x[:, 1:4] = x
         self.contact.call[ASKED] = LIMIT
         return k.contact_task(self.table)
+
+    def speed(self, x: np.ndarray) -> float:
+        """What is found in the limit of a correction x (m) of pieces that may come into contact, m."""
+        self.states[0].v[:] = x
+        self.clock[TRY_END], self.work.u[:] = 1.0, 0.0
+        self.contact.call[ASKED] = PREPARE
+        k.contact_task(self.table)
+        return float(self.contact.contact.numbers[SPEED])
 
 
 def crossing(gap: float, angle: float = 70.0, seed: int = 0) -> np.ndarray:
@@ -134,6 +143,41 @@ def test_contact_keeps_momentum_and_angular_momentum(name: str) -> None:
     size = np.abs(g).sum()
     assert np.abs(g.sum(axis=0)).max() < 1e-14 * size
     assert np.abs(np.cross(tangle.r, g).sum(axis=0)).max() < 1e-14 * size * np.abs(tangle.r).max()
+
+
+@pytest.mark.parametrize("name", SHAPES)
+def test_contact_does_not_depend_on_how_a_line_lies(name: str) -> None:
+    """Energy, the safe part of a correction, and the speed that the size of the law in collisions follows."""
+    random, r = np.random.default_rng(2), SHAPES[name]
+    x, far = 0.3 * WIDTH * random.normal(size=r.shape), 1.2 * r + 0.05
+    found = []
+    for seed in range(6):
+        turned = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0] if seed else np.eye(3)
+        tangle, apart = Tangle(r @ turned.T), Tangle(far @ turned.T)
+        parts = tangle.limit(x @ turned.T), apart.limit(x @ turned.T)
+        found.append([tangle.energy(np.zeros_like(r)), *parts, apart.speed(x @ turned.T)])
+    assert np.allclose(found, found[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("end", [0, -1], ids=["first", "last"])
+def test_ends_of_a_line_take_part(end: int) -> None:
+    """The end of one strand stands on the middle of the other: it is the last half cell that touches."""
+    x = np.linspace(-1.0, 1.0, 21)
+    leg = np.column_stack([x, np.zeros(21), np.zeros(21)])
+    up = np.column_stack([np.zeros(16), np.zeros(16), 0.95 * WIDTH + 0.2 * np.arange(16)])
+    bow = np.linspace(0.0, np.pi, 20)[1:-1]
+    way = np.column_stack([1.0 - 0.5 * (1.0 - np.cos(bow)), 1.5 * np.sin(bow), 0.5 * (up[-1, 2]) * (1 - np.cos(bow))])
+    r = np.vstack([leg, way, up[::-1]])
+    tangle = Tangle(r if end else r[::-1].copy())
+    g = tangle.gradient(np.zeros_like(r))
+    assert tangle.count > 0 and abs(g[end, 2]) > 0.5 * np.abs(g[:, 2]).max()
+    assert np.abs(g.sum(axis=0)).max() < 1e-13 * np.abs(g).sum()
+    still, shift = np.zeros_like(r), np.random.default_rng(0).normal(size=r.shape)
+    slope = (tangle.energy(still + 1e-8 * shift) - tangle.energy(still - 1e-8 * shift)) / 2e-8
+    assert slope == pytest.approx(np.vdot(g, shift), rel=1e-5)
+    push = np.zeros_like(r)
+    push[end, 2] = -WIDTH
+    assert 0.0 < tangle.limit(push) < 0.2
 
 
 def test_no_contact_no_energy() -> None:
