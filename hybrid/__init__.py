@@ -43,6 +43,7 @@ if TYPE_CHECKING:
     from hybrid.view.plots import plot_zones
     from hybrid.view.quantities import plot_energy, plot_quantity, plot_shape, plot_zone_map
     from hybrid.view.report import write_report as report
+    from hybrid.view.space import plot_space
 
 _HOME = {
     "ComputationError": ("hybrid.errors", "ComputationError"),
@@ -73,6 +74,7 @@ _HOME = {
     "plot_energy": ("hybrid.view.quantities", "plot_energy"),
     "plot_quantity": ("hybrid.view.quantities", "plot_quantity"),
     "plot_shape": ("hybrid.view.quantities", "plot_shape"),
+    "plot_space": ("hybrid.view.space", "plot_space"),
     "plot_zone_map": ("hybrid.view.quantities", "plot_zone_map"),
     "plot_zones": ("hybrid.view.plots", "plot_zones"),
     "report": ("hybrid.view.report", "write_report"),
@@ -120,6 +122,7 @@ __all__ = [
     "plot_energy",
     "plot_quantity",
     "plot_shape",
+    "plot_space",
     "plot_zone_map",
     "plot_zones",
     "report",

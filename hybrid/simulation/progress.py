@@ -18,6 +18,7 @@ from typing import TextIO
 
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import Resolution
+from hybrid.simulation.notebook_progress import in_notebook, notebook_bar
 
 PRE_RUN, ESTIMATION, RESULT, REFINEMENT = "mesh pre-run", "error estimation", "result", "refinement"
 
@@ -61,8 +62,10 @@ Listener = Callable[[Progress], None]
 
 
 def listener_of(progress: bool | Listener) -> Listener | None:
-    """The listener that a caller asks for; True: one line on the error stream."""
-    return StatusLine() if progress is True else progress or None
+    """The listener that a caller asks for; True: a bar in a notebook, elsewhere one line on the error stream."""
+    if progress is not True:
+        return progress or None
+    return (notebook_bar() if in_notebook() else None) or StatusLine()
 
 
 def cost_of(resolution: Resolution, result: Resolution) -> float:

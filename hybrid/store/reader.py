@@ -382,6 +382,10 @@ class Result(Histories):
             text += f"last zones {joined(list(map(str, self.zones[-1])))}; "
         return f"<{text}{self.status_text}>"
 
+    def _ipython_display_(self) -> None:
+        """Show the card and the cable in space in a notebook; elsewhere IPython takes one of the other ways."""
+        import_module("hybrid.view.notebook").show(self)  # by name: the store imports no view
+
     def _repr_html_(self) -> str:
         """What a notebook shows; of a result that cannot be drawn, what a terminal shows."""
         try:

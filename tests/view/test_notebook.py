@@ -1,0 +1,155 @@
+"""A result in a notebook: its figure in space, a page made of the notebook in a browser, progress as a widget."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from reported import reported
+from test_report_browser import browser  # noqa: F401  # a fixture
+
+import hybrid
+from hybrid.simulation import notebook_progress
+from hybrid.simulation.progress import Progress, StatusLine, listener_of
+from hybrid.view.notebook import MIME, bundle
+from hybrid.view.space import MOST_FRAMES, MOST_POINTS
+
+CELL = f"""
+import sys
+sys.path.insert(0, {str(Path(__file__).parents[1])!r})
+from hybrid.simulation.progress import Progress, listener_of
+from reported import reported
+tell = listener_of(True)  # what `hybrid.run(.., progress=True)` calls
+for t in (2.0, 10.0):
+    tell(Progress(t, 10.0, 5, 3, (), 0.5, fraction=t / 10.0))
+tell.close()
+reported(outputs=41)
+"""
+
+
+@pytest.fixture(scope="module")
+def figure() -> Any:
+    return hybrid.plot_space(reported(outputs=301, points=201))
+
+
+def curves(traces: Any) -> list[Any]:
+    return [trace for trace in traces if trace.type == "scatter3d" and trace.mode == "lines" and trace.x[0] is not None]
+
+
+def test_the_slider_has_the_moments_of_the_result(figure: Any) -> None:
+    result = reported(outputs=301, points=201)
+    steps = figure.layout.sliders[0].steps
+    assert len(steps) == len(figure.frames) == MOST_FRAMES
+    for k, output in ((0, 0), (40, 150), (80, 300)):
+        assert float(steps[k].label) == pytest.approx(result.times[output], rel=1e-3)
+        frame = next(frame for frame in figure.frames if frame.name == steps[k].args[0][0])
+        (line,) = curves(frame.data)
+        assert len(line.x) == MOST_POINTS
+        drawn = np.column_stack([line.x, line.y, line.z])
+        places = result.at(s=np.asarray(line.customdata), names=["position"])["position"][output]
+        assert np.abs(drawn - places).max() < 1e-3  # of four bytes, at points that are nearly those of s
+        assert figure.data[frame.traces[0]].type == "scatter3d"
+
+
+def test_what_is_drawn_besides(figure: Any) -> None:
+    assert {"seabed", "touchdown", "start", "end", "catenary", "rod"} <= {trace.name for trace in figure.data}
+    low, high = figure.layout.scene.zaxis.range
+    assert low <= -30.0 <= high, "the seabed is in the box"
+
+
+def test_colours_and_refusals() -> None:
+    result = reported()
+    line = curves(hybrid.plot_space(result, "tension").frames[5].data)[0].line
+    assert np.allclose(line.color, 1e-3 * result.tension[5], rtol=1e-5) and line.showscale  # kN
+    with pytest.raises(hybrid.ResultError, match="zone or tension or curvature"):
+        hybrid.plot_space(result, "colour")
+    with pytest.raises(hybrid.ResultError, match="no output"):
+        hybrid.plot_space(reported(outputs=0))
+    still = hybrid.plot_space(reported(outputs=1))
+    assert not still.frames and not still.layout.sliders
+
+
+def test_a_cell_is_small_and_brings_the_script_once(figure: Any) -> None:
+    later = bundle(figure, with_script=False)
+    assert len(str(later[MIME])) < 500e3 and len(later["text/html"]) < 500e3
+    assert "DecompressionStream" in bundle(figure, with_script=True)["text/html"]
+    assert "<script>" in later["text/html"] and "</script>" not in later["text/html"][:-9]
+    hostile = bundle(hybrid.plot_space(reported(title="</script><b>x")), with_script=False)["text/html"]
+    assert hostile.count("</script>") == 1 and "<b>" not in hostile
+
+
+def test_outside_a_notebook_ipython_shows_something_else() -> None:
+    with pytest.raises(NotImplementedError):  # IPython's sign for it
+        reported()._ipython_display_()
+
+
+def test_progress_is_text_where_there_is_no_notebook_or_no_widget(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert isinstance(listener_of(True), StatusLine)
+    monkeypatch.setattr("hybrid.simulation.progress.in_notebook", lambda: True)
+    monkeypatch.setitem(__import__("sys").modules, "ipywidgets", None)
+    assert isinstance(listener_of(True), StatusLine)
+    assert 'pip install "hybrid-cable[notebook]"' in capsys.readouterr().err
+    assert listener_of(False) is None
+
+
+def test_the_bar_follows_the_run(monkeypatch: pytest.MonkeyPatch) -> None:
+    widgets = pytest.importorskip("ipywidgets")
+    bar = notebook_progress.NotebookBar(widgets)
+    shown: list[Any] = []
+    monkeypatch.setattr("IPython.display.display", shown.append)
+    for t in (1.0, 4.0):
+        bar(Progress(t, 10.0, 5, 3, (), 0.5, fraction=t / 10.0))
+    (box,) = shown
+    assert box.children[0].value == 0.4 and "40 % done" in box.children[1].value
+    bar.close()
+    assert box.children[0].bar_style == "warning"
+
+
+@pytest.mark.slow  # a kernel, and a browser that starts plotly
+def test_a_notebook_made_into_a_page_moves_its_line(tmp_path: Path, browser: Any) -> None:  # noqa: F811
+    """Executed by nbclient, exported by nbconvert, opened in Chromium without a network: the slider moves the line."""
+    nbformat, nbclient = pytest.importorskip("nbformat"), pytest.importorskip("nbclient")
+    nbconvert = pytest.importorskip("nbconvert")
+    book = nbformat.v4.new_notebook(cells=[nbformat.v4.new_code_cell(CELL)])
+    nbclient.NotebookClient(book, kernel_name="python3", timeout=300).execute()
+    outputs = [output for output in book.cells[0].outputs if "data" in output]
+    assert [k for output in outputs for k in output["data"] if "json" in k] == [
+        "application/vnd.jupyter.widget-view+json",
+        MIME,
+    ]
+    states = book.metadata.widgets["application/vnd.jupyter.widget-state+json"]["state"].values()
+    (bar,) = [x["state"] for x in states if x["model_name"] == "FloatProgressModel"]
+    (words,) = [x["state"] for x in states if x["model_name"] == "LabelModel"]
+    assert bar["value"] == 1.0 and "100 % done" in words["value"]
+
+    page_file = tmp_path / "book.html"
+    page_file.write_text(nbconvert.HTMLExporter().from_notebook_node(book)[0], encoding="utf-8")
+    page = browser.new_page(viewport={"width": 1000, "height": 1100})
+    problems: list[str] = []
+    page.on("pageerror", lambda error: problems.append(str(error)))
+    page.route("http*://**", lambda route: route.abort())  # what nbconvert's page asks for: RequireJS and MathJax
+    page.goto(page_file.as_uri())
+    page.wait_for_selector("[data-drawn]", timeout=60_000)
+    end = "(() => { const all = document.querySelector('[data-drawn]')._fullData.filter((x) => x.mode === 'lines');"
+    end += " return all[0].z[all[0].z.length - 1]; })()"
+    assert page.evaluate(end) == pytest.approx(0.0, abs=1e-6)
+    rail = page.query_selector(".slider-rail-touch-rect")
+    rail.scroll_into_view_if_needed()
+    box = rail.bounding_box()
+    heights = []
+    for part in (0.25, 0.75):
+        page.mouse.click(box["x"] + part * box["width"], box["y"] + box["height"] / 2)
+        page.wait_for_timeout(500)
+        heights.append(page.evaluate(end))
+    assert heights == pytest.approx([2.0, -2.0], abs=0.1), "the end heaves by 2 m every 10 s"
+    from PIL import Image
+
+    picture = Image.open(io.BytesIO(page.query_selector("[data-drawn]").screenshot())).convert("RGB")
+    blue = (np.abs(np.asarray(picture).astype(int) - (0x00, 0x72, 0xB2)).max(axis=2) < 40).sum()
+    assert blue > 300 and not problems, "the line in the colour of catenaries"
+    page.close()
