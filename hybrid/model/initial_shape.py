@@ -114,8 +114,10 @@ def dead_loads(line: Line) -> Floats:
     return loads
 
 
-def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
+def hung(scene: Scene, line: Line, sea: Sea, clamp_leads: bool = True) -> Hanging | None:
     """The elastic catenary that a search for equilibrium starts from; None where it does not apply or stays slack.
+
+    clamp_leads: whether a line that is clamped at one end and free at the other has none.
 
     All loads but contact and bending: weight, full buoyancy, attachments, end forces, and the drag of the
     current on the shape found so far.
@@ -127,7 +129,9 @@ def hung(scene: Scene, line: Line, sea: Sea) -> Hanging | None:
         return None
     places = [end.held_position for end in scene.ends.both]
     stiff = any(end.held_tangent for end in scene.ends.both)
-    if not any(places) or (stiff and not all(places)):  # what is clamped at one end starts along its clamp
+    if not any(places) or (
+        clamp_leads and stiff and not all(places)
+    ):  # what is clamped at one end starts along its clamp
         return None
     loads = dead_loads(line)
     floating = _floating_end(scene, line)

@@ -12,6 +12,7 @@ import numpy as np
 from hybrid.errors import Complaint, SceneError
 from hybrid.model.build import HUNG, Model, build
 from hybrid.model.contents import Entry
+from hybrid.model.initial_shape import hung
 from hybrid.model.material import material
 from hybrid.model.mesh import Zone
 from hybrid.model.model_costs import structural, with_model
@@ -194,10 +195,14 @@ def _plan(scene: Scene) -> Plan:
 
 
 def _critical_torque(scene: Scene, model: Model) -> CriticalTorque | None:
-    """Of the elastic catenary that a search of equilibrium starts from."""
-    cable, line, T = model.cable, model.line, model.start.T
-    if not (cable.passes_torque and model.start_shape == HUNG and T.min() > 0.0):
+    """Of the elastic catenary that a search of equilibrium starts from, or would without a clamp at one end."""
+    cable, line = model.cable, model.line
+    if not cable.passes_torque:
         return None
+    hangs = model.start if model.start_shape == HUNG else hung(scene, line, model.sea.values, clamp_leads=False)
+    if hangs is None or not hangs.T.min() > 0.0:
+        return None
+    T = hangs.T
     middle = 0.5 * (line.s[:-1] + line.s[1:])
     EI = cable.weakest_bending[cable.piece(middle)]
     if not EI.min() > 0.0:

@@ -34,3 +34,25 @@ def trapped_loop(result: Result, found: Along, torque: np.ndarray) -> dict[str, 
             if np.isfinite(margin):
                 best["kink_margin"] = margin
     return best
+
+
+def held_loop(result: Result, found: Along, torque: np.ndarray, tension: np.ndarray) -> dict[str, float] | None:
+    """Of the outputs (nt,) at which the line touches itself, that at which a loop is nearest to being pulled open.
+
+    torque, tension: (nt, n) N m, N.  Returns its time (s), and over the largest tension there, the tension at which a
+    loop of the torque of that output pops out; None: no contact is computed or found, or no loop is trapped.
+    """
+    diameter, stiffness = found.of(result, "diameter"), found.of(result, "bending_stiffness")
+    if diameter is None or stiffness is None or "energy/self_contact" not in result:
+        return None
+    best: dict[str, float] | None = None
+    for k in np.flatnonzero(np.asarray(result["energy/self_contact"]) > 0.0):
+        i = int(np.abs(torque[k]).argmax())
+        loop = pop_out(float(torque[k, i]), float(stiffness[i]), float(diameter[i])) if diameter[i] > 0.0 else None
+        most = float(tension[k].max())
+        if loop is None or not most > 0.0:
+            continue
+        margin = loop.tension / most
+        if best is None or margin < best["pop_out_margin"]:
+            best = {"pop_out_margin": margin, "pop_out_time": float(result.times[k])}
+    return best

@@ -19,7 +19,7 @@ from hybrid.store.limits import held_of
 from hybrid.store.reader import Result
 from hybrid.store.records import Event
 from hybrid.view.along import along
-from hybrid.view.loops import trapped_loop
+from hybrid.view.loops import held_loop, trapped_loop
 from hybrid.view.projections import STILL, free_edges
 from hybrid.view.style import NEWS, ZERO, prefix, short
 from hybrid.view.worst import Worst, limits_of, worst
@@ -348,6 +348,13 @@ def _hockling(result: Result) -> Fact:
             kinks = loop["kink_margin"] < 1.0
             text += f", {short(loop['kink_margin'], 3)} of the radius allowed" + (": it kinks first" if kinks else "")
         text += "."
+    if (held := held_loop(result, found, torque, np.asarray(tension))) is not None:
+        values |= held
+        then = moment(result, held["pop_out_time"])
+        text += (
+            f" While the cable touches itself, a loop would be pulled open by {short(held['pop_out_margin'], 3)} times "
+            f"its tension{then}, at no other output by less."
+        )
     return Fact("hockling", title, f"{text} {HOCKLING}.", weight, values, t, s)
 
 

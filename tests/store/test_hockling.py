@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -105,3 +107,13 @@ def test_the_plan_names_the_torque_from_which_a_hanging_line_can_throw_a_loop() 
     assert critical.s == pytest.approx(0.5 * length, abs=length / 200)
     scene["cable"]["attachments"] = [{"kind": "swivel", "at": 10.0}]  # there is no torque
     assert hybrid.plan(hybrid.validate_scene(scene)).critical_torque is None
+
+
+def test_the_plan_of_a_line_with_a_load_that_is_held_against_turning() -> None:
+    """Clamped above, guided below: 2 sqrt(EI F) in its lowest cell; its torque is c times the mean tension."""
+    plan = hybrid.plan(Path(__file__).parents[2] / "examples" / "armoured_cable.yaml")
+    critical = plan.critical_torque
+    assert critical is not None and critical.s == pytest.approx(249.5)
+    weight = (2.0 - 1025.0 * np.pi * 0.025**2 / 4.0) * 9.80665  # N/m
+    assert critical.torque == pytest.approx(2.0 * np.sqrt(4.0 * (6000.0 + 0.5 * weight)), rel=1e-6)
+    assert critical.of_tension == pytest.approx(0.004 * (6000.0 + 125.0 * weight), rel=1e-4)

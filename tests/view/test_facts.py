@@ -93,6 +93,20 @@ def test_the_loop_of_the_largest_torque_is_held_against_the_bend_radius() -> Non
     assert "kinks first" in fact(reported(torque=2000.0, allowed=0.2), "hockling").text
 
 
+def test_a_loop_in_contact_is_held_against_what_would_pull_it_open() -> None:
+    """At t = 2.5 s the tension is largest, 10 kN (1.1 + s/100) at the end of the outputs in contact."""
+    result = reported(torque=2000.0, through=True)
+    touches = np.zeros(len(result.times))
+    touches[3:7] = 1.0  # t = 1.5 to 3 s
+    result._dims = {**result._dims, "energy/self_contact": ("t",)}
+    result._cache["energy/self_contact"] = touches
+    found = fact(result, "hockling")
+    assert found.values["pop_out_time"] == 2.5
+    assert found.values["pop_out_margin"] == pytest.approx(found.values["pop_out_tension"] / 21e3, rel=1e-3)
+    assert "be pulled open" in found.text and "not in it" in found.text
+    assert "pop_out_margin" not in fact(reported(torque=2000.0, through=True), "hockling").values
+
+
 def test_torque_of_catenaries_counts() -> None:
     """The smallest tension is in a catenary, where the same torque asks for the same."""
     found = fact(reported(torque=2000.0, through=True), "hockling")
