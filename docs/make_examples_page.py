@@ -18,8 +18,7 @@ ENTRIES = ("Shows", "Physics", "Look at", "Run time", "Source")
 HEAD = """\
 # Examples
 
-Every scene here is a file of `examples/`, commented line by line; copy the one that is nearest to your cable and
-change it.
+Use this page to find a scene to copy: every one is a file of `examples/`, commented line by line.
 The tests run all of them (tests/test_examples.py).
 Run times are of one core of a 2024 server, without the compilation of the first run.
 

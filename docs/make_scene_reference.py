@@ -23,6 +23,7 @@ PAGE = Path(__file__).with_name("scene.md")
 HEAD = """\
 # The scene
 
+Use this page to look up every key of a scene: meaning, unit, bounds and default.
 A scene is a YAML file, or the same tables in Python: `hybrid.validate_scene({...})`.
 SI units; the inertial frame has z up; arc length s is unstretched and runs from `ends.start` to `ends.end`.
 Angles are in degrees, as people write them.
@@ -32,6 +33,8 @@ you type;
 `hybrid run scene.yaml --set time.step=0.005` changes a value without touching the file.
 
 This page is made from that schema by `python docs/make_scene_reference.py`.
+Each table has a heading to link to, such as `scene.html#section`, and is closed: its line of keys opens it, a link to
+it does as well, and *Open all tables* opens all, to search the page.
 
 ## The least that is needed
 
@@ -372,6 +375,16 @@ def table(schema: dict[str, Any]) -> Iterator[str]:
         yield "| " + " | ".join(cell.replace("|", "\\|") for cell in cells) + " |"
 
 
+def folded(schema: dict[str, Any]) -> Iterator[str]:
+    """The table, closed: its keys stand in the line that opens it, those that are required first and bold."""
+    names, required = list(schema["properties"]), schema.get("required", [])
+    marked = [f"<b><code>{name}</code></b>" for name in names if name in required]
+    marked += [f"<code>{name}</code>" for name in names if name not in required]
+    yield from ('<details markdown="1">', f"<summary>{', '.join(marked)}</summary>", "")
+    yield from table(schema)
+    yield from ("", "</details>")
+
+
 def referred(schema: Any) -> Iterator[str]:
     """Names of the tables a schema refers to, in the order they are met."""
     if isinstance(schema, dict):
@@ -417,7 +430,8 @@ def page() -> str:
             visit(name)
         lines += [f"## {title}", "", " ".join(schema["description"].split()), "", *table(schema), ""]
         for name in order[known:]:
-            lines += [f"### {name}", "", " ".join(tables[name]["description"].split()), "", *table(tables[name]), ""]
+            text = " ".join(tables[name]["description"].split())
+            lines += [f"### {name}", "", text, "", *folded(tables[name]), ""]
     return "\n".join([*lines, *former_names(), TAIL])
 
 

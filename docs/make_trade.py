@@ -28,6 +28,7 @@ BEGIN, END = "<!-- {} -->\n", "<!-- end of {} -->\n"
 HEAD = """\
 # Error against cost
 
+Use this page to choose model and accuracy by what they cost on your scene.
 `hybrid trade scene.yaml` computes a scene with every model at several accuracies, compares errors with CPU time, and
 recommends a setting.
 

@@ -20,6 +20,7 @@ PAGE = Path(__file__).parents[1] / "docs" / "validation.md"
 HEAD = """\
 # Validation
 
+Use this page to see how well results agree with exact and published solutions.
 Every figure below was measured by the test named beside it, in one session of
 `pytest tests/validation -m "not bench" --write-validation`, which wrote this page.  A tolerance is one of three kinds: *round-off*; *discretisation*, an order
 and a bound, where an order that is too high fails as well; *published*, the digits printed in the

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from test_report_browser import browser  # noqa: F401  # a fixture
 
 import hybrid
 from hybrid.errors import EVENTS_BY_WEIGHT, ZONE_EVENTS, Outcome
@@ -85,6 +86,29 @@ def test_every_public_name_is_on_the_page() -> None:
     assert sorted(re.findall(r"^::: hybrid\.(\w+)$", text, re.MULTILINE)) == sorted(hybrid.__all__)
 
 
+def test_every_page_begins_with_what_it_is_for() -> None:
+    for page in sorted(DOCS.glob("*.md")):
+        first = page.read_text(encoding="utf-8").split("\n\n")[1]
+        assert re.match(r"Use this page to [^.]*[^.]*[.:]", first.replace("examples/", "")), (
+            f"{page.name}: {first[:80]}"
+        )
+
+
+def test_tables_of_the_scene_reference_are_closed_and_name_their_keys() -> None:
+    text = (DOCS / "scene.md").read_text(encoding="utf-8")
+    folds = re.findall(
+        r"^### (\w+)\n\n.*\n\n<details markdown=\"1\">\n<summary>(.*)</summary>\n\n((?:\|.*\n)+)\n</details>$",
+        text,
+        re.M,
+    )
+    assert len(folds) > 40 and len({name for name, _, _ in folds}) == len(folds), "headings to link to"
+    for name, summary, table in folds:
+        keys = set(re.findall(r"^\| `(\w+)` \|", table, re.M))
+        assert set(re.findall(r"<code>(\w+)</code>", summary)) == keys, name
+    links = set(re.findall(r"\]\(#(\w+)\)", text))
+    assert links <= {name.lower() for name, _, _ in folds}
+
+
 # --- equations -------------------------------------------------------------------------------------
 
 
@@ -122,20 +146,41 @@ def test_prose_keeps_what_is_no_equation() -> None:
 # --- the site --------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_the_site_is_built_strictly_and_asks_no_other_host(tmp_path: Path) -> None:
-    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(tmp_path / "site")]
+@pytest.fixture(scope="module")
+def site(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The folder of the site."""
+    folder = tmp_path_factory.mktemp("manual") / "site"
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "-q", "-d", str(folder)]
     done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr
-    pages = sorted((tmp_path / "site").rglob("*.html"))
+    return folder
+
+
+@pytest.mark.slow
+def test_the_site_is_built_strictly_and_asks_no_other_host(site: Path) -> None:
+    pages = sorted(site.rglob("*.html"))
     assert len(pages) > 12
     asks = r"<(?:script|img|iframe|source)\b[^>]*\bsrc=\"(?:https?:)?//|<link\b[^>]*\bhref=\"(?:https?:)?//"
     for page in pages:
         assert not re.search(asks, page.read_text(encoding="utf-8")), page
-    for sheet in (tmp_path / "site").rglob("*.css"):
+    for sheet in site.rglob("*.css"):
         assert not re.search(r"url\([\"']?(?:https?:)?//|@import", sheet.read_text(encoding="utf-8")), sheet
-    index = (tmp_path / "site" / "index.html").read_text(encoding="utf-8")
-    assert '<script src="manual/iframe-worker.js">' in index and (tmp_path / "site/search/search_index.js").is_file()
-    assert "<math" in (tmp_path / "site" / "theory.html").read_text(encoding="utf-8")
-    api = (tmp_path / "site" / "api.html").read_text(encoding="utf-8")
+    index = (site / "index.html").read_text(encoding="utf-8")
+    assert '<script src="manual/iframe-worker.js">' in index and (site / "search" / "search_index.js").is_file()
+    assert "<math" in (site / "theory.html").read_text(encoding="utf-8")
+    api = (site / "api.html").read_text(encoding="utf-8")
     assert all(f'id="hybrid.{name}"' in api for name in hybrid.__all__)
+
+
+@pytest.mark.slow
+def test_a_link_to_a_closed_table_opens_it(site: Path, browser: Any) -> None:  # noqa: F811
+    page = browser.new_page(viewport={"width": 400, "height": 800})
+    page.goto((site / "scene.html").as_uri() + "#section")
+    is_open = "name => document.getElementById(name).parentElement.querySelector(`#${name} ~ details`).open"
+    assert page.evaluate(is_open, "section") and not page.evaluate(is_open, "clump")
+    page.evaluate("location.hash = 'clump'")
+    page.wait_for_function("document.querySelector('#clump ~ details').open")
+    page.click("text=Open all tables")
+    assert page.evaluate("[...document.querySelectorAll('article details')].every((fold) => fold.open)")
+    assert page.evaluate("document.documentElement.scrollWidth <= innerWidth"), "no sideways scrolling on a phone"
+    page.close()

@@ -55,7 +55,8 @@ def listed() -> dict[str, str]:
 HEAD = """\
 # Extreme cases
 
-Where each model holds, degrades and refuses.  Every line below was computed, and this page written, by
+Use this page to see where each model holds, where it warns, and where it refuses.
+Every line below was computed, and this page written, by
 `pytest tests/extremes -m "not bench" --write-extremes`.
 
 *Right*: within the tolerance of the truth, by the figure that comes nearest to it.  *Warned*: not within it, and the
