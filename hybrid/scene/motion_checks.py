@@ -210,6 +210,19 @@ def shortest_period(ends: Ends, environment: Environment | None) -> float:
     return min(times, default=math.inf)
 
 
+def stationary_from(scene: Scene) -> tuple[float, float] | None:
+    """From when on (s) all that moves or loads a line is periodic or a stationary sea, and the longest period (s).
+
+    None: it is not, or cannot be known: of a file, a velocity, line that is paid out, an end that is let go.
+    """
+    ends, environment = scene.ends, scene.environment
+    periods = _all_periods(ends, environment)
+    changes = [getattr(end, "payout", None) or end.release for end in ends.both]
+    if not periods or any(changes) or ends.files() or any(m.velocity for _, _, m in _motions(ends)):
+        return None
+    return max(ramp_ends(scene), default=0.0), max(periods.values())
+
+
 def prescribed_twist(ends: Ends) -> float:
     """The most (rad) by which both ends together can twist a rod, turns and motions added; 0 where one turns freely."""
     if not all(end.holds_twist for end in ends.both):

@@ -33,7 +33,7 @@ from hybrid.simulation.beside import beside, thread_count
 from hybrid.simulation.equilibrium import equilibrium_of
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.initial_zones import zones_at_start
-from hybrid.simulation.mesh_survey import POINTS, Survey, survey_resolution
+from hybrid.simulation.mesh_survey import POINTS, Survey, survey_duration, survey_resolution
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, REFINEMENT, RESULT, ProgressReporter
 from hybrid.simulation.restart import LoadChange, changes_text
 from hybrid.simulation.restore import program, refused, resolution_from, resolution_tree, restored_parts
@@ -273,8 +273,8 @@ class Case:
         self._unwanted.clear()
         return beside(samples, threads, self.progress.look, self._unwanted.set)
 
-    def sample(self, resolution: Resolution, points: Floats | None = None) -> RunSample:
-        """Compute for comparison only; points: places, m, instead of those of the result.
+    def sample(self, resolution: Resolution, points: Floats | None = None, until: float | None = None) -> RunSample:
+        """Compute for comparison only; points: places, m, instead of those of the result; until: s, None: to the end.
 
         A resolution with longer steps has as many times fewer outputs, to save time, and so that outputs do not
         shorten its steps where these end at outputs.
@@ -282,7 +282,7 @@ class Case:
         begin = clock.thread_time()
         self.progress.begin(ESTIMATION if points is None else PRE_RUN, resolution)
         model, equilibrium, switching = self._start(resolution)
-        loop = self._loop(self.scene, model, resolution, switching, None, points=points)
+        loop = self._loop(self.scene, model, resolution, switching, None, points=points, until=until)
         numbers = len(loop.run.run.books.outputs) * sum(math.prod(field.shape) for field in loop.observer.fields)
         if self.beside_result is not None and points is None and numbers > MOST_IN_MEMORY:
             loop.recorder = RowsRecorder(rows_path(self.beside_result, rows_key(resolution)), FORCE_COLUMNS)
@@ -290,7 +290,7 @@ class Case:
         assert isinstance(found, MemoryRecorder)
         try:
             loop.begin(equilibrium)
-            loop.to_the_end(self._duration, self._exact, self.changes)
+            loop.to_the_end(until or self._duration, self._exact, self.changes)
         finally:
             found.close("", "")
         values, errors = split_outputs({name: found[name] for name in found.names})
@@ -318,15 +318,15 @@ class Case:
 
         ComputationError: it failed in steps as short as those of the result too, and the scene gives cells to a layer.
         """
-        coarse = survey_resolution(resolution)
+        coarse, until = survey_resolution(resolution), None if self.changes else survey_duration(self.scene)
         s = np.linspace(0.0, self.scene.length, POINTS)
         try:
-            found = self.sample(coarse, s).values
+            found = self.sample(coarse, s, until).values
         except ComputationError:
             if self.scene.resolution is None:
                 return None
             coarse = coarse.coarser(steps=resolution.step / coarse.step)  # as short as those of the result
-            found = self.sample(coarse, s).values
+            found = self.sample(coarse, s, until).values
         return Survey.of(self.scene, resolution, build(self.scene, coarse), s, found)
 
     # --- parts of a run -------------------------------------------------------------------------
@@ -349,6 +349,7 @@ class Case:
         target: Path | io.BytesIO | None,
         correction: Correction | None = None,
         points: Floats | None = None,
+        until: float | None = None,
     ) -> TimeLoop:
         """The loop of a run, as yet without a state; scene: the one that holds at present."""
         if correction is None and model.follows_error:
@@ -356,6 +357,8 @@ class Case:
         times = output_times(self.scene)
         if target is None and resolution.every > 1:
             times = [*times[resolution.every - 1 : -1 : resolution.every], times[-1]]
+        if until is not None and until < times[-1]:
+            times = [t for t in times if t < until] + [until]
         run = Transient(scene, model, resolution, switching, correction, EventLog(), [0.0, *times], target is not None)
         if points is None:
             points = self.points.s

@@ -29,6 +29,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.scene.schema import Scene
 from hybrid.simulation.error_estimate import Errors, Estimate
+from hybrid.simulation.error_forecast import forecast
 from hybrid.simulation.error_order import COARSER
 from hybrid.simulation.error_statistics import (
     LARGEST,
@@ -107,6 +108,7 @@ class ErrorController:
     irregular: bool = False
     choice: ModelChoice = NAMED  # of a scene that names no model
     runs: list[float] = field(default_factory=list)  # s of processor time, of all runs so far
+    first: Resolution | None = None  # that the runs to compare with are for; the result may be finer
     next: Resolution | None = None  # of the result that is to be computed
     comparisons: tuple[RunSample, RunSample | None, RunSample | None] | None = None  # for the first result
     estimate: Estimate | None = None  # of the result as it is
@@ -153,14 +155,24 @@ class ErrorController:
 
     def start(self, resolution: Resolution) -> tuple[RunSample, Errors | None]:
         """From a first resolution to the result and its errors, None where they cannot be estimated."""
-        self.comparisons, self.next = self._compute_comparisons(resolution), resolution
+        self.comparisons, self.first = self._compute_comparisons(resolution), resolution
+        self.next = self._forecast(resolution)
         return self.proceed()
+
+    def _forecast(self, resolution: Resolution) -> Resolution:
+        """How finely the first result is computed: finer, where the runs to compare with show that it must be."""
+        if self.comparisons is None or self.asked is None or not self.moves or self.irregular:
+            return resolution
+        coarse, rough, coarsest = self.comparisons
+        if coarsest is None:
+            return resolution
+        return forecast(self.asked, resolution, self.free, (coarse, rough, coarsest))
 
     def proceed(self) -> tuple[RunSample, Errors | None]:
         """The same from the next result on."""
         if self._lost and self.next is not None:
             self.runs, self._notes, self._lost = [], [], False
-            self.comparisons = self._compute_comparisons(self.next)
+            self.comparisons = self._compute_comparisons(self.first or self.next)
         while self.next is not None:
             resolution = self.next
             try:
@@ -396,6 +408,7 @@ class ErrorController:
         """What it has found until now, as named arrays and plain values."""
         return {
             "runs": np.array(self.runs), "next": self.next and resolution_tree(self.next),
+            "first": self.first and resolution_tree(self.first),
             "coarse": self.comparisons and [x and x.checkpoint() for x in self.comparisons],
             "estimate": self.estimate and self.estimate.checkpoint(),
             "statistics": {name: x.checkpoint() for name, x in self.statistics.items()}, "every": self._every,
@@ -410,15 +423,15 @@ class ErrorController:
         ResultError or ValueError: it is none of this scene.
         """
         template = {"runs": np.zeros(0), "ratio": np.inf, "finer": 0, "every": 1, "irregular": False}
-        names = ("next", "coarse", "estimate", "statistics", "scattered", "notes", "choice")
-        saved = matched({"choice": ["", ""], **tree}, template | dict.fromkeys(names), "error control")
+        names = ("next", "first", "coarse", "estimate", "statistics", "scattered", "notes", "choice")
+        saved = matched({"choice": ["", ""], "first": None, **tree}, template | dict.fromkeys(names), "error control")
         shape = len(output_times(scene)) + 1, points.s.size, points.jumps.size
         self.runs, self._ratio, self._judged = saved["runs"].tolist(), saved["ratio"], saved["finer"]
         self._every, self.irregular = saved["every"], saved["irregular"]
         if self._every < 1:
             raise ValueError("statistics of no outputs")
         self._notes = list(restored_notes(saved["notes"]))
-        self.next = resolution_from(saved["next"], scene) if saved["next"] is not None else None
+        self.next, self.first = (x and resolution_from(x, scene) for x in (saved["next"], saved["first"]))
         if saved["coarse"] is not None:
             try:
                 first, second, third = (x and restored_sample(x, scene, shape, source) for x in saved["coarse"])

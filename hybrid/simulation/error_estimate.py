@@ -20,12 +20,15 @@ from hybrid.simulation.error_order import (
     MOST_ORDER,
     ORDERS,
     around,
+    as_halved,
     at_all_outputs,
     falls,
     magnitude,
     order,
+    refinement,
     squares,
     start_change,
+    step_share,
 )
 from hybrid.simulation.run_sample import (
     END_FORCES,
@@ -112,6 +115,7 @@ class Estimate:
 
     orders = ORDERS  # bounds of the order of convergence
     cancels = True  # whether errors by mesh and time step add with their signs; else their sizes add
+    _errors: Errors | None = None  # of the result and the model error as they are; None: not asked for yet
 
     def __init__(
         self,
@@ -128,6 +132,11 @@ class Estimate:
         both = [name for name in result.values if name in coarse.values]
         # What a halving of cells and steps leaves of the difference to the run before; NaN where it is not known.
         fall = {name: falls(name, result, coarse, coarsest) for name in both}
+        cells, steps = refinement(result.resolution, coarse.resolution)
+        finer = cells, steps if steps > 1.0 else COARSER  # there may be no steps
+        if coarsest is not None and finer != (COARSER, COARSER):
+            for name, found in fall.items():
+                fall[name] = as_halved(found, finer, step_share(name, coarse, rough, coarsest))
         self.falls = {name: found.mean for name, found in fall.items()}
         self.order = {name: order(max(found.mean, found.largest), self.orders) for name, found in fall.items()}
         # Root mean square of the last change of each output, and of that before.
@@ -149,19 +158,23 @@ class Estimate:
         if self.by_step is not None and self.by_mesh is not None:
             step, mesh = self.by_step.get(name), self.by_mesh.get(name)
             return step if step is None else step[a:b], mesh if mesh is None else mesh[a:b]
-        result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
-        count, by_step = len(result.values[name]), None
-        if rough is not None and name in rough.values:
-            known, own = around(every_of(count, rough.every), a, b)
-            later = coarse.some(name, every_of(len(coarse.values[name]), rough.every // coarse.every)[own])
-            late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
-            late = late / (result.steps / coarse.steps) ** p
-            by_step = at_all_outputs(late, known, a, b)
+        result, coarse = self.run, self._coarse
+        count, by_step = len(result.values[name]), self._by_step(name, a, b)
         if not self.has_mesh:
             return by_step, None
         known, own = around(every_of(count, coarse.every), a, b)
         change = result.some(name, known) - coarse.values[name][own]
         return by_step, self._mesh_error(name, at_all_outputs(change, known, a, b), by_step, coarse)
+
+    def _by_step(self, name: str, a: int, b: int) -> np.ndarray | None:
+        """Error by the time step of the outputs from number a to b, with its sign; None: not known."""
+        result, coarse, rough, p = self.run, self._coarse, self._rough, self.order[name]
+        if rough is None or name not in rough.values:
+            return None
+        known, own = around(every_of(len(result.values[name]), rough.every), a, b)
+        later = coarse.some(name, every_of(len(coarse.values[name]), rough.every // coarse.every)[own])
+        late = (later - rough.values[name][own]) / ((coarse.steps / rough.steps) ** p - 1.0)
+        return at_all_outputs(late / (result.steps / coarse.steps) ** p, known, a, b)
 
     def _mesh_error(self, name: str, change: np.ndarray, by_step: np.ndarray | None, before: RunSample) -> np.ndarray:
         """Error by the mesh, from a change since a run with other cells: less what its steps have changed."""
@@ -181,13 +194,13 @@ class Estimate:
 
     def _take(self, result: RunSample) -> Notes:
         """Take over a result, without the model error that it knows of itself if that is implausible: what to say."""
-        doubtful = _implausible(result)
+        doubtful, self._errors = _implausible(result), None
         self.run = replace(result, model_error={}) if doubtful else result
         return ((NOT_ESTIMATED, doubtful),) if doubtful else ()
 
     def set_model_errors(self, coarse: RunSample) -> None:
         """Take the model error of a coarser run: it hardly depends on cells and steps."""
-        doubtful = _implausible(coarse)
+        doubtful, self._errors = _implausible(coarse), None
         self.notes: Notes = (*coarse.notes, *(((NOT_ESTIMATED, doubtful),) if doubtful else ()))
         found = coarse.model_error if not doubtful else {}
         self._model: Mapping[str, Outputs] = {name: x for name, x in found.items() if len(x)}
@@ -283,6 +296,11 @@ class Estimate:
     @property
     def errors(self) -> Errors:
         """Magnitudes by cause.  That of the model adds to the others: how they cancel is not known."""
+        if self._errors is None:
+            self._errors = self._all_errors()
+        return self._errors
+
+    def _all_errors(self) -> Errors:
         shapes: dict[str, dict[str, tuple[int, ...]]] = {}
         for block in self._blocks(1):
             shapes.setdefault(block.cause, {})[block.name] = (self._count, *block.values.shape[1:])

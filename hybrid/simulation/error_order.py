@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.model.resolution import Resolution
 from hybrid.simulation.run_sample import END_FORCES, RunSample, every_of
 
 # The order of convergence where three runs do not show it, and the bounds of what they may show.  A smooth motion has
@@ -43,6 +44,43 @@ def falls(name: str, result: RunSample, coarse: RunSample, coarsest: RunSample |
         return Falls(np.nan, np.nan, np.nan, np.nan)
     mean = np.sqrt(sums / max(1, int(np.prod(values.shape))))
     return Falls(float(mean[0] / mean[1]), float(largest[0] / largest[1]), float(mean[0]), float(mean[1]))
+
+
+def refinement(result: Resolution, coarse: Resolution) -> tuple[float, float]:
+    """How many times as many cells and steps a resolution asks for."""
+    steps = coarse.step / result.step if result.step else 1.0
+    return result.fineness / coarse.fineness, steps
+
+
+def step_share(name: str, coarse: RunSample, rough: RunSample | None, coarsest: RunSample | None) -> float:
+    """Part of the change between two runs, of longer cells and steps both, that the steps make, 0 to 1."""
+    if rough is None or coarsest is None or name not in rough.values or name not in coarsest.values:
+        return 0.0
+    same = every_of(len(coarse.values[name]), rough.every // coarse.every)
+    rows, sums = max(1, MOST // int(np.prod(rough.values[name].shape[1:]))), np.zeros(2)
+    for a in range(0, len(rough.values[name]), rows):
+        now = coarse.some(name, same[a : a + rows])
+        sums += [squares(now - run.values[name][a : a + rows]) for run in (rough, coarsest)]
+    return float(min(1.0, np.sqrt(sums[0] / sums[1]))) if sums[1] > 0.0 else 0.0
+
+
+def as_halved(found: Falls, finer: tuple[float, float], share: float) -> Falls:
+    """What runs would show if the last were COARSER times as fine as the one before; finer: how many times it is.
+
+    share: of the steps in what the first two differ by.  An order p leaves (1 - finer^-p)/(COARSER^p - 1).
+    """
+
+    def halved(left: float) -> float:
+        low, high = -2.1, 6.3  # of p; the higher, the less is left
+        while high - low > 1e-4 and not np.isnan(left):
+            p = 0.5 * (low + high)
+            cells, steps = (1.0 - x**-p for x in finer)
+            of_p = ((1.0 - share) * cells + share * steps) / (COARSER**p - 1.0)
+            low, high = (p, high) if of_p > left else (low, p)
+        return float(COARSER ** (-0.5 * (low + high))) if not np.isnan(left) else left
+
+    mean = halved(found.mean)
+    return Falls(mean, halved(found.largest), mean * found.before, found.before)
 
 
 def order(found: float, bounds: tuple[float, float]) -> float:

@@ -12,11 +12,14 @@ from hybrid.model.build import Model, rod_cells
 from hybrid.model.mesh_grading import AT_PLACE, LAYER, SAMPLES, Grading, grading, layers
 from hybrid.model.model_costs import Demand
 from hybrid.model.resolution import RequestedAccuracy, Resolution, is_irregular, requested_accuracy, zones_are_free
+from hybrid.scene.motion_checks import stationary_from
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.run_sample import Outputs
 
 # Cells and steps so many times as long as those of the first result; places at which it is looked at.
 CELLS, STEPS, POINTS = 2.0, 4.0, 201
+# Periods of a stationary irregular motion that the pre-run follows: what 98 % of its outputs ask for is known by then.
+PERIODS = 100
 # Rod cells in a base cell of zones that move.
 MOST_PARTS = 24.0
 # Part of the outputs of an irregular motion whose curvature cells must show.  With 1 (the largest) the ten storms of
@@ -30,6 +33,13 @@ OF_ALONG = 0.5
 def survey_resolution(resolution: Resolution) -> Resolution:
     """How finely the pre-run is computed."""
     return resolution.coarser(CELLS, STEPS)
+
+
+def survey_duration(scene: Scene) -> float:
+    """How long the pre-run is, s: of an irregular motion that is stationary, PERIODS of it, else all of the run."""
+    duration = scene.require_time().duration
+    found = stationary_from(scene) if is_irregular(scene) else None
+    return duration if found is None else min(duration, found[0] + PERIODS * found[1])
 
 
 def with_survey(resolution: Resolution, scene: Scene, survey: Survey | None) -> Resolution:

@@ -1,0 +1,84 @@
+"""The first result is as fine as the runs to compare with show that it must be; long storms have short pre-runs."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.model.resolution import RequestedAccuracy, Resolution
+from hybrid.simulation.error_estimate import Estimate
+from hybrid.simulation.error_forecast import FORECAST_FINER, forecast
+from hybrid.simulation.mesh_survey import PERIODS, survey_duration
+from hybrid.simulation.refinement import Free, judge
+from hybrid.simulation.run_sample import RunSample
+
+FIRST = Resolution(1.0, 0.1, 1e-3, 1e-3)
+ALL_FREE = Free(True, True, False)
+
+
+def run(resolution: Resolution, order: float, mesh: float = 0.01, time: float = 0.004) -> RunSample:
+    """A run with errors of one order, of such sizes at FIRST, in position and in a force that stays taut."""
+    t = np.linspace(0.0, 1.0, 9)[:: resolution.every]
+    h, dt = 1.0 / resolution.fineness, resolution.step / FIRST.step
+    wrong = (mesh * h**order + time * dt**order) * (1.0 + t)
+    position = np.zeros((t.size, 4, 3))
+    position[..., 2] = (np.sin(t) + wrong)[:, None]
+    values = {"position": position, "reaction_end": (5.0 + wrong)[:, None] * [0.0, 0.0, 1.0]}
+    return RunSample(resolution, values, round(1000 / h), round(1000 / dt), 0.0, resolution.every)
+
+
+def runs(order: float, **sizes: float) -> tuple[RunSample, RunSample, RunSample]:
+    each = FIRST.coarser(2, 2), FIRST.coarser(2, 4), FIRST.coarser(4, 4)
+    coarse, rough, coarsest = (run(x, order, **sizes) for x in each)
+    return coarse, rough, coarsest
+
+
+@pytest.mark.parametrize("order", [1.5, 1.75, 2.0])
+@pytest.mark.parametrize(("mesh", "time"), [(0.01, 0.004), (0.002, 0.02)])
+def test_an_order_is_found_whatever_the_result_is_finer_by(order, mesh, time):
+    """The estimate is that of errors of that order, for a result that is 2.6 times as fine in cells and 3.3 in steps."""
+    finer = FIRST.coarser(1 / 1.3, 1 / 1.65)
+    estimate = Estimate(run(finer, order, mesh, time), *runs(order, mesh=mesh, time=time))
+    assert estimate.order["position"] == pytest.approx(order, abs=0.02)
+    assert estimate.errors.largest("mesh", "position") == pytest.approx(2 * mesh / 1.3**order, rel=0.03)
+    assert estimate.errors.largest("time", "position") == pytest.approx(2 * time / 1.65**order, rel=0.03)
+
+
+@pytest.mark.parametrize("order", [1.6, 1.75, 2.0])
+@pytest.mark.parametrize("part", [0.6, 0.8])
+def test_a_first_result_that_would_miss_is_made_finer(order, part):
+    """Asked for 0.6 and 0.8 of its error: finer in both, and enough without a repetition."""
+    asked = RequestedAccuracy(part * 0.028, None, None)
+    found = forecast(asked, FIRST, ALL_FREE, runs(order))
+    assert 1.0 < found.fineness <= FORECAST_FINER + 1e-12 and FIRST.step / FORECAST_FINER - 1e-12 <= found.step < 0.1
+    result = run(found, order)
+    assert judge(asked, Estimate(result, *runs(order)).errors, result).ratio <= 1.1
+    assert forecast(asked, FIRST, Free(True, False, False), runs(order)).step == FIRST.step  # what is fixed
+
+
+def test_a_first_result_that_would_meet_what_is_asked_stays():
+    assert forecast(RequestedAccuracy(0.1, None, None), FIRST, ALL_FREE, runs(2.0)) == FIRST
+    # runs that are as wrong as this say nothing of a finer one
+    assert forecast(RequestedAccuracy(1e-4, None, None), FIRST, ALL_FREE, runs(2.0)) == FIRST
+
+
+def storm(duration: float, **more) -> hybrid.Scene:
+    """A line whose end follows irregular waves of 10 s that grow for 60 s."""
+    waves = {"kind": "jonswap", "significant_height": 2.0, "peak_period": 10.0, "ramp": 60.0}
+    start = {"kind": "pinned", "position": [0, 0, -5], "motion": {"follow": "waves", **more}}
+    return hybrid.validate_scene({
+        "environment": {"fluid": {"density": 1025, "surface": 0.0, "waves": waves}},
+        "cable": {"sections": [{"length": 30, "mass": 3, "diameter": 0.03, "drag": {"normal": 1.2}}]},
+        "ends": {"start": start, "end": {"kind": "pinned", "position": [20, 0, -8]}},
+        "initial": "equilibrium", "time": {"duration": duration},
+    })  # fmt: skip
+
+
+def test_a_long_storm_has_a_short_pre_run():
+    """A stationary sea is known after so many waves; what moves otherwise is followed to the end."""
+    assert survey_duration(storm(10800.0)) == 60.0 + PERIODS * 10.0
+    assert survey_duration(storm(300.0)) == 300.0
+    travel = {"travel": {"by": [1, 0, 0], "over": 100, "begin": 5000}}
+    assert survey_duration(storm(10800.0, **travel)) == 5100.0 + PERIODS * 10.0
+    assert survey_duration(storm(10800.0, velocity=[0.0001, 0, 0], ramp=10)) == 10800.0
