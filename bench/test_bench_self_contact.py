@@ -8,6 +8,7 @@ Processor time of this process; ratios are taken within one run.
 from __future__ import annotations
 
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -16,7 +17,7 @@ import hybrid
 from hybrid.kernels.energies import observe
 from hybrid.kernels.newton import ASKED, FINISH, LIMIT, NEAR, PREPARE, TOUCH
 from hybrid.kernels.self_contact import contact_task
-from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, TRIED
+from hybrid.kernels.self_contact_pairs import ENERGY, NODES, POINTS, TRIED
 from hybrid.kernels.self_distance import LEAST_DISTANCE
 from hybrid.simulation.transient import Transient
 
@@ -203,3 +204,42 @@ def test_search_for_contact_that_is_not_there(shape: str) -> None:
         share, whole, found = sorted(spent)[1]
         print(f"{cells:6} {1e6 * whole:9.0f} {each:5.2f} {1e6 * found:8.1f} {100.0 * share:6.2f} %")
         assert share < 0.05
+
+
+def approaching(cells: int) -> hybrid.Simulation:
+    """examples/plectoneme.yaml with cells of 1 cm: its torque and speed, as long as the cells make it."""
+    scene = hybrid.load_scene(Path(__file__).parents[1] / "examples" / "plectoneme.yaml").model_dump(
+        exclude_unset=True, by_alias=True
+    )
+    length = 0.01 * cells
+    scene["cable"]["sections"][0]["length"] = length
+    scene["ends"]["end"] |= {"position": [length + 0.002, 0.0, 0.0], "turns": 4.0 * length}
+    scene["mesh"] = {"cells": cells}
+    return hybrid.Simulation(hybrid.validate_scene(scene))
+
+
+def test_cost_of_contact() -> None:
+    """Two strands wound around each other: CPU time of a Newton iteration, with about 50 nodes in contact.
+
+    At most 1.5 ms with 200 cells; of longer lines at most in proportion to their cells, within what CPU times scatter.
+    """
+    print("\ncells, nodes in contact, points of contact, iterations of a step, ms of an iteration")
+    found = []
+    for cells in (200, 400, 800):
+        simulation = approaching(cells)
+        run, step = simulation._loop.run, simulation.scene.time.step
+        counts = run.run.contact.contact.counts
+        while counts[NODES] < 48:
+            simulation.advance(simulation.t + step)
+        spent = []
+        for _ in range(5):
+            solves, steps, begin = 0, run.steps, time.process_time()
+            for _ in range(6):
+                simulation.advance(simulation.t + step)
+                solves += run.iterations
+            spent.append((time.process_time() - begin) / solves * 6.0 / (run.steps - steps))
+        each = 1e3 * float(np.median(spent))
+        found.append(each)
+        print(f"{cells:6} {counts[NODES]:4} {counts[POINTS]:5} {solves / 6.0:6.2f} {each:8.3f}")
+    assert found[0] < 1.5
+    assert found[1] < 2.2 * found[0] and found[2] < 4.4 * found[0]
