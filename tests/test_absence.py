@@ -20,9 +20,11 @@ from hybrid.kernels.forces import (
     FORCES,
     FRICTION,
     MASS_DAMPING,
+    MAY_TOUCH,
     PLANAR,
     ROTARY,
     SEABED,
+    SELF_CONTACT,
     STIFFNESS_DAMPING,
     SURFACE,
     WAVES,
@@ -98,7 +100,8 @@ SCENES = {
     "mass damping": (scene(BARE | {"damping": 0.5}), MASS_DAMPING),
     "stiffness damping": (scene(BENDS | {"damping": {"stiffness": 0.01}}, "rod"), STIFFNESS_DAMPING),
     "rotary inertia": (scene(BENDS | {"rotary_inertia": 1e-5}, "rod"), ROTARY),
-    "diameter of a rod": (scene(BENDS | {"diameter": 0.01}, "rod"), ROTARY),
+    "diameter of a rod": (scene(BENDS | {"diameter": 0.01}, "rod"), ROTARY | MAY_TOUCH),
+    "no contact with itself": (scene(BENDS | {"diameter": 0.01}, "rod", contact={"self": False}), ROTARY),
     "diameter of a catenary": (scene(BARE | {"diameter": 0.01}), 0),
     "current without drag": (scene(BARE | {"diameter": 0.01}, **wet(current=[1, 0, 0])), FLOW),
     "surface": (scene(BARE | {"diameter": 0.005}, **wet(surface=1.0)), SURFACE),
@@ -153,7 +156,8 @@ def test_the_contents_say_what_the_line_does(asked: hybrid.Scene, bits: int) -> 
     plan = hybrid.plan(asked)
     said = {entry.what: entry for entry in plan.contents}
     for name, (bit, _) in FORCES.items():
-        assert said[name].on == bool(bits & bit), name
+        begins = bit == SELF_CONTACT and bool(bits & MAY_TOUCH)
+        assert said[name].on == (bool(bits & bit) or begins), name
         assert said[name].why
     assert said["buoyancy"].on == (asked.environment.fluid is not None)
     kinds = {zone.kind for zone in plan.zones}

@@ -23,6 +23,8 @@ SHORT = {
     "drag, added mass or wetting of bodies": "bodies",
     "seabed contact": "seabed",
     "seabed friction": "friction",
+    "contact of the line with itself": "contact with itself",
+    "friction of the line on itself": "friction on itself",
 }
 
 

@@ -95,6 +95,7 @@ IS_BENT, MEETS_ITSELF = 512, 1024
 LETS_GO = 2048
 ITERATIONS_CUT = 4096
 NEARS_PLANE = 8192
+NEARS_ITSELF = 16384
 
 # --- powers and work --------------------------------------------------------------------------------
 

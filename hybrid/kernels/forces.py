@@ -24,6 +24,9 @@ SELF_FRICTION = 8192
 # No force: tension that is no multiple of strain (hybrid.kernels.axial_law).
 AXIAL_LAW = 16384
 
+# No force: the line may come to touch itself, which is computed from where it comes near itself on.
+MAY_TOUCH = 32768
+
 FORCES = {
     "drag": (DRAG, "velocity, direction; environment.fluid and sections[].drag, or drag_area of modules"),
     "added mass": (ADDED_MASS, "acceleration, direction; environment.fluid and sections[].added_mass, or of modules"),

@@ -43,6 +43,7 @@ from hybrid.kernels.books import (
     MOST_ITERATIONS,
     MUTE_CUTS,
     MUTE_SLACK,
+    NEARS_ITSELF,
     NEW_STATE,
     NOW,
     OUTCOME,
@@ -81,7 +82,7 @@ from hybrid.kernels.powers import find_powers
 from hybrid.kernels.references import caller, reader
 from hybrid.kernels.report import REPORT_SIZE
 from hybrid.kernels.sampling import sample_step
-from hybrid.kernels.self_distance import UNBENT, is_bent
+from hybrid.kernels.self_distance import MEETS, NEARS, UNBENT, is_bent
 from hybrid.kernels.state import (
     Ends,
     Floats,
@@ -162,12 +163,13 @@ call_reel = caller(0)
 
 @inner
 def watch_itself(job, state):
-    """How near the line is to itself after a step, as bits: whether it has become so bent, whether it meets itself."""
+    """How near the line is to itself after a step, as bits: whether it has become so bent, meets itself, is near."""
     if job.itself == UNBENT:
         return IS_BENT if is_bent(state) else 0
-    if job.itself != 0 and call_itself(job.itself, job.itself_table) != 0:
-        return MEETS_ITSELF
-    return 0
+    if job.itself == 0:
+        return 0
+    found = call_itself(job.itself, job.itself_table)
+    return (MEETS_ITSELF if found & MEETS else 0) | (NEARS_ITSELF if found & NEARS else 0)
 
 
 @inner

@@ -33,6 +33,10 @@ BOX = 12  # numbers of a box: lowest and highest position, lowest and highest ta
 HORIZON = 10.0  # diameters; what is farther away is not looked for
 APART = 0.5  # diameters of clearance at which what has met has come apart
 DEPTH = 64  # levels of the tree, at most
+CLOSE = 1.0  # diameters of clearance below which contact begins to be computed, whatever the line does
+INSIDE = 0.15  # diameters that surfaces may be in each other for contact to begin (kernels.self_contact_law)
+CLOSING = 3.0  # steps like the last one, in which it is foreseen that the line comes so near
+MEETS, NEARS = 1, 2  # bits of what `watch_itself` returns
 UNBENT = 1  # in place of the address of `watch_itself`, while the line is not bent so far
 
 (
@@ -44,6 +48,9 @@ UNBENT = 1  # in place of the address of `watch_itself`, while the line is not b
     LEAST, LEAST_DISTANCE, LEAST_S, LEAST_OTHER, LEAST_TIME,  # the same of the least clearance so far, and when, s
 ) = range(11)  # fmt: skip
 FOUND = 11
+# Of `ahead`: by how much the line may come nearer to itself in the next steps, at least, < 0: nobody asks; clearance
+# below which it is near, m.
+AHEAD, WITHIN = 0, 1
 
 
 class Itself(NamedTuple):
@@ -54,6 +61,7 @@ class Itself(NamedTuple):
     stack: NDArray[np.int64]  # (DEPTH 4, 2) pairs of boxes that are still to be looked at
     found: Floats  # (FOUND,)
     cells: NDArray[np.int64]  # (2,) the pair that was nearest
+    ahead: Floats  # (2,)
 
 
 def blank_itself(width: Floats) -> Itself:
@@ -64,7 +72,8 @@ def blank_itself(width: Floats) -> Itself:
     found = np.zeros(FOUND)
     found[[CLEARANCE, DISTANCE, LEAST]] = np.inf
     stack = np.zeros((4 * DEPTH, 2), np.int64)
-    return Itself(width, np.zeros((2 * leaves, BOX)), stack, found, np.full(2, -1, np.int64))
+    ahead = np.array([-1.0, 0.0])
+    return Itself(width, np.zeros((2 * leaves, BOX)), stack, found, np.full(2, -1, np.int64), ahead)
 
 
 class ItselfJob(NamedTuple):
@@ -238,6 +247,21 @@ def compare_leaves(line, ends, before, r, itself, a, b):
 
 
 @inner
+def largest_approach(before, r):
+    """By how much two nodes may have come nearer to each other on the way, m."""
+    n = r.shape[0]
+    m0, m1, m2 = 0.0, 0.0, 0.0
+    for i in range(n):
+        d = sub(get3(r, i), get3(before, i))
+        m0, m1, m2 = m0 + d[0], m1 + d[1], m2 + d[2]
+    mean, square = (m0 / n, m1 / n, m2 / n), 0.0
+    for i in range(n):
+        d = sub(sub(get3(r, i), get3(before, i)), mean)
+        square = max(square, dot(d, d))
+    return 2.0 * math.sqrt(square)
+
+
+@inner
 def search(line, ends, before, state, itself):
     """The least clearance of the step from the positions `before` to a state, into itself.found."""
     tree, stack, found, width = itself.tree, itself.stack, itself.found, itself.width
@@ -247,7 +271,10 @@ def search(line, ends, before, state, itself):
         return
     for i in range(width.shape[0]):
         widest = max(widest, width[i])
-    found[CLEARANCE] = HORIZON * widest
+    ahead = itself.ahead
+    if ahead[AHEAD] >= 0.0:
+        ahead[WITHIN] = CLOSE * widest + max(ahead[AHEAD], CLOSING * largest_approach(before, r))
+    found[CLEARANCE] = max(HORIZON * widest, ahead[WITHIN])
     fill_tree(tree, before, r, state.e)
     if itself.cells[0] >= 0:  # what was nearest is likely to be so again
         compare_cells(line, ends, before, r, itself, itself.cells[0], itself.cells[1])
@@ -298,7 +325,9 @@ def note_found(found, t):
 
 @kernel
 def watch_itself(table):
-    """Look how near the line comes to itself in the step that led to its state; 1: surfaces have met.
+    """Look how near the line comes to itself in the step that led to its state; MEETS: surfaces have met; NEARS: they
+
+    may do so soon, where that is asked.
 
     The states of the job have changed places after the step, as in kernels.run.
     """
@@ -307,4 +336,7 @@ def watch_itself(table):
     if job.counts[PARITY]:
         state, before = before, state
     search(job.line, job.ends, before.r, state, job.itself)
-    return 1 if note_found(job.itself.found, job.clock[NOW]) else 0
+    found, ahead = job.itself.found, job.itself.ahead
+    near = ahead[AHEAD] >= 0.0 and found[DISTANCE] < math.inf and found[CLEARANCE] < ahead[WITHIN]
+    near &= found[CLEARANCE] > -INSIDE * (found[DISTANCE] - found[CLEARANCE])
+    return (MEETS if note_found(found, job.clock[NOW]) else 0) | (NEARS if near else 0)

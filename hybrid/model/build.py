@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 
 from hybrid.errors import Complaint, SceneError
-from hybrid.kernels.forces import FRICTION, SEABED, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.forces import FRICTION, SEABED
 from hybrid.kernels.state import Floats, Line, State, state_for
 from hybrid.model.catenary_guess import Hanging
 from hybrid.model.contents import Entry, contents_of, followed
@@ -40,6 +40,7 @@ from hybrid.model.resolution import Resolution, first_resolution, follows_curvat
 from hybrid.model.scales import tension_scale
 from hybrid.model.sea import Surroundings, rubs, surroundings
 from hybrid.model.sections import merged_sections
+from hybrid.model.self_reach import contact_bits
 from hybrid.scene.motion_checks import prescribed_twist
 from hybrid.scene.schema import (
     AdaptiveModel,
@@ -186,8 +187,7 @@ def build(
     slack_scale = tension_scale(scene, sections, False, fastest)
     bed = scene.environment.seabed
     touch = 0 if bed is None else SEABED | (FRICTION if rubs(bed) else 0)
-    if scene.contact.self:
-        touch |= SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
+    touch |= contact_bits(scene)
     moves = layout is not None
     line = line_on(cable, s, rod, touch, sections_turn=not moves or spins_freely(cable), comes_and_goes=moves)
     h, compliance = line.h, line.ck

@@ -8,7 +8,7 @@ from itertools import pairwise
 from math import pi
 
 from hybrid.kernels.criteria import CRITERIA
-from hybrid.kernels.forces import FORCES
+from hybrid.kernels.forces import FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
 from hybrid.kernels.state import Line
 from hybrid.model.mesh import Zone
 from hybrid.model.resolution import (
@@ -21,6 +21,7 @@ from hybrid.model.resolution import (
 )
 from hybrid.model.sea import current_table
 from hybrid.model.sections import swivels, weight
+from hybrid.model.self_reach import self_reach
 from hybrid.scene.schema import AdaptiveModel, Scene
 
 # Mean densities of real cables, kg/m^3, with room: from hollow and foamed to solid heavy metal.
@@ -71,7 +72,8 @@ def _watched(scene: Scene) -> Iterator[Entry]:
     yield Entry(f"zones that move; tolerance {first_resolution(scene).zones * scene.length:.3g} m", True, why)
     for x in CRITERIA:
         forced = scene.model.force_rod or scene.model.force_catenary
-        asked = {"given": forced, "contact": scene.contact.self}.get(x.name, True)
+        reach = self_reach(scene)
+        asked = {"given": forced, "contact": reach.asked or reach.may}.get(x.name, True)
         yield Entry(f"criterion {x.name}: rod above 1, catenary below {x.off:g}", bool(asked), x.ratio)
 
 
@@ -160,6 +162,15 @@ def followed(scene: Scene, zones: Sequence[Zone], corrects: bool) -> Entry:
     return Entry(what, True, why)
 
 
+def _force(scene: Scene, line: Line, name: str, bit: int, needs: str) -> Entry:
+    """Whether a force acts, or may: contact of the line with itself begins where it comes near itself."""
+    if bit == SELF_CONTACT:
+        return Entry(name, bool(line.bits & (bit | MAY_TOUCH)), self_reach(scene).why)
+    if bit == SELF_FRICTION and line.bits & MAY_TOUCH:
+        return Entry(name, scene.contact.friction > 0.0, needs)
+    return Entry(name, bool(line.bits & bit), needs)
+
+
 def contents_of(
     scene: Scene, line: Line, zones: Sequence[Zone], flat: Entry, corrects: bool = False
 ) -> tuple[Entry, ...]:
@@ -208,7 +219,7 @@ def contents_of(
     entries += _accuracy(scene)
     entries.append(Entry("gravity", scene.environment.gravity != 0, "environment.gravity"))
     entries.append(Entry("buoyancy", scene.environment.fluid is not None, "environment.fluid"))
-    entries += [Entry(name, bool(line.bits & bit), needs) for name, (bit, needs) in FORCES.items()]
+    entries += [_force(scene, line, name, bit, needs) for name, (bit, needs) in FORCES.items()]
     if isinstance(scene.model, AdaptiveModel):
         why = "rods that come and go have none; fixed zones and `model: rod` do"
         entries = [replace(x, why=why) if x.what == "rotary inertia" else x for x in entries]

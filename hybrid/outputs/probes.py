@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.link import CROSSINGS, LINK, TWIST, WRITHE, holds_twist
 from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
@@ -209,7 +209,7 @@ class Observer:
         has |= (kinds or {zone.kind for zone in zones}) | ({"seabed"} if line.bits & SEABED else set())
         has |= {"link"} if holds_twist(line) and not line.bits & PLANAR else set()
         has |= {"payout"} if payout else set()
-        has |= {"self_contact"} if line.bits & SELF_CONTACT else set()
+        has |= {"self_contact"} if line.bits & (SELF_CONTACT | MAY_TOUCH * with_work) else set()
         self._probes = {
             name: p
             for name, p in PROBES.items()

@@ -156,11 +156,11 @@ def _other_units(density: float, mass: float, diameter: float) -> str:
 class Contact(Table):
     """What the cable touches beside the seabed: itself."""
 
-    self: bool = Field(
-        default=False,
+    self: bool | None = Field(
+        default=None,
         description="whether parts of the cable that are no neighbours keep a diameter apart in a run; needs "
-        "model: rod or adaptive, and the diameter of every section; absent: they pass through each other, and an "
-        "event says where",
+        "model: rod or adaptive, and the diameter of every section; absent: where these are given and the cable can "
+        "reach itself, from when it comes near itself on, else parts pass through each other, and an event says where",
     )
     friction: NonNegative = Field(
         default=0.0,

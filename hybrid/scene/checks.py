@@ -233,10 +233,10 @@ def _touches_itself(
     cable: Cable, contact: Contact, model: Model, solver: str, dimension: int | None
 ) -> Iterator[Finding]:
     """Contact of the cable with itself is known between rods, in space; catenaries of zones that move become rods."""
+    if contact.self is False and contact.friction > 0.0:
+        expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
+        yield Finding(("contact", "friction"), expected, "leave `self: false` out, or leave friction out")
     if not contact.self:
-        if contact.friction > 0.0:
-            expected = "0 or nothing, because parts of the cable do not touch each other without contact.self"
-            yield Finding(("contact", "friction"), expected, "add `self: true`, or leave friction out")
         return
     here: Place = ("contact", "self")
     for i, section in enumerate(cable.sections):

@@ -251,7 +251,7 @@ class System(Table):
         tables: dict[str, Any] = {
             "title": f"{self.title}, line {name}" if self.title else f"line {name}", "environment": self.environment,
             "cable": line.cable, "ends": Ends(**ends), "initial": Equilibrium(), "model": line.chosen_model,
-            "mesh": line.mesh,
+            "mesh": line.mesh, "contact": {"self": False},
         }  # fmt: skip
         if self.time is not None:
             tables["time"] = self.time

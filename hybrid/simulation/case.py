@@ -96,6 +96,7 @@ class Case:
         self.interrupted: Callable[[], bool] = lambda: False
         self.beside_result: Path | None = None  # beside which outputs of long runs to compare with are kept
         self._results = 0  # that were begun
+        self.came_near_itself = False  # whether contact with itself was computed in a run to compare with
         self._unwanted = Event()  # what runs to compare with still compute
 
     # --- results --------------------------------------------------------------------------------
@@ -293,6 +294,7 @@ class Case:
             loop.to_the_end(until or self._duration, self._exact, self.changes)
         finally:
             found.close("", "")
+        self.came_near_itself |= loop.run.run.contact is not None
         values, errors = split_outputs({name: found[name] for name in found.names})
         cpu = clock.thread_time() - begin
         bound = resolution.zones * model.length if switching is not None else 0.0

@@ -111,7 +111,7 @@ class CellChanges:
             and run.contact is None
             and not (model.line.torsion.size or model.line.tension_twist.size)
         )
-        watches = owner.envelope is not None and owner.envelope.itself.watching
+        watches = owner.itself is not None and owner.itself.watching
         return plain and not watches and bool(model.line.bits & PLANAR or not switching.manager.twisted)
 
     def still_fits(self) -> bool:

@@ -15,12 +15,13 @@ import numpy as np
 from hybrid.errors import LIMIT_EVENTS
 from hybrid.kernels import books as b
 from hybrid.kernels.extremes import fold_extremes
-from hybrid.kernels.forces import PLANAR, SEABED, SELF_CONTACT
+from hybrid.kernels.forces import MAY_TOUCH, PLANAR, SEABED, SELF_CONTACT
 from hybrid.kernels.state import Floats
 from hybrid.model.build import Model
 from hybrid.model.output_points import NEAR
 from hybrid.model.payout import whole_scene
 from hybrid.model.sections import SECTION_LIMITS, limits_along, section_changes
+from hybrid.model.self_reach import no_contact
 from hybrid.outputs.output_grid import Grid
 from hybrid.scene.schema import Scene
 from hybrid.simulation.self_watch import SelfWatch
@@ -92,7 +93,7 @@ class Envelope:
         self.bounds = no_extremes(self.s.size)  # of meshes before that of now
         has = {"", *({"rod"} if layout is not None else {zone.kind for zone in model.zones})}
         has |= ({"seabed"} if model.line.bits & SEABED else set()) | ({"time"} if moves else set())
-        has |= {"self_contact"} if moves and model.line.bits & SELF_CONTACT else set()
+        has |= {"self_contact"} if moves and model.line.bits & (SELF_CONTACT | MAY_TOUCH) else set()
         has |= {"torsion"} if "rod" in has or (model.line.torsion.size and not model.line.bits & PLANAR) else set()
         self._rows = {row: what for row, what in QUANTITIES.items() if what[3] in has}
         side = 3.0 * NEAR * model.length  # beyond which a place is no longer at a change of section
@@ -103,7 +104,9 @@ class Envelope:
         whole, begin = whole_scene(scene)
         self._limits = limits_along(whole, beside - begin)
         self._grows = model.payout is not None
-        self.itself = SelfWatch(model)
+        if moves and model.line.bits & MAY_TOUCH and not model.line.bits & SELF_CONTACT:
+            self.bounds[:, b.SELF_PRESSURE] = 0.0  # there is no contact before it is computed
+        self.itself = SelfWatch(model, no_contact(scene)) if moves else SelfWatch(model)
 
     # --- what is kept -------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from hybrid.model.build import build
 from hybrid.model.plane import in_space, planar
 from hybrid.model.release import released_as
+from hybrid.model.self_reach import touching
 from hybrid.scene.schema import Scene
 from hybrid.simulation.plane_monitor import same_plane
 from hybrid.simulation.transient import Transient
@@ -33,6 +34,8 @@ def change_loads(run: Transient, scene: Scene) -> None:
         model = monitor.leave(replace(model, plane=old.plane), run.run, state)
     else:
         model = replace(model, line=in_space(model.line), plane=None)
+    if run.run.contact is not None:
+        model = replace(model, line=touching(model.line, scene.contact.friction))
     run.set_model(model, state)
     if run.switching is not None:
         run.switching.manager.load(model.ends.moments)

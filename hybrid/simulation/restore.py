@@ -28,6 +28,7 @@ from hybrid.model.output_points import OutputPoints
 from hybrid.model.plane import in_space, planar
 from hybrid.model.release import released_as
 from hybrid.model.resolution import Resolution, first_resolution
+from hybrid.model.self_reach import touching
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.initial_zones import manager_for
@@ -159,6 +160,8 @@ def restored_model(scene: Scene, resolution: Resolution, saved: Mapping[str, Any
         first = model = build(scene, resolution, (s, zones))
     plane = matched(saved["plane"], np.zeros((3, 3)), "plane") if saved["plane"] is not None else None
     line = in_space(model.line) if plane is None else planar(model.line, plane)
+    if saved.get("self_contact") is not None:  # it has come near itself
+        line = touching(line, scene.contact.friction)
     released = _released(saved)
     return released_as(first, released, 0.0), released_as(replace(model, line=line, plane=plane), released, 0.0)
 

@@ -9,10 +9,12 @@ import numpy as np
 
 from hybrid.errors import Complaint, SceneError
 from hybrid.kernels.binding import Table
-from hybrid.kernels.forces import SELF_CONTACT
-from hybrid.kernels.self_contact_law import OUTER
+from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
+from hybrid.kernels.self_contact_law import INNER, OUTER
 from hybrid.kernels.self_distance import (
+    AHEAD,
     CLEARANCE,
+    CLOSING,
     DISTANCE,
     LEAST,
     LEAST_DISTANCE,
@@ -20,7 +22,10 @@ from hybrid.kernels.self_distance import (
     LEAST_S,
     LEAST_TIME,
     MEETING,
+    MEETS,
+    NEARS,
     OTHER_S,
+    TOLD,
     TURNED,
     UNBENT,
     S,
@@ -58,16 +63,18 @@ def least_bending(model: Model) -> Floats:
     return np.asarray(model.cable.B[model.cable.piece(0.5 * (s[:-1] + s[1:])), :2].min(axis=1))
 
 
-def meeting_text(s: float, other: float, distance: float, width: float, dt: float) -> str:
+REMEDY = "contact: {self: true} does in a run of rods, or of zones that move"
+
+
+def meeting_text(s: float, other: float, distance: float, width: float, dt: float, why: str) -> str:
     """Text of the event of a line that comes within `distance`, m, of itself at two arc lengths, m.
 
-    width: m, of the cable; dt: s, the step in which it does, 0: in none.
+    width: m, of the cable; dt: s, the step in which it does, 0: in none; why: no contact is computed.
     """
     passing = f" in a step of {dt:.3g} s" if dt > 0.0 else ""
     return (
         f"s = {s:.6g} m and s = {other:.6g} m come within {distance:.3g} m of each other{passing}, less than the "
-        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here; contact: {{self: true}} "
-        f"does in a run of rods, or of zones that move"
+        f"diameter of {width:.3g} m: nothing keeps it from passing through itself here ({why}); {REMEDY}"
     )
 
 
@@ -82,8 +89,10 @@ def touching_text(s: float, other: float, distance: float, width: float) -> str:
 class SelfWatch:
     """Watches one line for as long as a run lasts; a line without a diameter is not watched."""
 
-    def __init__(self, model: Model) -> None:
-        self.on = bool(diameters(model).any())
+    def __init__(self, model: Model, why: str = "statics compute no contact") -> None:
+        """why: no contact is computed, for an event."""
+        self.on, self.why = bool(diameters(model).any()), why
+        self.asks = False  # whether it is asked when the line comes near itself, so that contact begins
         self.itself = blank_itself(np.ones(1))
         self._job = Table(blank_itself_job())
         self._address = UNBENT
@@ -106,21 +115,40 @@ class SelfWatch:
         )  # fmt: skip
         self._touches = bool(model.line.bits & SELF_CONTACT)
         self.itself.found[MEETING] = OUTER - 1.0 if self._touches else 0.0
+        self.asks = bool(model.line.bits & MAY_TOUCH) and not self._touches
+        self.itself.ahead[AHEAD] = 0.0 if self.asks else -1.0
         run.watch_itself(self._job.numbers, self._address)
 
-    def look(self, run: CompiledRun) -> bool:
+    def look(self, run: CompiledRun) -> int:
         """Look at the last step of a line that is so bent that it could come near itself, and let every step do so from
 
-        now on; whether surfaces have met.
+        now on; MEETS and NEARS of kernels.self_distance.
         """
         if self._address == UNBENT:
             self._address = watch_itself.address(self._job.numbers)
             run.watch_itself(self._job.numbers, self._address)
-        return bool(watch_itself(self._job.numbers))
+        return int(watch_itself(self._job.numbers))
+
+    def is_near(self, run: CompiledRun, step: float) -> bool:
+        """Whether a line that may touch itself is near itself in a state from which steps (s) are to be made."""
+        if not (self.on and self.asks and is_bent(run.state)):
+            return False
+        v = run.state.v
+        self.itself.ahead[AHEAD] = 2.0 * CLOSING * step * float(np.linalg.norm(v - v.mean(axis=0), axis=1).max())
+        found = self.look(run)
+        self.itself.ahead[AHEAD], self.itself.found[TOLD] = 0.0, 0.0
+        return bool(found & NEARS)
+
+    def tell_again(self, t: float, dt: float, event: Callable[..., None]) -> None:
+        """The event of a line that meets itself, where contact could not begin, unless it has been told."""
+        found = self.itself.found
+        if found[CLEARANCE] < 0.0 and found[TOLD] == 0.0:
+            found[TOLD] = 1.0
+            self.tell(t, dt, event)
 
     def look_at_start(self, run: CompiledRun, event: Callable[..., None]) -> None:
         """Look at the state of a run that has made no step."""
-        if self.on and is_bent(run.state) and self.look(run):
+        if self.on and is_bent(run.state) and self.look(run) & MEETS:
             self.tell(run.t, 0.0, event)
 
     def tell(self, t: float, dt: float, event: Callable[..., None]) -> None:
@@ -132,7 +160,7 @@ class SelfWatch:
             text = touching_text(s, other, distance, width)
             event(t, s, other, "line touches itself", text, value=distance, threshold=width)
         else:
-            text = meeting_text(s, other, distance, width, dt)
+            text = meeting_text(s, other, distance, width, dt, self.why)
             event(t, s, other, "line meets itself", text, value=distance, threshold=width)
 
     def fields(self) -> list[Field]:
@@ -169,10 +197,23 @@ def let_touch_itself(run: CompiledRun, scene: Scene, model: Model, work: Work) -
     run.touch_itself(contact, model.line, model.ends.values, work)
 
 
+def within_itself(contact: SelfContact, model: Model) -> str:
+    """Where parts of a line are in each other, and contact could not tell to which side they belong; empty: nowhere."""
+    if math.isfinite(contact.energy()):
+        return ""
+    p, q = contact.deepest
+    s, other = sorted((float(model.line.s[p]), float(model.line.s[q])))
+    width = float(0.5 * (contact.contact.width[p] + contact.contact.width[q]))
+    return (
+        f"the centrelines of s = {s:.6g} m and s = {other:.6g} m are {contact.least_distance:.3g} m apart, less than "
+        f"{INNER:g} of the diameter of {width:.3g} m"
+    )
+
+
 def refuse_start_in_itself(contact: SelfContact, scene: Scene, model: Model) -> None:
-    """SceneError: parts of the line are in each other at the start, and contact could not tell to which side."""
-    if not np.isfinite(contact.energy()):
-        s, other = (float(model.line.s[k]) for k in contact.deepest)
-        given = f"{scene.initial.kind}, where the line is within itself at s = {s:.6g} m and s = {other:.6g} m"
-        fix = "another start, a smaller diameter, or contact: {self: false}"
-        raise SceneError([Complaint("initial", given, "a start in which the line does not cross itself", fix)])
+    """SceneError: parts of the line are in each other at the start."""
+    where = within_itself(contact, model)
+    if where:
+        given = f"{scene.initial.kind}, where {where}"
+        fix = "a start in which they are a diameter apart, a smaller diameter, or contact: {self: false}"
+        raise SceneError([Complaint("initial", given, "a start in which the line is not within itself", fix)])

@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from hybrid.kernels import books as b
+from hybrid.kernels.self_distance import MEETS, NEARS, TOLD
 from hybrid.simulation.events import slack_steps_text, steps_cut_text
 
 if TYPE_CHECKING:
@@ -61,13 +62,19 @@ def note_unknown_error(moving: Transient) -> None:
 
 
 def look_at_itself(moving: Transient, flags: int, cells_change: bool) -> None:
-    """The line has become so bent that it could come near itself, or it meets itself: an event.
+    """The line has become so bent that it could come near itself, is near, or meets itself: an event.
 
     flags: of kernels.books; cells_change: whether the line may have other cells than when it was attached.
     """
-    assert moving.envelope is not None
-    watch = moving.envelope.itself
+    watch = moving.itself
+    assert watch is not None
     if cells_change and not watch.watching:
         watch.attach(moving.model, moving.run)
-    if flags & b.MEETS_ITSELF or watch.look(moving.run):
+    found = (MEETS if flags & b.MEETS_ITSELF else 0) | (NEARS if flags & b.NEARS_ITSELF else 0)
+    found = found or watch.look(moving.run)
+    if found & NEARS:
+        moving.nears_itself = True  # contact begins after the outputs of this step
+        if found & MEETS:
+            watch.itself.found[TOLD] = 0.0
+    elif found & MEETS and moving.envelope is not None:
         watch.tell(moving.t, float(moving.run.clock[b.LAST_DT]), moving.events.event)

@@ -14,7 +14,7 @@ import numpy as np
 from hybrid.adapt.manager import Change
 from hybrid.errors import Outcome
 from hybrid.kernels import books as b
-from hybrid.kernels.forces import SELF_CONTACT
+from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT
 from hybrid.kernels.report import SEABED_ENERGY
 from hybrid.kernels.state import State, Work, state_for
 from hybrid.kernels.step_law import FIRST
@@ -26,13 +26,14 @@ from hybrid.scene.schema import Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.blended import note_blended, rotate_ends_in
 from hybrid.simulation.cell_changes import CellChanges
+from hybrid.simulation.contact_start import begin_contact
 from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.payout import PayingOut
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
-from hybrid.simulation.self_watch import let_touch_itself, refuse_start_in_itself
+from hybrid.simulation.self_watch import SelfWatch, let_touch_itself, refuse_start_in_itself
 from hybrid.simulation.step_events import (
     look_at_itself,
     note_cut,
@@ -80,6 +81,12 @@ class Transient:
         self.switching, self.correction, self.beyond = switching, correction, -np.inf
         self.run = CompiledRun(scene.time.rho_inf, np.array(outputs, float), extremes, switching is not None)
         self.envelope = Envelope(scene, model, moves=True) if extremes else None
+        self.itself: SelfWatch | None = None
+        if self.envelope is not None:
+            self.itself = self.envelope.itself
+        elif model.line.bits & MAY_TOUCH:
+            self.itself = SelfWatch(model, "")
+        self.nears_itself = False  # whether contact with itself has to begin after this step
         self.marked = marked_places(scene, model)
         self.payout = PayingOut(model) if model.payout is not None else None
         if self.payout is not None:
@@ -156,7 +163,7 @@ class Transient:
         """Whether the line that samples are of stays as it is in the next step, so that they may wait in the buffer."""
         joints = self.switching is not None and self.switching.joints is not None
         paid = self.payout is not None and self.payout.due
-        leaves = self._leaves or self._returns
+        leaves = self._leaves or self._returns or self.nears_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
 
     # --- the start ------------------------------------------------------------------------------
@@ -182,6 +189,9 @@ class Transient:
         if self.run.contact is not None:
             self.stepper.work.u[:] = 0.0
             refuse_start_in_itself(self.run.contact, self.scene, begun)
+        elif self.itself is not None and self.itself.is_near(self.run, self.resolution.step):
+            begin_contact(self)
+            begun, state = self.model, self.state
         self._find_accelerations()
         if self.switching is not None:
             self.switching.begin(begun.ends.values, state)
@@ -189,8 +199,8 @@ class Transient:
             with_friction = equilibrium is not None and equilibrium.with_friction
             self.correction.begin(begun.ends.at(0.0), state, equilibrium is not None, with_friction)
         self.run.place(state.r[model.always].copy())
-        if self.envelope is not None:
-            self.envelope.itself.look_at_start(self.run, self.events.event)
+        if self.envelope is not None and self.itself is not None:
+            self.itself.look_at_start(self.run, self.events.event)
 
     def _find_accelerations(self, new_leg: bool = True) -> None:
         """Accelerations and tensions that are consistent with positions, velocities and loads."""
@@ -310,7 +320,7 @@ class Transient:
         count, switching, asks = self.run.count, self.switching, 0
         if self._leaves:
             asks |= b.ASK_STEPS
-        changes = self._leaves or self._returns or self._overloaded or self._pending is not None
+        changes = self._leaves or self._returns or self.nears_itself or self._overloaded or self._pending is not None
         if changes or self.asks_samples or (self.payout is not None and self.payout.due):
             asks |= b.ASK_SAMPLES
         if switching is not None and not switching.compiled:
@@ -352,7 +362,7 @@ class Transient:
             note_slack(self)
         if flags & b.ITERATIONS_CUT:
             note_iterations(self)
-        if flags & (b.IS_BENT | b.MEETS_ITSELF):
+        if flags & (b.IS_BENT | b.MEETS_ITSELF | b.NEARS_ITSELF):
             look_at_itself(self, flags, self._cells is not None)
         if flags & b.PUSH_DIED:
             self.plane_monitor.renew(run)
@@ -364,7 +374,8 @@ class Transient:
         if self.switching is not None:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
-        changes = self._pending is not None or self._leaves or self._returns or bool(self._overloaded)
+        changes = self._pending is not None or self._leaves or self._returns or self.nears_itself
+        changes |= bool(self._overloaded)
         changes |= self.payout is not None and self.payout.due
         run.count[b.INSIDE] = changes
         changes |= bool(run.count[b.SAMPLES]) and not self.unchanging
@@ -387,6 +398,10 @@ class Transient:
             self._leaves = False
             state = self.state.copy()
             self.set_model(self.plane_monitor.leave(self.model, self.run, state), state)
+            self.evaluate_forces()
+        if self.nears_itself:
+            self.nears_itself = self._leaves = self._returns = False
+            begin_contact(self)
             self.evaluate_forces()
         if self._returns:
             self._returns = False
@@ -456,9 +471,12 @@ class Transient:
         )  # fmt: skip
         if touches:
             let_touch_itself(self.run, self.scene, model, self.stepper.work)
+        else:
+            self.run.touch_no_more()
         if self.envelope is not None:
             self.run.books.start[:] = self.envelope.start_of(model.nodes)
-            self.envelope.itself.attach(model, self.run)
+        if self.itself is not None:
+            self.itself.attach(model, self.run)
         if self.payout is not None:
             self.payout.attach(self.run, model, self.stepper)
         self.plane_monitor.attach(self.run, model.line)

@@ -113,6 +113,7 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
     if saved["push"] is not None:
         monitor.restore(saved["push"], compiled)
     if compiled.contact is not None:
+        monitor.comes_back = False
         compiled.contact.restore(saved["self_contact"])
     if run.switching is not None:
         run.switching.restore(saved["zoning"])

@@ -111,8 +111,8 @@ class ZoneSwitching:
         clock[z.LETTING_GO] = LETTING_GO * manager.pace
         self.limit_steps(run)
         line, sea, ends = self.model.line, self.model.sea.values, self.model.ends.values
-        if run.contact is not None:
-            manager.near = run.contact.look_ahead(LOOKAHEAD * manager.pace)
+        contact = run.contact
+        manager.near = np.zeros(0) if contact is None else contact.look_ahead(LOOKAHEAD * manager.pace)
         self.table.bind(
             line=line, sea=sea, ends=ends, old=run.states[0], new=run.states[1], clock=run.clock, counts=run.count,
             work=run.books.work, zones=self.zones, near=manager.near,

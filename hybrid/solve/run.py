@@ -155,6 +155,12 @@ class CompiledRun:
         self.table.bind(contact=contact.call, contact_table=table)
         self.contact = contact
 
+    def touch_no_more(self) -> None:
+        """The line does not touch itself, or no longer."""
+        if self.contact is not None:
+            self.table.bind(contact=np.zeros(3, np.int64), contact_table=np.zeros(0, np.int64))
+            self.contact = None
+
     def move(self, moves: Moves) -> None:
         """From now on the ends move otherwise, or other loads act."""
         self.table.bind(moves=moves)

@@ -12,7 +12,7 @@ from hybrid.kernels.forces import ROTARY
 from hybrid.kernels.newton import ADDRESS, ASKED, REST
 from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
-from hybrid.kernels.self_contact_law import FORCE, NORMAL, WX, WY, P, Q
+from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
 from hybrid.kernels.self_contact_pairs import (
     FRESH,
     FRICTION,
@@ -82,10 +82,16 @@ class SelfContact:
 
     @property
     def deepest(self) -> tuple[int, int]:
-        """The nodes beside the point of contact, of those looked at last, with the largest force."""
+        """The nodes beside the nearest point of contact of those looked at last."""
         points = self.contact.points[: self.contact.counts[POINTS]]
-        row = points[np.argmin(points[:, FORCE])]
+        row = points[np.argmin(points[:, DISTANCE])]
         return int(row[P]), int(row[Q])
+
+    @property
+    def least_distance(self) -> float:
+        """The least distance, m, of the points of contact looked at last."""
+        points = self.contact.points[: self.contact.counts[POINTS]]
+        return float(points[:, DISTANCE].min())
 
     def force(self, state: State) -> Floats:
         """Forces (N+1, 3) N of contact on the nodes of the state of a run.

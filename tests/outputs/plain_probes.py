@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from hybrid.kernels.energies import observe
-from hybrid.kernels.report import CONTACT_FORCE, FORCE_A
+from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
@@ -295,6 +295,8 @@ def plain_values(
         "energy/kinetic": v.energy[0], "energy/bending": v.energy[1], "energy/torsion": v.energy[2],
         "energy/stretch": v.energy[3], "energy/potential": -np.sum(v.line.force * computed.state.r),
     }  # fmt: skip
+    if not batch.touch.size:  # contact with itself has not begun
+        out |= {"self_contact": np.zeros(grid.s.size), "energy/self_contact": x.report[i, SELF_CONTACT_ENERGY]}
     if np.isfinite(observer.sea.stiffness):
         down = v.touchdown
         out |= {"contact": v.contact, "energy/contact": v.stored, "grounded_length": down.grounded}

@@ -1,0 +1,80 @@
+"""Whether contact of a line with itself is computed: as the scene asks, else wherever the line can reach itself."""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+from hybrid.kernels.forces import MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
+from hybrid.kernels.state import Line
+from hybrid.scene.schema import AdaptiveModel, RodModel, Scene
+
+# Diameters of slack of the smallest loop: WINDOW of kernels.self_contact_pairs less OUTER of kernels.self_contact_law,
+# which a plan does not import.
+LOOP = 2.7 - 1.05
+
+
+class Reach(NamedTuple):
+    """asked: computed from the start; may: from when the line comes near itself; why: which, or why neither."""
+
+    asked: bool
+    may: bool
+    why: str
+
+
+def self_reach(scene: Scene) -> Reach:
+    """Whether contact of the line with itself is computed, by the scene alone."""
+    asked = scene.contact.self
+    if asked is not None:
+        return Reach(asked, False, f"contact.self: {str(asked).lower()}")
+    model = scene.model
+    off = {
+        "a section has no diameter": any(x.diameter is None for x in scene.cable.sections),
+        "catenaries that stay know no contact; `model: rod` or `model: adaptive` do": (
+            not isinstance(model, RodModel | AdaptiveModel)
+            or (isinstance(model, AdaptiveModel) and (bool(model.force_catenary) or model.correct))
+        ),
+        f"solver: {scene.solver} knows no contact": scene.solver != "elimination",
+        "dimension: 2, and contact leads out of a plane": scene.dimension == 2,
+        "line is paid out": any(getattr(end, "payout", None) is not None for end in scene.ends.both),
+    }
+    why = next((text for text, holds in off.items() if holds), "")
+    if why:
+        return Reach(False, False, why)
+    slack, least = slack_of(scene), least_slack(scene)
+    if slack <= least:
+        return Reach(False, False, f"the slack of {max(slack, 0.0):.3g} m is less than {least:.3g} m, of a loop")
+    much = "whatever its ends do" if math.isinf(slack) else f"a slack of {slack:.3g} m, and a loop takes {least:.3g} m"
+    return Reach(False, True, f"from where it comes near itself: {much}; contact: {{self: false}} switches it off")
+
+
+def no_contact(scene: Scene) -> str:
+    """Why a line may be within itself in a run of a scene."""
+    reach = self_reach(scene)
+    return "parts are in each other, and contact begins where they are apart" if reach.may else reach.why
+
+
+def slack_of(scene: Scene) -> float:
+    """Length, m, by which the line is longer than its ends are apart; infinite where an end moves or may."""
+    a, b = (end.held_position for end in scene.ends.both)
+    if a is None or b is None or any(x.prescribed_motion or x.release for x in scene.ends.both):
+        return math.inf
+    return scene.length - math.dist(a, b)
+
+
+def least_slack(scene: Scene) -> float:
+    """The slack, m, that two points take to meet which are no neighbours along the line: that of the smallest loop."""
+    return LOOP * min(x.diameter or math.inf for x in scene.cable.sections)
+
+
+def contact_bits(scene: Scene) -> int:
+    """Bits of kernels.forces for the start of a run."""
+    reach = self_reach(scene)
+    if reach.asked:
+        return SELF_CONTACT | (SELF_FRICTION if scene.contact.friction else 0)
+    return MAY_TOUCH if reach.may else 0
+
+
+def touching(line: Line, friction: float) -> Line:
+    """The line, of which contact with itself is computed from now on."""
+    return line._replace(bits=line.bits | SELF_CONTACT | (SELF_FRICTION if friction else 0))

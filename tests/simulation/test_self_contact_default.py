@@ -1,0 +1,113 @@
+"""Contact with itself where a scene does not speak of it: on where the line can reach itself, from when it is near."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from bits import Stopping, differences, went_on
+
+import hybrid
+from hybrid.kernels.self_contact_law import INNER, OUTER
+from hybrid.kernels.self_contact_pairs import WINDOW
+from hybrid.kernels.self_distance import INSIDE
+from hybrid.model.build import build
+from hybrid.model.self_reach import LOOP, self_reach
+
+WIDTH = 0.02
+
+
+def led_through(**more: Any) -> dict[str, Any]:
+    """A line hangs between two ends in a plane; one is led sideways through the other leg."""
+    section = {
+        "length": 4.0, "mass": 0.4, "diameter": WIDTH, "axial_stiffness": 1e4, "bending_stiffness": 1e-3,
+        "damping": {"mass": 1.0},
+    }  # fmt: skip
+    across = {"travel": {"by": [-1.2, 0, 0], "over": 4.0}}
+    return {
+        "cable": {"sections": [section]}, "model": "rod", "mesh": {"cells": 60}, "initial": "equilibrium",
+        "ends": {
+            "start": {"kind": "pinned", "position": [0, 0, 0]},
+            "end": {"kind": "pinned", "position": [0.6, 0, -1.0], "motion": across},
+        },
+        "time": {"duration": 3.0, "step": 0.02}, "output": {"every": 0.02, "points": 101},
+    } | more  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    path = tmp_path_factory.mktemp("led") / "whole.h5"
+    hybrid.run(hybrid.validate_scene(led_through()), path).close()
+    return path
+
+
+@pytest.fixture(scope="module")
+def led(whole: Path) -> hybrid.Result:
+    return hybrid.open(whole)
+
+
+def test_a_line_in_a_plane_touches_itself_without_being_asked(led: hybrid.Result) -> None:
+    kinds = {event.kind for event in led.events}
+    assert "line touches itself" in kinds and "line meets itself" not in kinds
+    assert float(led["self_distance/distance"]) > 0.85 * WIDTH
+    touches = led["energy/self_contact"] > 0.0
+    assert touches.any() and not touches[0]
+    assert (led["self_contact"].max(axis=1)[touches] > 0.0).all() and not led["self_contact"][~touches].any()
+    assert any(event.kind == "out of plane" and "itself" in event.text for event in led.events)
+    put_in = sum(np.abs(led[name]).max() for name in led.names if name.startswith("work/") and name != "work/scheme")
+    assert led["work/scheme"].max() < 1e-3 * put_in  # what steps in contact dissipate is theirs
+
+
+@pytest.mark.slow
+def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(
+    whole: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    stopping = Stopping(monkeypatch)
+    assert went_on(hybrid.validate_scene(led_through()), tmp_path / "run.h5", stopping, [20, 110]) == 2
+    assert differences(whole, tmp_path / "run.h5") == []
+
+
+@pytest.mark.parametrize(
+    ("more", "why"),
+    [
+        ({"contact": {"self": False}}, "contact.self: false"),
+        ({"model": "catenary"}, "catenaries that stay"),
+        ({"dimension": 2}, "dimension: 2"),
+        ({"ends": {"start": {"kind": "pinned", "position": [0, 0, 0]},
+                   "end": {"kind": "pinned", "position": [3.97, 0, 0]}}}, "of a loop"),
+    ],
+)  # fmt: skip
+def test_where_it_cannot_be_it_is_off_and_says_why(more: dict[str, Any], why: str) -> None:
+    scene = hybrid.validate_scene(led_through(**more))
+    reach = self_reach(scene)
+    assert not reach.asked and not reach.may and why in reach.why
+    entry = next(x for x in build(scene).contents if x.what == "contact of the line with itself")
+    assert not entry.on and why in entry.why
+
+
+def test_without_a_diameter_it_is_off() -> None:
+    scene = led_through()
+    del scene["cable"]["sections"][0]["diameter"]
+    assert "diameter" in self_reach(hybrid.validate_scene(scene)).why
+
+
+def test_the_smallest_loop_is_that_of_contact() -> None:
+    assert pytest.approx(WINDOW - OUTER) == LOOP and pytest.approx(1.0 - INNER) == INSIDE
+
+
+def test_it_is_on_where_the_slack_makes_a_loop() -> None:
+    plan = build(hybrid.validate_scene(led_through()))
+    entry = next(x for x in plan.contents if x.what == "contact of the line with itself")
+    assert entry.on and "near itself" in entry.why
+    assert plan.plane is not None  # nothing is computed in space before the line comes near itself
+
+
+def test_a_start_within_itself_is_told_of_and_refused_where_contact_is_asked() -> None:
+    ends = {"start": {"kind": "pinned", "position": [0, 0, 0]}, "end": {"kind": "pinned", "position": [0.01, 0, 0]}}
+    short = {"ends": ends, "time": {"duration": 0.04, "step": 0.02}, "output": {"every": 0.02}}
+    kinds = [event.kind for event in hybrid.run(hybrid.validate_scene(led_through(**short))).events]
+    assert kinds.count("line meets itself") == 1
+    with pytest.raises(hybrid.SceneError, match=r"s = .* m and s = .* m are .* m apart, less than 0.85[\s\S]*diameter"):
+        hybrid.run(hybrid.validate_scene(led_through(contact={"self": True}, **short)))
