@@ -75,6 +75,13 @@ def contact_bits(scene: Scene) -> int:
     return MAY_TOUCH if reach.may else 0
 
 
+def without_contact(scene: Scene) -> Scene:
+    """The scene with no contact that it does not ask for."""
+    if scene.contact.self is not None:
+        return scene
+    return scene.model_copy(update={"contact": scene.contact.model_copy(update={"self": False})})
+
+
 def touching(line: Line, friction: float) -> Line:
     """The line, of which contact with itself is computed from now on."""
     return line._replace(bits=line.bits | SELF_CONTACT | (SELF_FRICTION if friction else 0))

@@ -7,6 +7,7 @@ import math
 import time as clock
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
 from threading import Event
 
@@ -24,6 +25,7 @@ from hybrid.model.plan import output_times
 from hybrid.model.release import check_releases
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, requested_accuracy, wants_errors
 from hybrid.model.sections import section_changes
+from hybrid.model.self_reach import without_contact
 from hybrid.outputs.probes import Observer
 from hybrid.outputs.quantities import quantities_of
 from hybrid.scene.read import scene_text
@@ -144,6 +146,10 @@ class Case:
         with opened(source) as file:
             point = read_checkpoint(file)
             self._check(point, source)
+            texts = self._texts
+            if "self_contact" not in file:  # of a version that did not compute contact without being asked
+                self.scene = without_contact(self.scene)
+                self.changes = tuple(replace(x, scene=without_contact(x.scene)) for x in self.changes)
             scenes = (self.scene, *(x.scene for x in self.changes))
             with refused(source):
                 resolution = resolution_from(point.resolution, self.scene)
@@ -159,7 +165,7 @@ class Case:
                     raise ValueError(f"an output at {due[at]:g} s is due, after one at {point.t:g} s")
             assert loop.run.envelope is not None
             loop.recorder = recorder = Recorder.again(
-                file, target, loop.observer.fields, STEP_FIELDS, point, self._texts, before or {},
+                file, target, loop.observer.fields, STEP_FIELDS, point, texts, before or {},
                 [*loop.run.envelope.fixed(), *mesh_fields(model)],
             )  # fmt: skip
         recorder.files = self._files

@@ -10,6 +10,7 @@ import pytest
 from bits import Stopping, differences, went_on
 
 import hybrid
+import hybrid.model.build
 from hybrid.kernels.self_contact_law import INNER, OUTER
 from hybrid.kernels.self_contact_pairs import WINDOW
 from hybrid.kernels.self_distance import INSIDE
@@ -67,6 +68,19 @@ def test_it_resumes_bit_for_bit_before_contact_begins_and_in_it(
     stopping = Stopping(monkeypatch)
     assert went_on(hybrid.validate_scene(led_through()), tmp_path / "run.h5", stopping, [20, 110]) == 2
     assert differences(whole, tmp_path / "run.h5") == []
+
+
+def test_a_file_of_before_goes_on_as_it_began(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It was written when nothing was computed that was not asked for, and has no fields for it."""
+    stopping, scene = Stopping(monkeypatch), led_through(time={"duration": 0.2, "step": 0.02})
+    with monkeypatch.context() as before:
+        before.setattr(hybrid.model.build, "contact_bits", lambda scene: 0)
+        stopping.left = 4
+        with pytest.raises(KeyboardInterrupt):
+            hybrid.run(hybrid.validate_scene(scene), tmp_path / "run.h5", progress=stopping)
+    with hybrid.resume(tmp_path / "run.h5") as result:
+        assert result.status == "complete" and result.times[-1] == 0.2 and "self_contact" not in result
+        assert hybrid.parse_scene(result.scene_text).contact.self is None
 
 
 @pytest.mark.parametrize(
