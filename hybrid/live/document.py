@@ -18,6 +18,8 @@ REMEMBERED = 50_000_000
 # Lines beyond which two texts are not compared line by line: it takes a second.
 MOST_LINES = 20_000
 
+Stamp = tuple[int, int, int]  # of a file: number, size, time of the last change
+
 
 class Refused(Exception):
     """Something that was asked is not done; the text says why, and what to try."""
@@ -34,7 +36,7 @@ class Document:
         self.newline = "\r\n" if "\r\n" in text else "\n"  # of the file; texts here have \n alone, as browsers do
         self._former: dict[int, str] = {0: unified(text)}
         self.saved: str | None = self.text if path else None  # what the file holds as far as is known
-        self._stamp = _stamp(path)
+        self._stamp = stamp_of(path)
 
     @property
     def text(self) -> str:
@@ -79,14 +81,14 @@ class Document:
         if target == self.path and not force and _content(target) not in (self.saved, self.text):
             raise Refused(f"{target.name} was changed on disk by another program")
         _write(target, self.text.replace("\n", self.newline))
-        self.path, self.saved, self._stamp = target, self.text, _stamp(target)
+        self.path, self.saved, self._stamp = target, self.text, stamp_of(target)
 
     def look(self) -> str:
         """Look at the file: "" as it was; "taken" its new text is the text now; "differs" it has another text, and so
         has this; "gone" it is not there."""
         if self.path is None:
             return ""
-        stamp = _stamp(self.path)
+        stamp = stamp_of(self.path)
         if stamp == self._stamp:
             return ""
         if stamp is None:
@@ -110,7 +112,7 @@ class Document:
                 found = unified(text_of(self.path))
             except SceneError as error:
                 raise Refused(str(error)) from None
-            self.saved, self._stamp = found, _stamp(self.path)
+            self.saved, self._stamp = found, stamp_of(self.path)
             if found != self.text:
                 self._take(found)
 
@@ -181,7 +183,7 @@ def _changes(old: Sequence[str], new: Sequence[str]) -> list[tuple[int, int, int
     return [(i, j, k, m) for tag, i, j, k, m in found if tag != "equal"]
 
 
-def _stamp(path: Path | None) -> tuple[int, int, int] | None:
+def stamp_of(path: Path | None) -> Stamp | None:
     """What changes when a file does; None: there is none."""
     try:
         found = path.stat() if path is not None else None

@@ -11,8 +11,9 @@ from pathlib import Path
 from typing import Any
 
 from hybrid.errors import SceneError
-from hybrid.live.document import Document, Refused
+from hybrid.live.document import Document, Refused, Stamp, stamp_of
 from hybrid.live.examples import example_text, examples
+from hybrid.live.named_files import named_files
 from hybrid.live.new_scenes import new_scene, questions
 from hybrid.live.playback import Playback
 from hybrid.live.runs import Run
@@ -23,6 +24,7 @@ from hybrid.store.lock import is_held
 # s between two looks at the scene file, and at a result; s after which a file that is not there is gone, and not about
 # to be replaced by an editor that saves.
 WATCH, FOLLOW, GONE = 0.02, 0.2, 1.0
+WATCH_NAMED = 0.1  # s between two looks at the files that a scene names
 # Messages that wait for a browser that does not read: it is let go, and gets everything when it comes back.
 MOST_WAITING = 500
 STOPPING = 10.0  # s for a run to complete its file when the view ends
@@ -70,7 +72,8 @@ class Session:
         await self.workers.start()
         if self.document is not None and self.document.text.strip():
             self._wanted.set()
-        self._tasks = [asyncio.create_task(x) for x in (self._compute(), self._watch(), self._follow())]
+        work = (self._compute(), self._watch(), self._watch_named(), self._follow())
+        self._tasks = [asyncio.create_task(x) for x in work]
 
     async def stop(self) -> None:
         """End everything; a run completes its file."""
@@ -213,6 +216,20 @@ class Session:
                 self._disk = "differs"
             if found or self._disk == "gone":
                 self._tell_state()
+
+    async def _watch_named(self) -> None:
+        """Look at the files that the scene names, such as motions: where one has changed there is a new picture."""
+        revision, stamps = -1, dict[Path, Stamp | None]()
+        while self.document is not None:
+            if revision != self.document.revision:
+                revision = self.document.revision
+                files = named_files(self.document.text, self.document.folder)
+                stamps = {file: stamps.get(file) or stamp_of(file) for file in files}
+            now = {file: stamp_of(file) for file in stamps}
+            if now != stamps:
+                stamps = now
+                self._wanted.set()
+            await asyncio.sleep(WATCH_NAMED)
 
     # ---- pictures -----------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cabl
 from viewed import LINES, SCENE, Page, exchange, random_edit, served
 from websockets.exceptions import ConnectionClosed, InvalidHandshake
 
+from hybrid.live.named_files import MOST_FILES, named_files
 from hybrid.live.pictures import picture_of
 from hybrid.live.server import LARGEST_MESSAGE
 from hybrid.live.session import Session
@@ -253,6 +254,30 @@ def test_the_file_is_watched_and_saving_asks_where_it_was_changed(
     page.ask(do="reload")
     assert "Theirs" in page.hear(lambda m: m["is"] == "text" and "Theirs" in m["text"])["text"]
     assert "Theirs" in file.read_text()
+
+
+def test_files_that_the_scene_names_are_watched(viewed: tuple[str, Session, Path], page: Page) -> None:
+    """A picture follows the motion file: not there, sound, and with a jump of velocity."""
+    moved = SCENE.replace("{heave: {amplitude: 0.5, period: 4}, ramp: 4}", "{file: moved.csv}")
+    problems = page.picture(page.edit(moved))["problems"]
+    assert problems and "moved.csv" in problems[0]["text"] + problems[0]["given"]
+    file = viewed[2].parent / "moved.csv"
+    rows = [(0.5 * k, 14.0, 0.0, 0.0) for k in range(9)]
+    file.write_text("t,x,y,z\n" + "".join(f"{t},{x},{y},{z}\n" for t, x, y, z in rows))
+    assert not page.hear("picture")["picture"]["problems"]
+    file.write_text(file.read_text().replace("2.0,14.0", "2.0,wrong"))
+    problems = page.hear("picture")["picture"]["problems"]
+    assert problems and "moved.csv" in problems[0]["text"] + problems[0]["given"]
+
+
+def test_files_are_found_in_texts_that_are_no_scenes(tmp_path: Path) -> None:
+    text = "  # file: no.csv\nmotion: {file: a.csv, ramp: 8}\nx: [\nforce: {'file': \"b c.csv\"}\n"
+    text += (
+        "vessel: {rao: ship/rao.csv, origin: [0, 0]}  # file: x\n  file: d.csv # the last\nprofile: e.csv\nfile: {\n"
+    )
+    names = ["a.csv", "b c.csv", "ship/rao.csv", "x", "d.csv"]
+    assert named_files(text, tmp_path) == [tmp_path / name for name in names]
+    assert len(named_files("file: a{}\n" * 3 + "".join(f"file: {k}.csv\n" for k in range(99)), tmp_path)) == MOST_FILES
 
 
 def test_two_pages_see_each_other_and_lose_nothing(viewed: tuple[str, Session, Path], page: Page) -> None:
