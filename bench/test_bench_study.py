@@ -19,7 +19,8 @@ import hybrid
 from hybrid.scene.study import study_from
 from hybrid.studies.cases import cases_of, scene_of
 from hybrid.studies.collect import usual
-from hybrid.studies.study import Job, StudyRunning, compute_batch
+from hybrid.studies.dispatch import StudyRunning
+from hybrid.studies.workers import Job, compute_batch
 
 pytestmark = pytest.mark.bench
 
@@ -92,9 +93,9 @@ def test_memory_of_a_worker_is_flat(folder: Path) -> None:
 def test_empty_tasks() -> None:
     """What the scheduler takes for a task: 10 000 empty ones in one cluster."""
 
-    from hybrid.studies.study import _client
+    from hybrid.studies.cluster import client_of
 
-    with _client(2, None) as client:
+    with client_of(2, None) as client:
         begin = clock.perf_counter()
         futures = client.map(int, range(10_000), pure=False)
         client.gather(futures)

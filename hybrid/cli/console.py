@@ -25,8 +25,8 @@ if TYPE_CHECKING:
     from hybrid.scene.schema import Scene
     from hybrid.simulation.progress import Progress
     from hybrid.store.records import Event
+    from hybrid.studies.dispatch import StudyRunning
     from hybrid.studies.runs import StudyProgress
-    from hybrid.studies.study import StudyRunning
 
 JSON_EVERY = 1.0  # s of wall time between two progress lines for programs: a long run must not fill a log
 BAR_EVERY = 0.5  # s of wall time between two drawings of the bar of a study: below 1 % of what its runs cost

@@ -75,6 +75,9 @@ class StudyFile:
         self.batch = int(self._group.attrs["batch"])
         self._status = np.asarray(self._group["status"][:])
         self.cases = int(self._group["case"].shape[0])
+        # What is open already: to find and open an array in its folder takes longer than to write a chunk.
+        self._arrays = dict(self._group.arrays())
+        self._coordinates: dict[str, np.ndarray] = {}
 
     @classmethod
     def create(
@@ -137,9 +140,9 @@ class StudyFile:
 
         Columns have the shapes of those of the study, and coordinates are new.
         """
-        where, known = self.slice_of(batch), set(self._group.array_keys())
+        where = self.slice_of(batch)
         for name, column in coordinates.items():
-            array = self._group.create_array(
+            array = self._arrays[name] = self._group.create_array(
                 name, shape=column.values.shape, chunks=column.values.shape, dtype=column.values.dtype, overwrite=True,
                 dimension_names=[name], attributes={"units": column.unit, "long_name": column.description},
             )  # fmt: skip
@@ -148,22 +151,28 @@ class StudyFile:
         for name, column in columns.items():
             if name == "status":
                 continue
-            if name not in known:
-                self._array(self._group, name, column, self.cases, self.batch)
+            if name not in self._arrays:
+                self._arrays[name] = self._array(self._group, name, column, self.cases, self.batch)
             text = column.values.dtype.kind in "UO"
-            self._group[name][where] = column.values.astype(object) if text else column.values
-        self._group["status"][where] = self._status[where] = columns["status"].values
+            self._arrays[name][where] = column.values.astype(object) if text else column.values
+        self._arrays["status"][where] = self._status[where] = columns["status"].values
+
+    def __contains__(self, name: str) -> bool:
+        """Whether there is a column of that name."""
+        return name in self._arrays
 
     def coordinate(self, name: str) -> np.ndarray | None:
         """Values of a dimension; None: there are none yet, or a kill came while they were written."""
-        if name not in self._group or not self._group[name].attrs.get(COMPLETE):
-            return None
-        return np.asarray(self._group[name][:])
+        if name not in self._coordinates:
+            if name not in self._arrays or not self._arrays[name].attrs.get(COMPLETE):
+                return None
+            self._coordinates[name] = np.asarray(self._arrays[name][:])
+        return self._coordinates[name]
 
     def reopen(self, cases: Iterable[int]) -> None:
         """Make cases open again, to be computed anew."""
         self._status[list(cases)] = OPEN
-        self._group["status"][:] = self._status
+        self._arrays["status"][:] = self._status
 
 
 def open_study(path: str | Path) -> xarray.Dataset:

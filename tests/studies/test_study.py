@@ -193,9 +193,9 @@ def test_other_workers_and_batches_give_the_same(folder: Path, found: object, tm
 
 def test_a_second_call_does_what_is_missing(folder: Path, found: object, monkeypatch: pytest.MonkeyPatch) -> None:
     """A complete study starts no worker; of an incomplete one only the open batches are computed."""
-    from hybrid.studies import study as module
+    from hybrid.studies import dispatch
 
-    monkeypatch.setattr(module, "_client", None)
+    monkeypatch.setattr(dispatch, "client_of", None)
     again = hybrid.study(folder / "heave.yaml")
     assert again.equals(found)
 
@@ -411,13 +411,13 @@ def test_a_case_that_kills_its_worker_is_data(
     def deadly(job: object) -> list:  # sent by value: workers do not know this module
         import os as system
 
-        from hybrid.studies.study import compute_batch
+        from hybrid.studies.workers import compute_batch
 
         if any(row["A"] == 0.5 and row["T"] == 6 for row in job.rows):  # type: ignore[attr-defined]
             system.kill(system.getpid(), 9)
         return compute_batch(job)  # type: ignore[arg-type]
 
-    monkeypatch.setattr("hybrid.studies.study.compute_batch", deadly)
+    monkeypatch.setattr("hybrid.studies.dispatch.compute_batch", deadly)
     after = hybrid.study(folder / "heave.yaml", tmp_path / "deadly.zarr", workers=2, batch=3)
     dead = (after.A.values == 0.5) & (after["T"].values == 6)
     assert dead.sum() == 1 and "worker died" in str(after.reason.values[dead][0])

@@ -1,0 +1,165 @@
+"""The batches of a study: sent to workers a few ahead, and written as they come back; a kill of anything is expected.
+
+Batches come back in any order.  Units, places and times of what is kept are those of the first case in order that has
+it, so that results do not depend on the number of workers: a batch that would be the first to have something waits
+until all batches before it are written.
+"""
+
+from __future__ import annotations
+
+import time as clock
+from collections.abc import Callable, Mapping
+from concurrent.futures import CancelledError
+from contextlib import suppress
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from hybrid.errors import ResultError
+from hybrid.scene.study import Kept
+from hybrid.store.selection import optional_package
+from hybrid.store.study_file import FAILED, OPEN, StudyFile, counts_of
+from hybrid.studies.cases import Cases
+from hybrid.studies.cluster import client_of
+from hybrid.studies.outcomes import has_something_new, write_outcomes
+from hybrid.studies.workers import NOT_KEPT, Job, Outcome, compute_batch
+
+# Batches that a worker has, or waits for.
+AHEAD = 3
+
+
+@dataclass(frozen=True)
+class StudyRunning:
+    """Progress of a study: cases in all, done, failed; s since it began; dask's dashboard, "" if there is none."""
+
+    total: int
+    done: int
+    failed: int
+    elapsed: float
+    dashboard: str
+
+    @property
+    def left(self) -> int:
+        return self.total - self.done - self.failed
+
+
+def compute_open_batches(
+    file: StudyFile, cases: Cases, wanted: Mapping[str, Kept], workers: int | None, scheduler: str | None,
+    progress: Callable[[StudyRunning], None] | None,
+) -> None:  # fmt: skip
+    """Compute the batches of a study that are not done; ResultError when the scheduler is gone."""
+    begin = clock.perf_counter()
+
+    def tell(dashboard: str) -> None:
+        if progress is not None:
+            now = counts_of(file.status)
+            progress(StudyRunning(file.cases, now["done"], now["failed"], clock.perf_counter() - begin, dashboard))
+
+    def job_of(k: int) -> Job:
+        return Job(cases.base, cases.keys, cases.rows[file.slice_of(k)], wanted, cases.static)
+
+    with client_of(workers, scheduler) as client:
+        dashboard = str(getattr(client, "dashboard_link", "") or "")
+        tell(dashboard)
+        batches = _Batches(client, file, job_of, lambda: tell(dashboard))
+        try:
+            batches.compute(file.open_batches())
+        except (OSError, TimeoutError, CancelledError) as error:  # distributed's errors of a lost connection are these
+            raise ResultError(_gone(file, str(error) or type(error).__name__)) from None
+        finally:
+            with suppress(Exception):
+                client.cancel(list(batches.running))
+
+
+class _Batches:
+    """Batches by what has become of them: running, aside because workers died of them, or computed and not written."""
+
+    def __init__(self, client: Any, file: StudyFile, job_of: Callable[[int], Job], written: Callable[[], None]) -> None:
+        self._client, self._file, self._job_of, self._written = client, file, job_of, written
+        self._distributed = optional_package("distributed", "a study", "studies")
+        self._waiting = self._distributed.as_completed(loop=client.loop)
+        self.running: dict[Any, int] = {}
+        self._aside: list[int] = []
+        self._computed: dict[int, list[Outcome]] = {}
+
+    def compute(self, batches: list[int]) -> None:
+        """Compute batches, and write them."""
+        left = iter(batches)
+        most = AHEAD * max(sum(self._client.nthreads().values()), 1)
+        while True:
+            stuck = self._aside and self._computed  # what is computed waits for a batch that is aside: that one first
+            while len(self.running) < most and not stuck and (k := next(left, None)) is not None:
+                self._send(k)
+            if self.running:
+                self._receive(next(self._waiting))
+            elif self._aside:
+                k = self._aside.pop(0)
+                self._keep(k, self._one_by_one(self._job_of(k)))
+            else:
+                return
+
+    def _send(self, k: int) -> None:
+        future = self._client.submit(compute_batch, self._job_of(k), pure=False)
+        self.running[future] = k
+        self._waiting.add(future)
+
+    def _receive(self, future: Any) -> None:
+        """Take what a batch has come to."""
+        if future.status in ("lost", "pending"):  # its worker died with the result: it is computed again elsewhere
+            self._waiting.add(future)
+            return
+        k = self.running.pop(future)
+        try:
+            if future.status == "cancelled":
+                raise ResultError(_gone(self._file, "its tasks are cancelled"))
+            self._keep(k, future.result())
+        except self._distributed.KilledWorker:
+            self._aside.append(k)
+        future.release()
+
+    def _one_by_one(self, job: Job) -> list[Outcome]:
+        """The cases of a batch whose worker died, each alone, so that the one that kills a worker is known.
+
+        Nothing else may run: of whatever a worker was about to compute, dask counts its death.
+        """
+        outcomes = []
+        for row in job.rows:
+            future = self._client.submit(compute_batch, job._replace(rows=[row]), pure=False)
+            try:
+                outcomes += future.result()
+            except self._distributed.KilledWorker:
+                outcomes.append(Outcome(FAILED, "its worker died at every try (out of memory?)", "", np.nan, -1, {}))
+            future.release()
+        return outcomes
+
+    def _keep(self, k: int, outcomes: list[Outcome]) -> None:
+        """Write a batch, and those that have waited for it; or let it wait."""
+        if k == 0:
+            _refuse_what_is_never_kept(outcomes)
+        self._computed[k] = outcomes
+        for each in sorted(self._computed):
+            first_open = np.flatnonzero(self._file.status == OPEN)[0]
+            if first_open < self._file.slice_of(each).start and has_something_new(self._file, self._computed[each]):
+                continue
+            write_outcomes(self._file, each, self._computed.pop(each))
+            self._written()
+
+
+def _refuse_what_is_never_kept(outcomes: list[Outcome]) -> None:
+    """ResultError if of the first batch nothing could be kept, for the reason of `collect`: so it would be of all."""
+    reasons = {one.reason for one in outcomes}
+    if len(reasons) == 1 and (reason := reasons.pop()).startswith(NOT_KEPT):
+        raise ResultError(
+            f"of the first {len(outcomes)} cases nothing could be kept: {reason.removeprefix(NOT_KEPT)}\n"
+            "    try:      another collect"
+        )
+
+
+def _gone(file: StudyFile, detail: str) -> str:
+    now = counts_of(file.status)
+    done = now["done"] + now["failed"]
+    return (
+        f"the scheduler of the study is gone; {done} of {file.cases} cases are in {file.path}\n"
+        f"    detail:   {detail}\n    try:      the same command goes on"
+    )

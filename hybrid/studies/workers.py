@@ -1,0 +1,72 @@
+"""What runs on a worker of a study: a batch of cases, and what is kept of each."""
+
+from __future__ import annotations
+
+import os
+import time as clock
+from collections.abc import Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from hybrid.errors import EVENTS_BY_WEIGHT, HybridError, SceneError
+from hybrid.scene.study import Kept
+from hybrid.simulation.api import run, static
+from hybrid.store.study_file import DONE, FAILED
+from hybrid.studies.cases import scene_of
+from hybrid.studies.collect import Variable, collected
+
+# How the reason of a case begins that was computed, and of which something could not be kept.
+NOT_KEPT = "not kept: "
+
+
+class Job(NamedTuple):
+    """What a worker needs to know of a batch: the scene, the keys, and the rows of its cases."""
+
+    base: Mapping[str, Any]
+    keys: Mapping[str, tuple[str, ...]]
+    rows: list[dict[str, Any]]
+    wanted: Mapping[str, Kept]
+    static: bool
+
+
+class Outcome(NamedTuple):
+    """Of one case: status, reason, events, s of processor time, steps, and what was kept."""
+
+    status: int
+    reason: str
+    events: str
+    cpu: float
+    steps: int
+    kept: dict[str, tuple[Variable, np.ndarray]]
+
+
+def compute_batch(job: Job) -> list[Outcome]:
+    """Compute the cases of a batch, one after the other, in one thread."""
+    os.environ["HYBRID_THREADS"] = "1"
+    return [_computed(job, row) for row in job.rows]
+
+
+def _computed(job: Job, row: dict[str, Any]) -> Outcome:
+    begin = clock.process_time()
+    try:
+        scene = scene_of(job.base, job.keys, row)
+        result = static(scene) if job.static else run(scene)
+    except SceneError as error:
+        first = error.complaints[0]
+        reason = f"refused: {first.where}: given {first.value}, expected {first.expected}"
+        return Outcome(FAILED, reason, "", clock.process_time() - begin, -1, {})
+    except HybridError as error:
+        return Outcome(FAILED, str(error).splitlines()[0], "", clock.process_time() - begin, -1, {})
+    except (ArithmeticError, ValueError, LookupError, TypeError, AssertionError) as error:
+        return Outcome(FAILED, f"a bug: {type(error).__name__}: {error}", "", clock.process_time() - begin, -1, {})
+    spent = clock.process_time() - begin
+    with result:
+        kinds = {event.kind for event in result.events}
+        events = ", ".join([*(k for k in EVENTS_BY_WEIGHT if k in kinds), *sorted(kinds - set(EVENTS_BY_WEIGHT))])
+        logged = next(iter(result.lines.values()), result)
+        steps = len(logged["steps/t"]) if "steps/t" in logged else 0
+        try:
+            return Outcome(DONE, "", events, spent, steps, collected(result, job.wanted))
+        except (HybridError, KeyError, AttributeError) as error:
+            return Outcome(FAILED, NOT_KEPT + str(error).splitlines()[0], events, spent, steps, {})
