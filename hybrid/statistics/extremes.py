@@ -38,9 +38,10 @@ EULER = 0.5772156649015329
 
 
 class Extreme(NamedTuple):
-    """The largest value in a time: `most_probable`, and the `fractile` that it does not exceed with that probability.
+    """The largest value in a time: `most_probable`, its `median`, and the `fractile` not exceeded with `probability`.
 
     Each has its interval (low, high) at CONFIDENCE.  most_probable: what is exceeded once in that time on average;
+    median: what the largest values of many such times exceed in every other one;
     law: "weibull" or "gumbel", `fitted`: its numbers in words; peaks: that entered the fit; duration: s; beyond: how
     many times the record that is.
     """
@@ -48,6 +49,8 @@ class Extreme(NamedTuple):
     law: str
     most_probable: float
     most_probable_interval: tuple[float, float]
+    median: float
+    median_interval: tuple[float, float]
     fractile: float
     fractile_interval: tuple[float, float]
     probability: float
@@ -124,11 +127,13 @@ def of_record(
     def beyond(number: Floats | float, scale: Floats | float, shape: Floats | float, part: float) -> Floats:
         return np.asarray(threshold + scale * np.maximum(np.log(number / part), 0.0) ** (1.0 / shape))
 
-    rare = -math.log(probability)
+    # P(x) = p where rate T exp(-((x - threshold) / scale)^shape) = -ln p; the most probable value is that of 1.
+    def figure(part: float) -> tuple[float, tuple[float, float]]:
+        return float(beyond(number, scale, shape, part)), _interval(beyond(numbers, scales, shapes, part))
+
     return Extreme(
-        "weibull", float(beyond(number, scale, shape, 1.0)), _interval(beyond(numbers, scales, shapes, 1.0)),
-        float(beyond(number, scale, shape, rare)), _interval(beyond(numbers, scales, shapes, rare)), probability,
-        duration, int(over.size), duration / float(times[-1] - times[0]),
+        "weibull", *figure(1.0), *figure(math.log(2.0)), *figure(-math.log(probability)), probability, duration,
+        int(over.size), duration / float(times[-1] - times[0]),
         f"Weibull, threshold {threshold:.6g}, scale {float(scale):.4g}, shape {float(shape):.4g}",
     )  # fmt: skip
 
@@ -154,11 +159,15 @@ def of_maxima(
         raise ResultError(f"{values.size} largest values are all {values[0]:.6g}\n    try:      other seeds")
     rng = np.random.default_rng(0)
     modes, scales = fit_gumbel(rng.gumbel(float(mode), float(scale), (values.size, RESAMPLES)))
-    rare = -math.log(-math.log(probability))
+
+    # P(x) = p at -ln(-ln p) scales above the mode.
+    def figure(above: float) -> tuple[float, tuple[float, float]]:
+        return float(mode + scale * (shift + above)), _interval(modes + scales * (shift + above))
+
     return Extreme(
-        "gumbel", float(mode + scale * shift), _interval(modes + scales * shift),
-        float(mode + scale * (shift + rare)), _interval(modes + scales * (shift + rare)), probability, duration,
-        int(values.size), duration / record, f"Gumbel, mode {float(mode):.6g}, scale {float(scale):.4g}",
+        "gumbel", *figure(0.0), *figure(-math.log(math.log(2.0))), *figure(-math.log(-math.log(probability))),
+        probability, duration, int(values.size), duration / record,
+        f"Gumbel, mode {float(mode):.6g}, scale {float(scale):.4g}",
     )  # fmt: skip
 
 

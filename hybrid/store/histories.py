@@ -147,8 +147,9 @@ class Histories:
         low = None if threshold is None else -threshold
         found = extremes.of_record(history.t, -history.values, duration, low, probability)
         return found._replace(
-            most_probable=-found.most_probable, fractile=-found.fractile,
+            most_probable=-found.most_probable, median=-found.median, fractile=-found.fractile,
             most_probable_interval=_negated(found.most_probable_interval),
+            median_interval=_negated(found.median_interval),
             fractile_interval=_negated(found.fractile_interval), fitted=f"of the negative values: {found.fitted}",
         )  # fmt: skip
 

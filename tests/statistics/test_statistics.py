@@ -163,8 +163,9 @@ def test_extreme_of_seeds_contains_what_further_seeds_bring() -> None:
     """Largest values of 20 records of three hours: their most probable value, and the median of 200 more."""
     far = np.array([record(3.0 * HOUR, 1000 + k, 1.0)[1].max() for k in range(220)])
     found = extremes.of_maxima(far[:20], 3.0 * HOUR)
+    assert found.median_interval[0] < np.median(far[20:]) < found.median_interval[1]
     half = extremes.of_maxima(far[:20], 3.0 * HOUR, probability=0.5)
-    assert half.fractile_interval[0] < np.median(far[20:]) < half.fractile_interval[1]
+    assert [half.fractile, *half.fractile_interval] == pytest.approx([found.median, *found.median_interval])
     assert found.beyond == 1.0 and found.peaks == 20
     # six hours are as two records: P(x)^2
     more = extremes.of_maxima(far[:20], 3.0 * HOUR, 6.0 * HOUR)
@@ -173,14 +174,32 @@ def test_extreme_of_seeds_contains_what_further_seeds_bring() -> None:
 
 
 def test_intervals_hold_what_they_promise() -> None:
-    """In 200 draws of 20 Gumbel values the true 90 % fractile is inside the 90 % interval in 80 to 98 %."""
+    """In 200 draws of 20 Gumbel values mode, median and 90 % fractile are inside their 90 % intervals in 80 to 98 %."""
     rng = np.random.default_rng(9)
-    truth = 10.0 - 3.0 * math.log(-math.log(0.9))
-    inside = 0
+    truth = np.array([10.0 - 3.0 * math.log(-math.log(p)) for p in (math.exp(-1.0), 0.5, 0.9)])
+    inside = np.zeros(3)
     for _ in range(200):
-        low, high = extremes.of_maxima(rng.gumbel(10.0, 3.0, 20), 1.0, 1.0).fractile_interval
-        inside += low <= truth <= high
-    assert 0.8 <= inside / 200 <= 0.98
+        found = extremes.of_maxima(rng.gumbel(10.0, 3.0, 20), 1.0, 1.0)
+        low, high = np.transpose([found.most_probable_interval, found.median_interval, found.fractile_interval])
+        inside += (low <= truth) & (truth <= high)
+    assert np.all((inside >= 160) & (inside <= 196))
+
+
+def test_median_of_a_record_is_that_of_its_peaks() -> None:
+    """Exponential peaks, whose excess is a Weibull law: the largest of N exceeds ln(N / ln 2) in every other record."""
+    N, rng = 10_000, np.random.default_rng(4)
+    t = np.arange(2.0 * N + 1.0)
+    x = np.zeros(t.size)  # a peak, and a trough as deep as another, at every other instant
+    x[1::2] = rng.exponential(1.0, N)
+    x[2::2] = -rng.permutation(x[1::2])
+    found = extremes.of_record(t, x, t[-1])
+    for value, interval, part in (
+        (found.most_probable, found.most_probable_interval, 1.0), (found.median, found.median_interval, math.log(2.0))
+    ):  # fmt: skip
+        exact = math.log(N / part)
+        assert value == pytest.approx(exact, rel=0.05) and interval[0] < exact < interval[1]
+    low = extremes.of_record(t, x, t[-1], probability=0.5)
+    assert low.fractile == low.median > low.most_probable
 
 
 def test_too_few_peaks_are_refused() -> None:

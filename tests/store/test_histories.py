@@ -59,8 +59,9 @@ def test_statistics_are_of_steps_and_of_outputs(result: hybrid.Result) -> None:
 def test_extremes_and_their_negative(result: hybrid.Result) -> None:
     """The smallest value is the negative of the largest of what is negated, with its interval the right way round."""
     low = result.extreme("tension", at=30.0, smallest=True, duration=600.0)
-    assert low.fractile < low.most_probable < result.at(s=30.0, names=["tension"])["tension"].mean()
+    assert low.fractile < low.median < low.most_probable < result.at(s=30.0, names=["tension"])["tension"].mean()
     assert low.fractile_interval[0] <= low.fractile <= low.fractile_interval[1]
+    assert low.median_interval[0] <= low.median <= low.median_interval[1]
 
 
 def test_spectrum_has_its_peak_where_the_motion_is(result: hybrid.Result) -> None:
