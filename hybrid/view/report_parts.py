@@ -33,7 +33,12 @@ def filled_page(parts: dict[str, str], store: Store) -> str:
     links = [("summary", "Summary"), *sections, ("scene", "The scene")]
     more = {"contents": "".join(f'<a href="#{name}">{title}</a>' for name, title in links)}
     more |= {"data": packed(store.block), "plotly": packed(plotly_script().encode())}
-    return filled("report.html", parts | more | {"css": page_file("report.css"), "js": page_file("report.js")})
+    return page_of("report.html", parts | more | {"css": page_file("report.css"), "js": page_file("report.js")})
+
+
+def page_of(body: str, parts: dict[str, str]) -> str:
+    """A whole page: what all pages have (head, title, footer, plotly.js), and a template of what is in it."""
+    return filled("page.html", parts | {"body": filled(body, parts)})
 
 
 def page_file(name: str) -> str:

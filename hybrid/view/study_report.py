@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from hybrid.store.study_file import DONE, FAILED, OPEN, counts_of, open_study
-from hybrid.view.report_parts import filled, footer, packed, page_file, plotly_script
+from hybrid.view.report_parts import footer, packed, page_file, page_of, plotly_script
 from hybrid.view.save import PAGES, REPORT_MARK, check_target, write_file
 
 STATUS = {OPEN: "open", DONE: "done", FAILED: "failed"}
@@ -53,7 +53,7 @@ def html(study: Path) -> str:
         "data": packed(json.dumps(data, allow_nan=False).encode()),
         "plotly": packed(plotly_script().encode()),
     }
-    return filled("study.html", parts)
+    return page_of("study.html", parts)
 
 
 def _column(found: Any, name: str) -> dict[str, Any]:
