@@ -23,6 +23,9 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
 
     settings = {
         "distributed.scheduler.allowed-failures": TRIES - 1, "distributed.comm.timeouts.connect": "20s",
+        # A killed worker starts again; on a busy machine that takes longer than the 15 s after which dask gives it up,
+        # and the study would wait for ever for workers that are not there.
+        "distributed.deploy.lost-worker-timeout": "1h",
         "distributed.worker.profile.enabled": False,  # it stops the worker a hundred times a second to look at it
     }  # fmt: skip
     with dask.config.set(settings), ExitStack() as stack:
