@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -163,13 +164,14 @@ class Survey:
         beside = self._layers(rod, [z.s_b for z in model.zones[:-1]])
         return grading(demand.s, demand.curvature, beside, model.length)
 
+    @cached_property
     def grading_of_catenary(self) -> Grading:
         """Cells of a line that is catenary everywhere."""
         return grading(self.demand.s, self.demand.curvature, np.zeros(SAMPLES), self.model.length)
 
     def grading_of_moving_zones(self, rod_cell: Floats) -> Grading:
         """Base cells of a line whose zones move; rod_cell: (K,) m, length of the cells of its rods."""
-        found = self.grading_of_catenary()
+        found = self.grading_of_catenary
         rods = np.interp(found.s, self.demand.s, rod_cell)
         exact = self.given is not None or self.along
         if exact:

@@ -44,7 +44,7 @@ def choose_model(case: Case, resolution: Resolution) -> tuple[ModelChoice, Resol
     bend = rod_cells(moving, model.cable, demand.s)
     gradings: dict[str, Grading] = {
         "rod": survey.grading(),
-        "catenary": survey.grading_of_catenary(),
+        "catenary": survey.grading_of_catenary,
         "adaptive": survey.grading_of_moving_zones(bend),
     }
     found = ratios(scene, model, demand, resolution.zones * model.length)
