@@ -229,3 +229,21 @@ def test_no_figure_is_still_to_come(page: Path) -> None:
     """A cell that is one word in capitals is a place kept for a number; so is such a line of a block of output."""
     text = re.sub(r"```(diff|python|yaml)\n.*?```", "", page.read_text(encoding="utf-8"), flags=re.DOTALL)
     assert not re.findall(r"(?:^|\| )([A-Z]{4,}(?:_[A-Z]+)*)(?: \||$)", text, re.MULTILINE)
+
+
+def test_films_of_the_gallery_are_there_and_small() -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "make_gallery.py"))
+    assert (ROOT / "docs" / "gallery.md").read_text(encoding="utf-8") == made["page"](), "python docs/make_gallery.py"
+    films = {file.stem: file.stat().st_size for file in (ROOT / "docs" / "films").iterdir()}
+    assert set(films) == set(made["SHOWN"])
+    assert all(10_000 < size < made["LARGEST"] for size in films.values()), films
+
+
+@pytest.mark.slow  # seven commands
+def test_the_tutorial_shows_what_its_commands_print(tmp_path: Path) -> None:
+    made = runpy.run_path(str(ROOT / "docs" / "make_tutorial.py"))
+    constant = made["constant"]
+    page = constant((ROOT / "docs" / "tutorial.md").read_text(encoding="utf-8"))
+    assert constant(made["page"](tmp_path)) == page, "python docs/make_tutorial.py"
+    assert "Traceback" not in page and "tow.html" in page
+    assert constant("4 min 2 s of wall time (compilation included)") == constant("0.9 s of wall time (70 x real time)")

@@ -1,6 +1,6 @@
 """Pictures of the live view for docs/view.md, in headless Chromium: wide and on a phone, light and dark.
 
-python docs/figures/view_pictures.py [FOLDER]
+python docs/figures/view_pictures.py [--new] [FOLDER]      # --new: those of a new scene alone
 """
 
 from __future__ import annotations
@@ -45,13 +45,13 @@ def small(picture: Path) -> None:
     Image.open(picture).convert("RGB").quantize(256).save(picture, optimize=True)
 
 
-def main(to: Path) -> None:
+def main(to: Path, all_of_them: bool = True) -> None:
     with tempfile.TemporaryDirectory() as name, sync_playwright() as play:
         folder = Path(name)
         shutil.copy(ROOT / "examples" / "touchdown.yaml", folder)
         program = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
         browser = play.chromium.launch(executable_path=program, args=list(QUIET))
-        for scheme in ("light", "dark"):
+        for scheme in ("light", "dark") if all_of_them else ():
             for width, screen in SCREENS.items():
                 with viewed(folder, "touchdown.yaml") as address:
                     # playwright waits by a way that the policy of the page forbids
@@ -68,15 +68,18 @@ def main(to: Path) -> None:
                     file = to / f"view_{width}_{scheme}.png"
                     page.screenshot(path=file)
                     small(file)
-        with viewed(folder) as address:
-            page = browser.new_context(bypass_csp=True, color_scheme="light", **SCREENS[1400]).new_page()
-            page.goto(address)
-            page.click("text=mooring")
-            page.wait_for_timeout(300)
-            page.screenshot(path=to / "view_new_1400_light.png")
-            small(to / "view_new_1400_light.png")
+        for width, scheme in ((1400, "light"), (400, "light"), (400, "dark")):
+            with viewed(folder) as address:
+                page = browser.new_context(bypass_csp=True, color_scheme=scheme, **SCREENS[width]).new_page()
+                page.goto(address)
+                page.click("text=mooring")
+                page.wait_for_timeout(300)
+                file = to / f"view_new_{width}_{scheme}.png"
+                page.screenshot(path=file)
+                small(file)
         browser.close()
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]) if sys.argv[1:] else PICTURES)
+    folders = [argument for argument in sys.argv[1:] if argument != "--new"]
+    main(Path(folders[0]) if folders else PICTURES, "--new" not in sys.argv)

@@ -29,6 +29,7 @@ FORMATS = (".mp4", ".gif")
 # A film of 12 to 30 s shows a motion without tiring; at most so many frames are drawn for it, and a gif, which stores
 # each of them nearly whole, gets fewer and smaller ones.
 _SECONDS, _FRAMES, _RATE = 12.0, {".mp4": 600, ".gif": 240}, {".mp4": 25.0, ".gif": 12.5}
+WIDE, _NARROW = 8.0, 6.0  # inches: the page, and the width below which views stand below each other
 _DPI = {".mp4": 150, ".gif": 90}
 _CRF = "23"  # of x264: its usual quality; lines stay sharp
 
@@ -48,10 +49,11 @@ class Film(NamedTuple):
         return f"{self.frames} frames{of}, {short(self.seconds, 3)} s at {self.factor:g} x real time"
 
 
-def animate(result: Result, path: str | Path, *, overwrite: bool = False) -> Film:
+def animate(result: Result, path: str | Path, *, overwrite: bool = False, width: float = WIDE) -> Film:
     """Write a film, in the format of its name; ResultError if nothing moves or it cannot be written.
 
-    overwrite: also replace a file that hybrid did not make.
+    overwrite: also replace a file that hybrid did not make.  width: of the page of one cable, inches; on a narrow one
+    words are larger beside the picture, and views stand below each other, for telephones.
     """
     target = check_target(path, FORMATS, overwrite=overwrite)
     suffix = target.suffix.lower()
@@ -70,7 +72,7 @@ def animate(result: Result, path: str | Path, *, overwrite: bool = False) -> Fil
         pause = max(round(pause, 2), 0.02)  # it counts in hundredths, and viewers slow down what is faster
         factor = float(f"{short(span / (pause * len(frames)), 3)}")
     seconds = pause * len(frames)
-    pictures = _pictures(result, frames, factor, _DPI[suffix])
+    pictures = _pictures(result, frames, factor, _DPI[suffix], width)
     write = _write_mp4 if suffix == ".mp4" else _write_gif
     write_file(target, lambda new: write(new, pictures, 1.0 / pause))
     return Film(target, len(frames), seconds, factor, n)
@@ -100,8 +102,8 @@ def _frames(result: Result, most: int) -> np.ndarray:
 # ---- frames ---------------------------------------------------------------------------------------
 
 
-def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int) -> Iterator[np.ndarray]:
-    """Pixels (height, width, 4) of every frame."""
+def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int, width: float) -> Iterator[np.ndarray]:
+    """Pixels (height, width, 4) of every frame; width: of the page, inches."""
     from hybrid.view.matplotlib_backend import film
 
     if result.lines:
@@ -115,8 +117,11 @@ def _pictures(result: Result, frames: np.ndarray, factor: float, dpi: int) -> It
     tall = aspect_of(list(views.values()), result) < 1.0
     mosaic: list[Any] = [[*names, "tension"]] if tall else [names, ["tension"] * len(names)]
     heights = None if tall else [2.2, 1.0]
+    if width < _NARROW and not tall:
+        mosaic, heights = [[name] for name in panels], [2.2] * len(views) + [1.4]
     # both sides even in pixels, as x264 wants them
-    look = {"mosaic": mosaic, "heights": heights, "legend": ["shape"], "size": (8.0, 5.12)}
+    size = tuple(2.0 * round(0.5 * x * dpi) / dpi for x in (width, 5.12 if width >= _NARROW else 1.04 * width))
+    look = {"mosaic": mosaic, "heights": heights, "legend": ["shape"], "size": size}
     page = page_of(result, [f"{factor:g} × real time"], panels=panels, **look)
     span = float(np.ptp(result.times)) / max(len(result.times) - 1, 1)
     places = int(np.clip(1 - np.floor(np.log10(span)), 0, 6))

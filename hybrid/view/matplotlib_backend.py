@@ -256,7 +256,9 @@ def film(page: Page, moving: Moving, frames: Iterable[int], dpi: int) -> Iterato
     canvas: Any = figure.canvas
     axes = {ax.get_label(): ax for ax in figure.axes}
     look: dict[str, Any] = {"fontsize": 11, "fontweight": "bold", "color": INK, "animated": True}
-    clock = figure.text(0.985, 0.985, "", ha="right", va="top", **look)
+    across, high = figure.get_size_inches()
+    below = 0.0 if across >= 6.0 else 0.2 / high  # on a narrow page beside the subtitle: the title needs the line
+    clock = figure.text(0.985, 0.985 - below, "", ha="right", va="top", **look)
     canvas.draw()
     figure.set_layout_engine("none")
     canvas.draw()

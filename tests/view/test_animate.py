@@ -33,6 +33,15 @@ def test_a_gif_moves_at_the_pace_that_is_said(tmp_path: Path) -> None:
     assert [x.name for x in tmp_path.iterdir()] == ["run.gif"]
 
 
+def test_a_narrow_page_for_telephones(tmp_path: Path) -> None:
+    """The clock, which has the same size in inches, is wider beside the page; the cable moves there as well."""
+    with Image.open(film.animate(reported(outputs=3), tmp_path / "run.gif", width=4.4).path) as image:
+        size, first = image.size, np.asarray(image.convert("RGB"), float)
+        image.seek(1)
+        second = np.asarray(image.convert("RGB"), float)
+    assert size == (396, 412) and np.abs(second - first).max() > 100
+
+
 def test_an_mp4_plays_everywhere(tmp_path: Path) -> None:
     program = film.ffmpeg()
     if program is None:
