@@ -133,9 +133,9 @@ class SystemPlan:
 
 def plan_system(system: System) -> SystemPlan:
     """What would be computed for several lines; nothing is computed."""
-    plans = {}
+    plans, guesses = {}, system.guesses
     for name in system.lines:
-        scene = system.scene_of(name, system.carried(name), system.guesses)
+        scene = system.scene_of(name, system.carried(name), guesses)
         if scene.time:
             refuse_too_much(scene)
         plans[name] = _plan(scene)

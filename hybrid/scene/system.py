@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from functools import cached_property
 from itertools import chain
 from typing import Annotated, Any, ClassVar, Literal
 
@@ -164,11 +165,20 @@ class System(Table):
 
     def lines_at(self, point: str) -> list[tuple[str, Literal["start", "end"]]]:
         """Names of the lines that meet at a point, each with the end that does; those that break there come last."""
-        found: list[tuple[str, Literal["start", "end"]]] = []
+        lines, meeting = self._meetings
+        if lines is not self.lines:  # those that this was copied from
+            del self._meetings
+            _, meeting = self._meetings
+        return [*meeting.get(point, ())]
+
+    @cached_property
+    def _meetings(self) -> tuple[dict[str, JoinedLine], dict[str, list[tuple[str, Literal["start", "end"]]]]]:
+        """The lines, and `lines_at` of every point where one ends."""
+        found: dict[str, list[tuple[str, Literal["start", "end"]]]] = {}
         for name, line in self.lines.items():
-            found += [(name, "start")] if line.start == point else []
-            found += [(name, "end")] if line.end == point else []
-        return sorted(found, key=lambda at: self.breaks(*at))
+            found.setdefault(line.start, []).append((name, "start"))
+            found.setdefault(line.end, []).append((name, "end"))
+        return self.lines, {point: sorted(ends, key=lambda at: self.breaks(*at)) for point, ends in found.items()}
 
     def breaks(self, name: str, end: str) -> bool:
         """Whether a line may break from the point at an end."""
@@ -210,7 +220,8 @@ class System(Table):
         return tuple(
             key
             for key in ("start", "end")
-            if getattr(line, key) in self.free and self.lines_at(getattr(line, key))[0] == (name, key)
+            if isinstance(self.points[getattr(line, key)], FreePoint)
+            and self.lines_at(getattr(line, key))[0] == (name, key)
         )
 
     def scene_of(

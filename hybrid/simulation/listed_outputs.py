@@ -43,7 +43,8 @@ def listed_outputs(scene: SceneLike | System) -> list[Listed]:
     if isinstance(asked, Scene):
         return _of_scene(asked)
     model = build_system(asked)
-    scenes = {name: asked.scene_of(name, asked.carried(name), asked.guesses) for name in model.names}
+    guesses = asked.guesses
+    scenes = {name: asked.scene_of(name, asked.carried(name), guesses) for name in model.names}
     found = _over_time([*fields_of(asked), *SystemQuantities(asked, scenes).fields])
     for (name, each), built in zip(scenes.items(), model.models, strict=True):
         fields = observer_of(each, built, asked.time is not None).fields

@@ -89,7 +89,8 @@ def content(run: SystemRun) -> dict[str, Any]:
 
 def files_of(system: System) -> dict[str, str]:
     """Digests of the files that motions and loads are read from, by path."""
-    scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in system.lines]
+    guesses = system.guesses
+    scenes = [system.scene_of(name, system.carried(name), guesses) for name in system.lines]
     found = {path for scene in scenes for path in scene.ends.files()}
     found |= {path for scene in scenes for path in scene.cable.files()} | set(system.environment.files())
     for body in system.bodies.values():

@@ -64,9 +64,11 @@ class LineResult:
         self.observer = observer_of(scene, model, self._moves)
         self.envelope = Envelope(scene, model, self._moves)
         self.envelope.itself.on = False  # lines of a system are not watched for meeting themselves
-        self.recorder: Recorder | DeferredRecorder = result_recorder(
+        recorder = result_recorder(
             scene, model, self.observer, io.BytesIO(), {"scene": scene_text(scene)}, found, self.envelope, outputs
         )
+        recorder.lay_by()
+        self.recorder: Recorder | DeferredRecorder = recorder
         loaded, bodies = model.loaded_ends, scene.ends.bodies()
         self._carried = [k for k, end in enumerate(("start", "end")) if end in bodies and loaded[k]]
         self.books = self._own_books(state)

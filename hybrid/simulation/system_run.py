@@ -58,7 +58,8 @@ class SystemRun:
         self.kept = kept and isinstance(target, Path)
         self.model = build_system(system)
         names = self.model.names
-        self.scenes = [system.scene_of(name, system.carried(name), system.guesses) for name in names]
+        guesses = system.guesses
+        self.scenes = [system.scene_of(name, system.carried(name), guesses) for name in names]
         self.times = output_times(self.scenes[0]) if moves else []
         self.found = None
         if source is None:

@@ -21,6 +21,8 @@ from hybrid.store.integrity import being_written, is_signed, unmarked
 from hybrid.store.lock import is_held
 
 _LIBVER = ("v110", "v110")
+# Places for chunks in the cache of a dataset, which is written at its end: HDF5 2.0 takes 8191, 64 kB a dataset.
+SLOTS = 31
 METADATA = 128 * 1024 * 1024  # bytes: the most that HDF5 takes
 _MOST_IN_MEMORY = 500_000_000  # bytes of a killed file that is read as a whole, in some tenths of a second
 
@@ -150,8 +152,10 @@ def redrafted(path: Path) -> AbstractContextManager[h5py.File]:
     return drafted(path, "r+")
 
 
-def created(path: Path, make: bytes | Callable[[Path], None]) -> h5py.File:
+def created(path: Path, make: bytes | Callable[[Path], None], many: bool = False) -> h5py.File:
     """Make a file of these bytes, or by `make`, beside its place, open it to readers, and move it into place.
+
+    many: it has so many datasets that nothing of them is to wait in memory until a chunk is full.
 
     So an older result survives a failed start, and a reader who has it open keeps what he sees.
     """
@@ -161,7 +165,8 @@ def created(path: Path, make: bytes | Callable[[Path], None]) -> h5py.File:
             new.write_bytes(make)
         else:
             make(new)
-        file = h5py.File(new, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=CACHE)
+        cache = 0 if many else CACHE
+        file = h5py.File(new, "r+", libver=_LIBVER, locking="best-effort", rdcc_nbytes=cache, rdcc_nslots=SLOTS)
         file.swmr_mode = True
         os.replace(new, path)
     except OSError as error:
@@ -185,7 +190,7 @@ def hold_metadata(file: h5py.File) -> None:
 
 def in_memory(content: bytes = b"") -> h5py.File:
     """A file in memory, to be written; content: of an existing one."""
-    return h5py.File.in_memory(content, libver=_LIBVER, rdcc_nbytes=CACHE)
+    return h5py.File.in_memory(content, libver=_LIBVER, rdcc_nbytes=CACHE, rdcc_nslots=SLOTS)
 
 
 def give_up(file: h5py.File) -> None:

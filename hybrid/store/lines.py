@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from typing import TYPE_CHECKING
 
 import h5py
+
+from hybrid.store.hdf5_file import in_memory
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
@@ -13,12 +15,14 @@ if TYPE_CHECKING:
 GROUP = "lines"
 
 
-def add_parts(file: h5py.File, parts: Mapping[str, h5py.File]) -> None:
-    """Put the results of lines, each a file in memory, into a new file of a system."""
+def add_parts(file: h5py.File, parts: Mapping[str, Callable[[], bytes]]) -> None:
+    """Put the results of lines into a new file of a system, one after another; parts: return the bytes of files."""
     group = file.require_group(GROUP)
     group.attrs["order"] = list(parts)
-    for name, part in parts.items():
+    for name, image in parts.items():
+        part = in_memory(image())
         part.copy("/", group, name=name, expand_refs=True)
+        part.id.close()
 
 
 def of_part(name: str, counts: Mapping[str, int]) -> dict[str, int]:

@@ -33,6 +33,10 @@ class Table:
         """Write to the datasets of the same names of another file, or of a group of it."""
         self._datasets = [h5d.open(file.id, name.encode()) for name in self._names]
 
+    def leave(self) -> None:
+        """Hold no datasets, until `move`."""
+        self._datasets = []
+
     def drop(self) -> None:
         """Forget the rows that wait."""
         self._blocks, self.waiting, self.bytes_waiting = [], 0, 0

@@ -76,7 +76,7 @@ class Recorder:
     overwrite: replace an existing result.  Another program's file is never replaced.
     before: what was found before the run, for whoever goes on with it; None: nobody can, it has no checkpoints.
     templates: folder where templates of files are kept (store.template); None: in this process alone.
-    parts: results of lines, begun in memory, that are groups of this file from now on and are written with it.
+    parts: results of lines, laid by in memory, that are groups of this file from now on and are written with it.
     """
 
     def __init__(
@@ -108,12 +108,12 @@ class Recorder:
         write_fixed(file, np.asarray(grid_s, dtype=float), fixed)
         write_before(file, before)
         if parts:
-            add_parts(file, {name: part._file for name, part in parts.items()})
+            add_parts(file, {name: part._take_image for name, part in parts.items()})
         if path is not None:
             file.flush()
-            image = bytes(file.id.get_file_image())
+            image = file.id.get_file_image()
             file.close()
-            file = created(path, image)
+            file = created(path, image, many=bool(parts))
             if parts:
                 hold_metadata(file)
         self._write_to(file, path, tables_of(fields, step_fields))
@@ -128,7 +128,7 @@ class Recorder:
         """Go on with a result from one of its checkpoints; what came after is left out.  path: where, perhaps the same.
 
         fixed: quantities that do not depend on time, with values for those that the file does not have.  parts: results
-        of lines, begun in memory, which go on with the groups of the file that have their names.
+        of lines, laid by in memory, which go on with the groups of the file that have their names.
         ResultError if the file holds other fields, or cannot be written.
         """
         self, tables = cls.__new__(cls), tables_of(fields, step_fields)
@@ -161,7 +161,7 @@ class Recorder:
                         del each.attrs[name]
 
         self._memory = None
-        file = created(path.expanduser().resolve(), make)
+        file = created(path.expanduser().resolve(), make, many=bool(parts))
         if parts:
             hold_metadata(file)
         self._write_to(file, path, tables)
@@ -177,6 +177,7 @@ class Recorder:
         self.path, self._tables = path, tables
         self._whole: Recorder | None = None  # never itself: a reference cycle would keep outputs in memory
         self._parts: dict[str, Recorder] = {}
+        self._image = b""  # of a file in memory that is closed
         self._all = tuple(Table(file, group, columns) for group, columns in tables.items())
         self._outputs, self._steps, self._zone_rows, self._events = self._all
         self._slots = [file[name] for name in SLOTS if name in file]
@@ -211,11 +212,30 @@ class Recorder:
         """Write results that were begun in memory into groups of this file."""
         self._parts = dict(parts)
         for name, part in parts.items():
-            before = part._file
             part._whole, part._memory, part._file = self, None, self._file[f"{GROUP}/{name}"]
             for table in part._all:
                 table.move(part._file)
-            before.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines squared
+
+    def _leave(self) -> None:
+        """Hold no datasets any more."""
+        for table in self._all:
+            table.leave()
+        self._fixed.clear()
+
+    def lay_by(self) -> None:
+        """Close a result in memory that will be a part of another one, and keep its bytes: HDF5 takes 5 MB for a file
+
+        that is open.  Events may be noted until it is taken.
+        """
+        self._leave()
+        self._file.flush()
+        self._image = self._file.id.get_file_image()
+        self._file.id.close()  # h5py's own way looks at all that is open, in time that grows with the lines squared
+
+    def _take_image(self) -> bytes:
+        """The bytes of a result that was laid by; they are kept no longer."""
+        image, self._image = self._image, b""
+        return image
 
     def save(self, t: float, values: Mapping[str, Any], zones: Sequence[tuple[str, float, float]]) -> None:
         """Append an output at time t (s), with the zones (kind, s_a, s_b) that hold then; errors as of `save_batch`."""
@@ -401,6 +421,8 @@ class Recorder:
             self._file.flush()
             if self._memory is not None:
                 self._memory.write(self._file.id.get_file_image())
+            for part in (self, *self._parts.values()):
+                part._leave()  # HDF5 looks for what is open, in time that grows with its square
             self._file.close()
         if self.path is not None:
             sign(self.path)

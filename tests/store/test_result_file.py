@@ -17,6 +17,7 @@ import pytest
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.format import Field
+from hybrid.store.hdf5_file import SLOTS
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import Event, Zone
 from hybrid.store.writer import Recorder
@@ -420,3 +421,23 @@ assert result._file and result.tension.shape == (4, 5)
     env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1])}
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+def test_results_that_wait_to_be_parts_keep_no_file_open(tmp_path: Path) -> None:
+    """HDF5 takes 5 MB for a file in memory, and 64 kB more for each dataset if it may choose: 6 GB for 1000 lines."""
+    parts = {name: recorder(io.BytesIO(), attributes={"title": name}) for name in ("a", "b")}
+    opened = len(h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE))
+    for name, part in parts.items():
+        part.lay_by()
+        part.event(0.0, 0.0, 1.0, "note", f"of {name}")
+    assert len(h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)) == opened - 2
+    path = tmp_path / "many.h5"
+    with recorder(path, parts=parts) as whole:
+        assert h5py.h5f.get_obj_ids(types=h5py.h5f.OBJ_FILE)[-1].get_access_plist().get_cache()[1:3] == (SLOTS, 0)
+        for each in (*parts.values(), whole):
+            each.save(0.0, values(0.0), [])
+            each.close()
+    with open_result(path) as result:
+        for name, line in result.lines.items():
+            assert line.title == name and [e.text for e in line.events] == [f"of {name}"]
+            assert np.array_equal(line.tension[0], values(0.0)["tension"])
