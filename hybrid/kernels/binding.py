@@ -104,6 +104,16 @@ class Series:
             tables[:, self._at[name]] += np.arange(count) * values.strides[0]
         return tables
 
+    def shift(
+        self, tables: NDArray[np.int64], arrays: Mapping[str, NDArray[Any]], begin: NDArray[np.int64],
+        count: NDArray[np.int64],
+    ) -> None:  # fmt: skip
+        """Of arrays by name each table has `count` rows from row `begin` on; the first has those of row 0 on."""
+        for name, values in arrays.items():
+            at = self._at[name]
+            tables[:, at] += begin * values.strides[0]
+            tables[:, at + 1] = count
+
 
 # Numbers of the tuples that were bound last: a line is bound in several tables, and two states take turns.
 class _OfThread(threading.local):

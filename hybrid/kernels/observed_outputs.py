@@ -8,6 +8,7 @@ from types import MappingProxyType
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.binding import Series
 from hybrid.kernels.cell import chord
@@ -16,7 +17,17 @@ from hybrid.kernels.energies import observe
 from hybrid.kernels.node_forces import get3
 from hybrid.kernels.references import reader
 from hybrid.kernels.rotations import cross, dot
-from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, blank_line, no_ends
+from hybrid.kernels.state import (
+    ALONG_LINE,
+    NO_TURN,
+    NODES_OF_LINE,
+    Batch,
+    Ends,
+    Floats,
+    Line,
+    blank_line,
+    no_ends,
+)
 
 FOLDED = 1e-12  # 1 + cos(x) of cells that are as good as folded onto each other
 
@@ -117,4 +128,34 @@ def observed(
         | {f"ends.{name}": x for name, x in held._asdict().items()}
     )
     observe_outputs(_series(first, nb, along))
+    return moment, strain, energy, bend
+
+
+def observed_joined(line: Line, batch: Batch, begin: NDArray[np.int64]) -> tuple[Floats, Floats, Floats, Floats]:
+    """The same of nb outputs of other lines, one behind the other: moments, strains (M, 3), energies (nb, 5), bends (M,).
+
+    begin: (nb+1,) nodes before each line; line, batch: arrays along all of them, in `batch` with one row; between two
+    lines is a cell that belongs to none.  Without catenary there are no bends, (0,).
+    """
+    nodes, catenary = int(begin[1]), not line.spin.all()
+    moment, strain = np.zeros((begin[-1], 3)), np.zeros((begin[-1], 3))
+    energy, bend = np.zeros((begin.size - 1, 5)), np.zeros(begin[-1] if catenary else 0)
+    on_nodes = {"r": batch.r[0], "v": batch.v[0], "moment": moment, "strain": strain} | (
+        {"bend": bend} if catenary else {}
+    )
+    on_nodes |= {f"line.{name}": getattr(line, name) for name in NODES_OF_LINE}
+    on_cells = {name: getattr(batch, name)[0] for name in ("e", "a1", "w", "T")}
+    on_cells |= {f"line.{name}": getattr(line, name) for name in ALONG_LINE if name not in NODES_OF_LINE}
+    cut = {name: x[:nodes] for name, x in on_nodes.items()} | {name: x[: nodes - 1] for name, x in on_cells.items()}
+    held = Ends(batch.held, batch.position, batch.frame, batch.spin, batch.force, batch.moment)
+    own = {name: x for name, x in cut.items() if "." not in name}
+    first = Output(
+        line._replace(**{name: cut[f"line.{name}"] for name in ALONG_LINE}), Ends(*(x[0] for x in held)),
+        **{"turn": NO_TURN, "bend": bend} | own, energy=energy[0],
+    )  # fmt: skip
+    along = {"energy": energy} | {f"ends.{name}": x for name, x in held._asdict().items()}
+    tables = _series(first, energy.shape[0], along)
+    _series.shift(tables, on_nodes, begin[:-1], np.diff(begin))
+    _series.shift(tables, on_cells, begin[:-1], np.diff(begin) - 1)
+    observe_outputs(tables)
     return moment, strain, energy, bend

@@ -84,6 +84,15 @@ class Line(NamedTuple):
     tension_twist: Floats = NO_TENSION_TORQUE
 
 
+# Of these there is one for every node; of all but what belongs to the whole line, one for every node or cell.
+NODES_OF_LINE = (
+    "s", "mass", "force", "element", "kb", "k0", "hn", "damp", "point_mass", "point_drag", "point_added", "point_buoy",
+    "point_displaced", "point_height", "point_upright", "footing",
+)  # fmt: skip
+OF_WHOLE_LINE = ("bits", "plane", "torsion", "law", "law_table", "law_at", *TENSION_TORQUE)
+ALONG_LINE = tuple(name for name in Line._fields if name not in OF_WHOLE_LINE)
+
+
 class Ends(NamedTuple):
     """What the two ends impose at one moment; row 0 the start, row 1 the end."""
 

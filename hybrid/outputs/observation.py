@@ -10,12 +10,14 @@ operation and one product with a sparse matrix (output_grid) serve the batch.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from functools import cached_property
 from types import MappingProxyType
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from hybrid.kernels.link import link_of
 from hybrid.kernels.observed_outputs import observed
@@ -32,30 +34,10 @@ from hybrid.kernels.state import NO_TURN, Batch, Ends, Floats, Line, Sea
 from hybrid.kernels.zone_torque import TORQUE, TURN, torsion_energy
 from hybrid.outputs.local_means import means_beside
 from hybrid.outputs.output_grid import Grid
+from hybrid.outputs.strains import strains
 from hybrid.outputs.touchdown import Touchdown, carried, contact_pressure, penetration, sinking, touchdown
+from hybrid.outputs.vectors import cross, dot, size
 from hybrid.solve.bending_corrector import Shift
-
-# Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
-UNRESOLVED = 3.0
-
-
-def cross(a: Floats, b: Floats) -> Floats:
-    """a x b of vectors (n, 3, nb)."""
-    out = np.empty(np.broadcast(a, b).shape)
-    out[:, 0] = a[:, 1] * b[:, 2] - a[:, 2] * b[:, 1]
-    out[:, 1] = a[:, 2] * b[:, 0] - a[:, 0] * b[:, 2]
-    out[:, 2] = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
-    return out
-
-
-def dot(a: Floats, b: Floats) -> Floats:
-    """a . b of vectors (n, 3, nb)."""
-    return np.asarray(a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2])
-
-
-def size(a: Floats) -> Floats:
-    """Length of vectors (n, 3, nb)."""
-    return np.asarray(np.sqrt(dot(a, a)))
 
 
 def last(x: Floats) -> Floats:
@@ -95,11 +77,57 @@ class Observation:
         """As computed.  (An attribute that refers to itself would keep a batch until garbage is searched for.)"""
         return self._corrects or self
 
-    def of_line(self, name: str, at: int | slice) -> Floats:
+    def of_line(self, name: str, at: int | slice | NDArray[np.int64]) -> Floats:
         """Values of the line at nodes or cells, (..., nb), or (..., 1) where they are the same in all outputs."""
         if name in self._varied:
             return np.moveaxis(self._varied[name][:, at], 0, -1)
         return np.asarray(getattr(self.line, name)[at][..., None])
+
+    # ---- how its arrays are laid out ----------------------------------------------------------
+
+    @property
+    def columns(self) -> int:
+        """Length of the last axis of arrays along the line."""
+        return self.batch.t.size
+
+    @cached_property
+    def changes(self) -> list[int]:
+        """Nodes where one section ends and the next begins."""
+        return [int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes]
+
+    @property
+    def end_nodes(self) -> tuple[int, ...] | NDArray[np.int64]:
+        """Nodes at ends of the line."""
+        return 0, self.line.h.size
+
+    def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
+        """Of values (n, ..., nb) on cells or nodes that at end k, or so many inward: (..., nb)."""
+        return x[-1 - inward if k else inward]
+
+    def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
+        """Values (N, nb) of cells between those (nb,) of both ends."""
+        return np.concatenate([ends[0][None], x, ends[1][None]])
+
+    def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
+        """Values with the outputs first, of those that a probe with these dimensions has found; a new array."""
+        return np.array(x.transpose(x.ndim - 1, *range(x.ndim - 1)), order="C")
+
+    def directors(self, cells: NDArray[np.int64]) -> Floats:
+        """First directors (n, 3, nb) of cells."""
+        return np.moveaxis(self.batch.a1[:, cells], 0, -1)
+
+    def stiffness(self, nodes: NDArray[np.int64]) -> Floats:
+        """Stiffness (n, 3, nb or 1) N m of the elements at nodes."""
+        return np.moveaxis(self.batch.kb[:, nodes], 0, -1) if self.batch.kb.size else self.line.kb[nodes, :, None]
+
+    def has_element(self, k: int) -> Any:
+        """Whether an element sits at end k, of all outputs or of each (nb,)."""
+        return bool(self.line.element[-k])
+
+    @property
+    def cell_lengths(self) -> Floats:
+        """(N, nb or 1) m, unstretched."""
+        return self.batch.h.T if self.batch.h.size else self.line.h[:, None]
 
     # ---- what was computed --------------------------------------------------------------------
 
@@ -151,6 +179,11 @@ class Observation:
         return last(M), last(strain), last(energy), bend.T
 
     @property
+    def element_strains(self) -> Floats:
+        """(N+1, 3, nb) rad, of the elements at nodes, as of kernels.observed_outputs."""
+        return self._observed[1]
+
+    @property
     def bends(self) -> Floats:
         """(N+1, nb) 1/m, from cell to cell, of what was computed, as of kernels.observed_outputs."""
         return self._observed[3]
@@ -161,16 +194,19 @@ class Observation:
     def tension(self) -> Floats:
         """(ns, nb) N: of the cells, and at the ends the pull of what holds them."""
         ends = []
-        for k, first, second in ((0, 0, 1), (1, -1, -2)):
-            t = 1.5 * self.d[first] - 0.5 * self.d[second] if len(self.d) > 1 else self.d[first]
-            if self.line.element[first] or (self.shift is not None and self.shift.clamped[k]):
-                t = self.batch.frame[:, k, 2::3].T  # a clamp or guide knows the tangent
+        for k in (0, 1):
+            t = self.at_end(self.d, k)
+            if len(self.d) > 1:
+                t = 1.5 * t - 0.5 * self.at_end(self.d, k, 1)
+            knows = self.has_element(k) | (self.shift is not None and self.shift.clamped[k])
+            if np.any(knows):  # a clamp or guide knows the tangent
+                t = np.where(knows, self.batch.frame[:, k, 2::3].T, t)
             if self.loaded(k):
                 ends.append(self._end_tension(k))
             else:
                 force = self.reaction(k) if k else -self.reaction(k)
                 ends.append((force * t).sum(axis=0) / np.sqrt((t * t).sum(axis=0)))
-        found = self.grid.held @ np.concatenate([ends[:1], self.T, ends[1:]])
+        found = self.grid.held @ self.with_ends(self.T, ends)
         return found if self.shift is None else found - self.grid.sides @ self._borne_by_bending(self.shift)
 
     def _borne_by_bending(self, shift: Shift) -> Floats:
@@ -192,11 +228,15 @@ class Observation:
         t = self.grid.cells @ self.d
         length = size(t)
         if length.min() < 1e-9:  # in the very middle of a fold the two sides cancel: take the nearest cell's
-            middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
             for g, i in np.argwhere(length < 1e-9):
-                t[g, :, i] = self.d[int(np.argmin(np.abs(middles - self.grid.s[g]))), :, i]
+                t[g, :, i] = self.d[self._cell_at(int(g)), :, i]
                 length[g, i] = 1.0
         return np.asarray(t / length[:, None])
+
+    def _cell_at(self, point: int) -> int:
+        """The cell whose middle is nearest to an output point."""
+        middles = 0.5 * (self.line.s[:-1] + self.line.s[1:])
+        return int(np.argmin(np.abs(middles - self.grid.s[point])))
 
     @property
     def theta(self) -> Floats:
@@ -237,7 +277,7 @@ class Observation:
 
     def end_moment(self, k: int) -> Floats:
         """(3, nb) N m, inertial, at end k: moment of what is after it on what is before it."""
-        moment, torsion = self.node_moment[-k], self.line.torsion
+        moment, torsion = self.at_end(self.node_moment, k), self.line.torsion
         if self.batch.turn.size and (torsion[-1, 1] == self.line.h.size if k else torsion[0, 0] == 0.0):
             tangent = self.batch.frame[:, k, 2::3]
             moment = moment + (self.batch.turn[:, -k, TORQUE, None] * tangent).T
@@ -269,86 +309,7 @@ class Observation:
     @cached_property
     def _strains(self) -> Floats:
         """Curvature and twist (n sides, 2, nb), 1/m, of what was computed."""
-        out = np.zeros((len(self.grid.side_nodes), 2, self.batch.t.size))
-        for zone, (a, b, o) in zip(self.grid.parts, self.grid.spans, strict=True):
-            side = out[o : o + b - a + 1]
-            if zone.kind == "rod":
-                self._strains_of_rod(side, a, b)
-                continue
-            side[:, 0] = self.bends[a : b + 1]
-            if b - a < 2:
-                continue
-            first, last = (a, a + 1, min(a + 2, b)), (b, b - 1, max(b - 2, a))
-            for row, one, two, nodes in ((0, 1, 2, first), (-1, -2, -3, last)):
-                if b - a >= 4:
-                    x, x1, x2 = (self.of_line("s", k) for k in nodes)
-                    p = (x - x1) / (x2 - x1)
-                    side[row, 0] = np.maximum(0.0, (1 - p) * side[one, 0] + p * side[two, 0])
-                else:
-                    side[row, 0] = side[one, 0]
-        self._bend_on_through_joints(out)
-        return out
-
-    def _bend_on_through_joints(self, strains: Floats) -> None:
-        """At a joint, curvature of a rod whose cell is too long to show how the bend fades: that of the catenary."""
-        kinds, spans = [zone.kind for zone in self.grid.parts], self.grid.spans
-        for k in range(1, len(kinds)):
-            if kinds[k - 1] == kinds[k]:
-                continue
-            last, first = spans[k - 1][2] + spans[k - 1][1] - spans[k - 1][0], spans[k][2]
-            node, rod = spans[k][0], kinds[k] == "rod"
-            cell, inner = (node, node + 1) if rod else (node - 1, node - 1)
-            if not self.line.element[inner]:
-                continue
-            EI = self.batch.stiffness(inner, self.line).T[:2].mean(axis=0) * self.of_line("hn", inner)
-            long = self.line.h[cell] ** 2 * self.T[cell] > UNRESOLVED**2 * EI
-            mine, its = (first, last) if rod else (last, first)
-            strains[mine, 0] = np.where(long, strains[its, 0], strains[mine, 0])
-
-    def _strains_of_rod(self, side: Floats, a: int, b: int) -> None:
-        """Curvature and twist (b - a + 1, 2, nb) of a rod from node a to node b."""
-        k = self._observed[1][a : b + 1] / self.of_line("hn", slice(a, b + 1))[:, None]
-        side[:, 0], side[:, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
-        for node, row, cell in ((a, 0, a), (b, -1, b - 1)):
-            if not self.line.element[node]:  # a joint or an end without element: strain of the moment that is given
-                side[row] = self._strain_of_moment(node, cell)
-            elif node in self._changes and self.line.element[2 * cell + 1 - node]:
-                side[row] = self._strain_of_moment(node, cell)  # the moment is one, the stiffness is not
-            elif node in (0, self.line.h.size):  # an angular spring at a clamp bends, but does not twist
-                side[row, 1] *= self.line.hn[node] / (0.5 * self.line.h[cell])
-            if self.line.tension_twist.size and b - a > 1:
-                side[row, 1] -= self._twist_to_node(cell, cell + 1 if cell == node else cell - 1)
-
-    @cached_property
-    def _changes(self) -> set[int]:
-        """Nodes where one section ends and the next begins."""
-        return {int(np.argmin(np.abs(self.line.s - x))) for x in self.grid.changes}
-
-    def _twist_to_node(self, cell: int, inner: int) -> Floats:
-        """Twist (nb,) 1/m by which tension turns the middle of a cell more than its end at a node."""
-        h, T = self.line.h, self.batch.T
-        more = (T[:, cell] - T[:, inner]) * h[cell] / (h[cell] + h[inner])
-        return np.asarray(2.0 * self.line.tension_twist[cell] / h[cell] * more)
-
-    def _strain_of_moment(self, node: int, cell: int) -> Floats:
-        """Curvature and twist (2, nb) at a rod's end that carries the given moment (at a joint that of its zone)."""
-        line, torque = self.line, np.zeros(1)
-        for z, (first, last) in enumerate(line.torsion[:, :2]):
-            if node in (first, last) and self.batch.turn.size:
-                torque = self.batch.turn[:, z, TORQUE]
-        inner = cell + 1 if cell == node else cell
-        if not line.element[inner]:
-            return np.zeros((2, self.batch.t.size))
-        hn = self.of_line("hn", inner)
-        B = self.batch.stiffness(inner, line).T * hn
-        k0 = line.k0[inner][:, None] / hn
-        a1, d, M = self.batch.a1[:, cell].T[None], self.d[cell : cell + 1], self.node_moment[node : node + 1]
-        body = np.concatenate([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque])
-        if line.tension_twist.size:
-            k0 = k0 + np.zeros_like(body)
-            k0[2] -= 2.0 * line.tension_twist[cell] / line.h[cell] * self.batch.T[:, cell]
-        k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
-        return np.stack([np.hypot(k[0], k[1]), k[2]])
+        return strains(self)
 
     def _curvature_of_moment(self, shift: Shift) -> Floats:
         """Curvature (n sides, nb) 1/m of all of the moment, with what was left out; without stiffness, as it is."""
@@ -381,14 +342,14 @@ class Observation:
 
     def reaction(self, k: int) -> Floats:
         """(3, nb) N: force of the support, or of an end body, on the cable at end k; else the force applied there."""
-        b, first, out = self.batch, -k, 2.0 * k - 1.0
+        b, out = self.batch, 2.0 * k - 1.0
         held = b.held[:, k] != 0
         force = -b.report[:, FORCE_A + 3 * k : FORCE_A + 3 * k + 3].T
         if self.shift is not None:
             force = force - self.shift.resultants[k]
         if held.all():
             return np.asarray(force)
-        given = out * self._end_tension(k) * self.d[first] if self.loaded(k) else b.force[:, k].T
+        given = out * self._end_tension(k) * self.at_end(self.d, k) if self.loaded(k) else b.force[:, k].T
         return np.where(held, force, given)
 
     def loaded(self, k: int) -> bool:
@@ -398,27 +359,29 @@ class Observation:
 
     def _end_tension(self, k: int) -> Floats:
         """Tension (nb,) N of the cable at end k, extrapolated from its last cells."""
-        first, second = (0, 1) if k == 0 else (-1, -2)
-        T, h = self.T, self.batch.h.T if self.batch.h.size else self.line.h
-        return T[first] + (T[first] - T[second]) * h[first] / (h[first] + h[second]) if len(h) > 1 else T[0]
+        T, h = self.T, self.cell_lengths
+        if len(h) == 1:
+            return np.asarray(T[0])
+        T0, T1, h0, h1 = (self.at_end(x, k, inward) for x in (T, h) for inward in (0, 1))
+        return np.asarray(T0 + (T0 - T1) * h0 / (h0 + h1))
 
     # ---- seabed and energies, of what was computed --------------------------------------------
 
     @cached_property
-    def _depth(self) -> Floats:
+    def depth(self) -> Floats:
         """(N+1, nb) m, below where contact begins."""
         return penetration(self.sea, self._plain.r)
 
     @cached_property
     def touchdown(self) -> Touchdown:
         s = self._varied["s"].T if "s" in self._varied else self.line.s[:, None]
-        return touchdown(s, self._depth, self._plain.r)
+        return touchdown(s, self.depth, self._plain.r)
 
     @property
     def contact(self) -> Floats:
         """(ns, nb) N/m."""
-        q = contact_pressure(self.sea, self._depth, sinking(self.sea, self._plain.r, self._plain.v))
-        return np.asarray(self.grid.chords @ carried(self.batch.h.T if self.batch.h.size else self.line.h, q))
+        q = contact_pressure(self.sea, self.depth, sinking(self.sea, self._plain.r, self._plain.v))
+        return np.asarray(self.grid.chords @ carried(self.cell_lengths, q))
 
     @property
     def self_contact(self) -> Floats:

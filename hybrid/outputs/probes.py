@@ -16,9 +16,11 @@ from hybrid.kernels.state import Batch, Floats, Line, Sea
 from hybrid.model.bending_reference import LEFT
 from hybrid.model.mesh import Zone
 from hybrid.model.output_points import NEAR
-from hybrid.outputs.observation import Observation, size
+from hybrid.outputs.joined_lines import JoinedGrid, JoinedObservation, Output
+from hybrid.outputs.observation import Observation
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.varying_grid import VaryingGrid
+from hybrid.outputs.vectors import size
 from hybrid.solve.bending_corrector import Shift
 from hybrid.solve.stepper import POWERS
 from hybrid.store.format import Field
@@ -292,6 +294,22 @@ class Observer:
         other._after = VaryingGrid(nodes, zones, jumps, self._cuts, self._changes, True, self._unloaded)
         return other
 
+    def _dims(self, name: str) -> tuple[str, ...]:
+        """Dimensions of a probe, before or after the points where it jumps."""
+        probe = self._probes.get(name.removeprefix("right/"))
+        return probe.dims if probe is not None else ()
+
+    def look_at(self, outputs: Sequence[Output]) -> tuple[Observer, JoinedObservation]:
+        """Outputs of which each has a line of its own, and what makes values of them; on a line of constant length."""
+        other = copy(self)
+        given = self._cuts, self._changes
+        grid = JoinedGrid([Grid(x.line.s, x.zones, self.s, *given, kept=self._unloaded) for x in outputs])
+        if self._right:
+            after = [Grid(x.line.s, x.zones, self.jumps, *given, True, self._unloaded) for x in outputs]
+            other._after = JoinedGrid(after)
+        other.line, other.zones, other.grid = outputs[0].line, outputs[0].zones, grid
+        return other, JoinedObservation(outputs, self.sea, grid)
+
     @property
     def zone_rows(self) -> list[tuple[str, float, float]]:
         return self.rows_of(self.zones)
@@ -332,7 +350,7 @@ class Observer:
             if self.jumps.size:
                 after = model_errors(plain.on(self._after), corrected.on(self._after))
                 found |= {f"errors/model/right_{name}": part * after[name] for name in SIDED_ERRORS}
-        out = {name: np.array(x.transpose(x.ndim - 1, *range(x.ndim - 1)), order="C") for name, x in found.items()}
+        out = {name: plain.by_output(x, self._dims(name)) for name, x in found.items()}
         if self._criteria:
             if ratios is None:
                 raise ValueError("criteria are written, but `ratios` is not given")
@@ -340,7 +358,9 @@ class Observer:
         if len(self.gauges):
             out["elevation"] = elevation(self.sea, self.gauges, batch.sea_now)
         if self._finest is not None:
-            out[THERE] = np.tile(there(self._finest, self.line.s), (batch.t.size, 1))
+            lines = [x.line for x in plain.outputs] if isinstance(plain, JoinedObservation) else [self.line]
+            rows = [there(self._finest, line.s) for line in lines]
+            out[THERE] = np.tile(np.stack(rows), (batch.t.size // len(rows), 1))
         if self._with_work:
             energy = sum((out[name] for name in out if name.startswith("energy/")), np.zeros(batch.t.size))
             if self.first_energy is None:

@@ -48,9 +48,10 @@ def sum_down(x: Floats) -> Floats:
 def touchdown(s: Floats, p: Floats, r: Floats) -> Touchdown:
     """First and last contact, exact for the chords that the contact force is integrated over.
 
-    s: (N+1, 1) m, or (N+1, nb) where it differs; p: (N+1, nb) m, as of `penetration`; r: (N+1, 3, nb) m, of the nodes.
+    s: (N+1, 1) m, or (N+1, nb) where it differs; p: (N+1, nb) m, as of `penetration`; NaN: no such node in an output;
+    r: (N+1, 3, nb) m, of the nodes.
     """
-    below = np.flatnonzero(p.max(axis=1) > 0.0)  # nodes that touch in any output
+    below = np.flatnonzero((p > 0.0).any(axis=1))  # nodes that touch in any output
     if not below.size:
         nb = p.shape[1]
         return Touchdown(np.full((2, nb), np.nan), np.full((2, 3, nb), np.nan), np.zeros(nb))

@@ -300,16 +300,30 @@ class CellChanges:
         self._in_run[self.side].put(self.cells, IN_RUN, self._run.table)
         self._in_zones[self.side].put(self.cells, IN_ZONES, self._switching.table)
 
-    def alone(self) -> bool:
-        """After a step that Python is to look at: whether cells change, and nothing else is to be done."""
-        clock, count, zones = self._run.clock, self._run.count, self._switching.zones
-        if count[b.FLAGS] or count[b.ASKS] or count[b.SAMPLES] or not zones.counts[z.CELLS_DUE]:
-            return False
-        if zones.clock[z.LOUDEST] > 1.0 or clock[b.NOW] >= zones.clock[z.NEXT_REVIEW]:
+    @property
+    def due(self) -> bool:
+        """Whether cells are to change."""
+        return bool(self._switching.zones.counts[z.CELLS_DUE])
+
+    def unwatched(self) -> bool:
+        """After a step that Python is to look at: whether nothing is to be done but a review and a change of cells."""
+        clock, count = self._run.clock, self._run.count
+        if count[b.FLAGS] or count[b.ASKS] or count[b.SAMPLES]:
             return False
         outputs, at = self._run.books.outputs, int(count[b.OUTPUT])
         # one at the end of the step is sampled after the change, one within it would have to be before
         return at == outputs.size or bool(outputs[at] >= clock[b.NOW] - SAME_TIME * clock[b.LAST_DT])
+
+    def review_due(self) -> bool:
+        """Whether the criteria are to be reviewed."""
+        return self._switching.manager.review_due(float(self._run.clock[b.NOW]))
+
+    def review(self) -> Change | None:
+        """The change of zones that follows from the criteria now; None: they stay."""
+        manager, k, n = self._switching.manager, self.side, self.cells
+        if self._stale:
+            manager.take(manager.layout, self._zones(k, n))
+        return manager.review(float(self._run.clock[b.NOW]), self._state(k, int(self._run.count[b.PARITY]), n))
 
     def change_zones(self, change: Change) -> float:
         """Other zones, with the cells that go with them; the energy, J, that is booked for it."""
@@ -346,6 +360,7 @@ class CellChanges:
         end_switch(switching)
         renew(renewing)
         self.side, self.cells, self._stale = to, m, True
+        run.set_quota(m)
         self._put_numbers()
         table, what = run.table.numbers, run.table.part("task").start
         before_forces(table)

@@ -21,7 +21,9 @@ from hybrid.kernels.report import BEND, TWIST_NODE
 from hybrid.kernels.resolution_checks import lowest
 from hybrid.kernels.state import Batch, Ends, Floats, State, ends_in, state_in
 from hybrid.model.build import Model
+from hybrid.outputs.joined_lines import JoinedObservation, Output
 from hybrid.outputs.observation import Observation
+from hybrid.simulation.doubtful_outputs import Bounds, doubtful
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.hockling_watch import LOOP, note_hockling, note_loops
 from hybrid.solve.run import CompiledRun
@@ -291,6 +293,24 @@ class Diagnostics:
         self.rest(seen.batch, values)
         return self.energy(seen.batch, values)
 
+    def joined_outputs(self, seen: JoinedObservation, values: Mapping[str, Floats], models: Sequence[Model]) -> Stop:
+        """Look at outputs as computed of which each has a line of its own, and a model."""
+        for k in np.flatnonzero(doubtful(seen, values, self._bounds)).tolist():
+            self.follow(models[k])
+            one = seen.one(k)
+            self.mesh(one)
+            self.rest(one.batch, {name: x[k : k + 1] for name, x in values.items()})
+        self.loops(seen.batch.t, values, seen.points)
+        return self.energy(seen.batch, values, list(zip(models, seen.outputs, strict=True)))
+
+    @property
+    def _bounds(self) -> Bounds:
+        model = self._model
+        return Bounds(
+            self._fold, self._off, self._sunk, self._bend <= UNRESOLVED, np.inf if self._rested else PRESSED,
+            model.length, tuple(model.attached),
+        )  # fmt: skip
+
     def loops(self, t: Floats, values: Mapping[str, Floats], s: Floats) -> None:
         """A torque that can throw a loop, and a loop, at outputs (nb,) s with fields (nb, ...) along s (ns,) m."""
         self._loop = note_hockling(self._model, t, values, s, self._loop, self.events.event)
@@ -373,8 +393,11 @@ class Diagnostics:
             self.note(t, cell, "slack", text)
             self._slack = min(10.0 * tension, 10.0 * self._slack)
 
-    def energy(self, batch: Batch, values: Mapping[str, Floats]) -> Stop:
-        """Energy that the time scheme creates or dissipates, held against all that was put in."""
+    def energy(self, batch: Batch, values: Mapping[str, Floats], lines: Sequence[tuple[Model, Output]] = ()) -> Stop:
+        """Energy that the time scheme creates or dissipates, held against all that was put in.
+
+        lines: of each output its model and what it is, where they differ.
+        """
         gained, potential = values["work/scheme"], values["energy/potential"]
         alive = sum((values[x] for x in values if x.startswith("energy/")), -potential)
         if batch.t[0] == 0.0:
@@ -385,8 +408,11 @@ class Diagnostics:
         floor = NEWTON_LEAVES * self._model.tension_scale * self._model.length
         # all that can be worth a word; most batches have none
         noted = (gained > self._gain * put_in + floor) | (-gained > self._loss * put_in + floor)
-        for k in np.flatnonzero(noted & (batch.t > 0.0)):
-            fastest = int(np.argmax(np.abs(batch.v[k]).sum(axis=1)))
+        for k in np.flatnonzero(noted & (batch.t > 0.0)).tolist():
+            if lines:
+                self.follow(lines[k][0])
+            v = lines[k][1].batch.v[0] if lines else batch.v[k]
+            fastest = int(np.argmax(np.abs(v).sum(axis=1)))
             if gained[k] > GAIN_STOPS * put_in[k] + floor:
                 return Outcome.GAINS_ENERGY, fastest
             self._note_energy(float(batch.t[k]), float(gained[k]), float(put_in[k]), floor, fastest)

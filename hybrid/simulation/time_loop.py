@@ -5,6 +5,7 @@ from __future__ import annotations
 import io
 import time as clock
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
@@ -13,7 +14,9 @@ import numpy as np
 from hybrid.errors import ComputationError
 from hybrid.kernels.books import AT_STOP, FAILED, FLAGS, JUMPED, LOG, PAUSED, ROWS, SAMPLES, STEPPED, STRETCHED
 from hybrid.kernels.state import Batch, batch_of_one
+from hybrid.model.build import Model
 from hybrid.model.mesh import Zone
+from hybrid.outputs.joined_lines import Output, outputs_in
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.motion_checks import ramp_ends
@@ -35,6 +38,9 @@ from hybrid.store.writer import Recorder
 
 # Rows of the log that wait for an output at most.
 LOGGED = 100
+
+# Nodes of the outputs that are put aside, at most; cells of a line whose outputs are looked at together, at least.
+MOST_ASIDE, FEWEST_JOINED = 20_000, 4
 
 
 # Steps times cells from one checkpoint to the next, about 5 s of computing.
@@ -79,6 +85,7 @@ class TimeLoop:
         self._observed = run.model  # by the observer
         self._cpu = clock.process_time()  # at the start of the run
         self.patient = False  # whether steps and outputs wait in the buffers of the run until these are full
+        self._aside: list[tuple[Model, Output]] = []  # outputs that wait, each of a line of its own
         self._ratios: list[np.ndarray] = []  # (criteria, points) of outputs that wait, where criteria are written
         run.asks_samples = run.switching is not None and observer.writes_criteria
         self._kept = (-1, 0)  # steps and changes at the last checkpoint
@@ -177,8 +184,10 @@ class TimeLoop:
         run = self.run
         for code in run.advance(stop):
             self._keep_ratios(int(run.run.count[SAMPLES]))
-            if code in (PAUSED, FAILED) or (code == AT_STOP and not self.patient) or not self._may_wait:
+            if code in (PAUSED, FAILED) or (code == AT_STOP and (self._aside or not self.patient)):
                 self.write_down()
+            elif not self._may_wait:
+                self.write_down(aside=run.cells_follow and self._may_be_joined)
             if code == STEPPED:
                 self.diagnostics.follow(run.model)
                 self._look(int(run.run.count[FLAGS]))
@@ -219,14 +228,55 @@ class TimeLoop:
 
     # --- what is written down -------------------------------------------------------------------
 
-    def write_down(self, everything: bool = False) -> None:
-        """Record the outputs since the last call, and log the steps; everything: even if they are few."""
+    def write_down(self, everything: bool = False, aside: bool = False) -> None:
+        """Record the outputs since the last call, and log the steps; everything: even if they are few; aside: outputs
+
+        are put aside, to be recorded with others.
+        """
         run = self.run
         batch = run.run.samples(run.model.ends.values)
-        if everything or batch is not None or run.run.count[ROWS] > LOGGED:
+        if aside:
+            if batch is not None:
+                self._put_aside(batch)
+            return
+        if everything or batch is not None or self._aside or run.run.count[ROWS] > LOGGED:
             self._log()
+        self._record_aside()
         if batch is not None:
             self._record(batch, run.run.sampled_errors)
+
+    @property
+    def _may_be_joined(self) -> bool:
+        """Whether outputs of other cells can be looked at together: all that is written follows from their states."""
+        observer, line = self.observer, self.run.model.line
+        of_states = not observer.writes_criteria and observer.quantities is None and self.run.correction is None
+        return of_states and not line.law.size and line.h.size >= FEWEST_JOINED
+
+    def _put_aside(self, batch: Batch) -> None:
+        """Outputs of the cells of now, to be recorded with others."""
+        model = self.run.model
+        self._aside += [(model, x) for x in outputs_in(batch, model.line, model.zones)]
+        self._note_torque()
+        if sum(x.line.s.size for _, x in self._aside) > MOST_ASIDE:
+            self._log()
+            self._record_aside()
+
+    def _record_aside(self) -> None:
+        """Record what was put aside, and look at it."""
+        if not self._aside:
+            return
+        aside, self._aside = self._aside, []
+        outputs = [x for _, x in aside]
+        observer, seen = self.observer.look_at(outputs)
+        values = observer.values_of(seen)
+        self.observer.first_energy = observer.first_energy
+        zones = [observer.rows_of(x.zones) for x in outputs]
+        self.recorder.save_batch(seen.batch.t.copy(), values, zones[0], zones[1:])
+        if self.target is not None:
+            models = [replace(model, line=x.line, zones=x.zones) for model, x in aside]
+            stop = self.diagnostics.joined_outputs(seen, values, models)
+            self.run.events.write_to(self.recorder)
+            self._stop_if(stop)
 
     def _log(self) -> None:
         """Log the steps, their processor time spread evenly over them."""
@@ -264,14 +314,18 @@ class TimeLoop:
         if self.target is None:
             return
         run, diagnostics = self.run, self.diagnostics
-        model, switching = run.model, run.switching
-        diagnostics.follow(model)
+        diagnostics.follow(run.model)
         stop = diagnostics.outputs(seen, values)
-        if switching is not None and not model.line.torsion.size:
-            manager = switching.manager
-            diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)
+        self._note_torque()
         run.events.write_to(self.recorder)
         self._stop_if(stop)
+
+    def _note_torque(self) -> None:
+        """A torque that no catenary passes on."""
+        run, switching = self.run, self.run.switching
+        if self.target is not None and switching is not None and not run.model.line.torsion.size:
+            manager = switching.manager
+            self.diagnostics.torque(run.t, manager.torque * manager.compliance, manager.torque)
 
     def _keep_ratios(self, count: int) -> None:
         """Of the outputs that wait, `count` by now: the largest ratios of criteria since the output before."""

@@ -98,6 +98,7 @@ class Transient:
         self.asks_samples = False  # whether Python looks at every output as it is sampled
         self.turned = self.slackened = False  # whether an event has told of steps cut by the turn of an end, by slack
         self._pending: Change | None = None
+        self._reviewed: Change | None = None  # what a review asks for that is done already
         self._cells: CellChanges | None = None  # of cells that change without Python
         self._overloaded: dict[int, str] = {}  # ends that are let go after the outputs of this step, and why
         self._leaves = self._returns = False  # whether it leaves its plane, or is back in it, after this step
@@ -165,6 +166,11 @@ class Transient:
         paid = self.payout is not None and self.payout.due
         leaves = self._leaves or self._returns or self.nears_itself
         return not (self._pending is not None or leaves or self._overloaded or joints or paid)
+
+    @property
+    def cells_follow(self) -> bool:
+        """Whether cells change without Python, so that outputs which wait are each of another line."""
+        return self._cells is not None and self._cells.adopted
 
     # --- the start ------------------------------------------------------------------------------
 
@@ -295,8 +301,15 @@ class Transient:
         cells = self._changes_of_cells()
         code = self.run.go()
         if cells is not None:
-            while code == b.STEPPED and cells.alone():
-                cells.change()
+            while code == b.STEPPED and cells.unwatched():
+                if cells.review_due():
+                    self._reviewed = cells.review()
+                    if self._reviewed is not None:
+                        break
+                elif not cells.due:
+                    break
+                if cells.due:
+                    cells.change()
                 code = self.run.go()
             cells.sync()
         return code
@@ -371,7 +384,9 @@ class Transient:
         self._returns = bool(flags & b.NEARS_PLANE)
         if flags & b.LETS_GO:
             self._overloaded = overloaded(run)
-        if self.switching is not None:
+        if self._reviewed is not None:
+            self._pending, self._reviewed = self._reviewed, None
+        elif self.switching is not None:
             booked, self._pending = self.switching.book_step(end, run.before, run.state)
             run.books.work[0, b.ZONES] += booked
         changes = self._pending is not None or self._leaves or self._returns or self.nears_itself

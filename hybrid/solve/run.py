@@ -112,7 +112,7 @@ class CompiledRun:
         self.clock[b.PREVIOUS] = self.clock[b.NOW]
         solver = in_plane if line.bits & PLANAR else in_space
         self._solver, self._address = solver, self._address if solver is self._solver else 0
-        self.quota = max(1, min(ROWS, CELL_STEPS // cells))
+        self.set_quota(cells)
         self.count[b.QUOTA] = self.quota
         old, new = self.states
         was, now = self.pushes
@@ -123,6 +123,10 @@ class CompiledRun:
         if corrector is not None:
             following = corrector.bind(line, sea, ends, self.states, self.clock, self.count, work)
             self.table.bind(following=following, follower=corrector.address())
+
+    def set_quota(self, cells: int) -> None:
+        """Steps of the calls to come, of a line of so many cells."""
+        self.quota = max(1, min(ROWS, CELL_STEPS // cells))
 
     def place(self, placed: Floats) -> None:
         """Where base nodes were at the start (n, 3) m."""

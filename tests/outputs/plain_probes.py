@@ -13,9 +13,9 @@ from hybrid.kernels.report import CONTACT_FORCE, FORCE_A, SELF_CONTACT_ENERGY
 from hybrid.kernels.seabed import stored
 from hybrid.kernels.state import Batch, Ends, Floats, Line, Sea, State, blank_state
 from hybrid.model.mesh import Zone
-from hybrid.outputs.observation import UNRESOLVED
 from hybrid.outputs.output_grid import Grid
 from hybrid.outputs.probes import Observer
+from hybrid.outputs.strains import UNRESOLVED
 from hybrid.outputs.touchdown import Touchdown
 from hybrid.solve.bending_corrector import Shift
 

@@ -1,0 +1,178 @@
+"""Outputs of a line whose cells are others in each, looked at together: their lines one behind the other.
+
+Between two lines lies a cell without length that belongs to none.  Arrays along all of them have one column; what there
+is one of in each output (ends, energies) has the outputs last, as in any `Observation`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.observed_outputs import observed_joined
+from hybrid.kernels.state import ALONG_LINE, NODES_OF_LINE, Batch, Floats, Line, Sea
+from hybrid.model.mesh import Zone
+from hybrid.outputs.observation import Observation
+from hybrid.outputs.output_grid import Grid, Rows
+from hybrid.outputs.touchdown import Touchdown, touchdown
+
+# What a batch has of the nodes and of the cells; the rest is of each output as it is.
+NODES_OF_BATCH, CELLS_OF_BATCH = ("r", "v", "vd"), ("e", "T", "a1", "w")
+OF_LINE = ("h", "kb")
+
+
+class Output(NamedTuple):
+    """One output with the line that it is of, in arrays of their own."""
+
+    line: Line
+    zones: tuple[Zone, ...]
+    batch: Batch  # of this output alone
+
+
+def outputs_in(batch: Batch, line: Line, zones: tuple[Zone, ...]) -> list[Output]:
+    """The outputs of a batch of one line, copied."""
+    found = []
+    arrays: dict[str, Any] = {name: getattr(line, name).copy() for name in ALONG_LINE if name not in OF_LINE}
+    for k in range(batch.t.size):
+        own: dict[str, Any] = {name: getattr(batch, name)[k].copy() for name in OF_LINE}
+        one = batch._make(x[k : k + 1].copy() for x in batch)
+        found.append(Output(line._replace(**arrays, **own), zones, one))
+    return found
+
+
+def _joined(parts: Sequence[Floats], gaps: bool) -> Floats:
+    """One behind the other; gaps: with the last row again after each but the last, for a cell that belongs to none."""
+    if gaps:
+        parts = [x for part in parts for x in (part, part[-1:])][:-1]
+    return np.concatenate(parts)
+
+
+class JoinedGrid(Grid):
+    """Grids of several lines, one behind the other."""
+
+    def __init__(self, grids: Sequence[Grid]) -> None:
+        first, self.of = grids[0], grids
+        self.loads, self.changes, self.after, self._kept = first.loads, first.changes, first.after, first._kept
+        self.begin = np.cumsum([0, *(grid._x.size for grid in grids)])  # nodes before each line
+        sides = np.cumsum([0, *(len(grid.side_nodes) for grid in grids)])
+        self.parts = tuple(part for grid in grids for part in grid.parts)
+        self.spans, self.side_nodes = [], []
+        for grid, n, o in zip(grids, self.begin.tolist(), sides.tolist(), strict=False):
+            self.spans += [(a + n, b + n, c + o) for a, b, c in grid.spans]
+            self.side_nodes += [x + n for x in grid.side_nodes]
+        self._sides_before, self.s = sides, np.concatenate([grid.s for grid in grids])
+
+    def _stacked(self, before: NDArray[np.int64], of: Callable[[Grid], Rows]) -> Rows:
+        """Each matrix in its own rows and columns; before: columns before those of each."""
+        rows = [of(grid) for grid in self.of]
+        ends = np.cumsum([0, *(x.columns.size for x in rows)])
+        begin = np.concatenate([*(x.begin[:-1] + end for x, end in zip(rows, ends[:-1], strict=True)), ends[-1:]])
+        columns = np.concatenate([x.columns + n for x, n in zip(rows, before.tolist(), strict=False)])
+        return Rows(begin, columns, np.concatenate([x.weights for x in rows]))
+
+    @cached_property
+    def nodes(self) -> Rows:
+        return self._stacked(self.begin, lambda grid: grid.nodes)
+
+    @cached_property
+    def cells(self) -> Rows:
+        return self._stacked(self.begin, lambda grid: grid.cells)
+
+    @cached_property
+    def chords(self) -> Rows:
+        return self._stacked(self.begin, lambda grid: grid.chords)
+
+    @cached_property
+    def held(self) -> Rows:
+        return self._stacked(self.begin + np.arange(self.begin.size), lambda grid: grid.held)
+
+    @cached_property
+    def sides(self) -> Rows:
+        return self._stacked(self._sides_before, lambda grid: grid.sides)
+
+
+class JoinedObservation(Observation):
+    """Outputs of several lines."""
+
+    def __init__(self, outputs: Sequence[Output], sea: Sea, grid: JoinedGrid) -> None:
+        lines, batches = [x.line for x in outputs], [x.batch for x in outputs]
+        along = {name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE}
+        along["h"][grid.begin[1:-1] - 1] = 0.0
+        of: dict[str, Any] = {
+            name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in NODES_OF_BATCH
+        }
+        of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
+        rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
+        heads = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
+        super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of))
+        self.outputs, self.begin, self._joined_grid = outputs, grid.begin, grid
+
+    @property
+    def columns(self) -> int:
+        return 1
+
+    @cached_property
+    def changes(self) -> list[int]:
+        pairs = zip(self.outputs, self.begin.tolist(), strict=False)
+        return [n + int(np.argmin(np.abs(one.line.s - x))) for one, n in pairs for x in self.grid.changes]
+
+    @cached_property
+    def end_nodes(self) -> NDArray[np.int64]:
+        return np.concatenate([self.begin[:-1], self.begin[1:] - 1])
+
+    def _end(self, x: Floats, k: int, inward: int) -> NDArray[np.int64]:
+        """Where values on cells or nodes have end k of each line."""
+        if not k:
+            return self.begin[:-1] + inward
+        return self.begin[1:] - (1 if len(x) == self.begin[-1] else 2) - inward
+
+    def at_end(self, x: Floats, k: int, inward: int = 0) -> Floats:
+        return np.moveaxis(x[self._end(x, k, inward)][..., 0], 0, -1)
+
+    def with_ends(self, x: Floats, ends: Sequence[Floats]) -> Floats:
+        lines = np.arange(self.batch.t.size)
+        of_cell = np.repeat(lines, np.diff(self.begin))[:-1]
+        out = np.empty((self.begin[-1] + lines.size, 1))
+        out[np.arange(len(x)) + of_cell + 1] = x
+        out[self.begin[:-1] + lines, 0], out[self.begin[1:] + lines, 0] = ends
+        return out
+
+    def by_output(self, x: Floats, dims: Sequence[str]) -> Floats:
+        if dims[:1] != ("s",):
+            return super().by_output(x, dims)
+        return np.array(x[..., 0].reshape(self.batch.t.size, -1, *x.shape[1:-1]), order="C")
+
+    def has_element(self, k: int) -> NDArray[np.bool_]:
+        return self.line.element[self.begin[1:] - 1 if k else self.begin[:-1]] == 1
+
+    def _cell_at(self, point: int) -> int:
+        k, at = divmod(point, self.grid.s.size // self.batch.t.size)
+        s = self.outputs[k].line.s
+        return int(self.begin[k] + np.argmin(np.abs(0.5 * (s[:-1] + s[1:]) - self.grid.s[at])))
+
+    @cached_property
+    def _observed(self) -> tuple[Floats, Floats, Floats, Floats]:
+        M, strain, energy, bend = observed_joined(self.line, self.batch, self.begin)
+        return M[..., None], strain[..., None], np.ascontiguousarray(energy.T), bend[:, None]
+
+    @cached_property
+    def touchdown(self) -> Touchdown:
+        """In one call for lines with as many nodes: those that shorter ones lack are nowhere."""
+        nodes, place = np.diff(self.begin), np.arange(np.diff(self.begin).max())[:, None]
+        at = self.begin[:-1] + np.minimum(place, nodes - 1)
+        depth = np.where(place < nodes, self.depth[at, 0], np.nan)
+        return touchdown(self.line.s[at], depth, np.moveaxis(self.r[at][..., 0], 1, 2))
+
+    @property
+    def points(self) -> Floats:
+        """(ns,) m, output points of each."""
+        return self._joined_grid.of[0].s
+
+    def one(self, k: int) -> Observation:
+        """Output k as if it had been looked at alone."""
+        found = self.outputs[k]
+        return Observation(found.line, self.sea, self._joined_grid.of[k], found.batch)

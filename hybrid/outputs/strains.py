@@ -1,0 +1,135 @@
+"""Curvature and twist on the sides of an observation's stretches: of rods by their elements, of catenaries by bends.
+
+At ends of a stretch without an element they follow from the moment that is given there, or from the nodes inside.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from hybrid.kernels.state import Floats
+from hybrid.kernels.zone_torque import TORQUE
+from hybrid.outputs.vectors import cross, dot
+
+if TYPE_CHECKING:
+    from hybrid.outputs.observation import Observation
+
+Integers = NDArray[np.int64]
+# Times sqrt(EI/T): a rod cell longer than that does not show how bending fades at its end.
+UNRESOLVED = 3.0
+
+
+class SpanEnds(NamedTuple):
+    """The ends of stretches, first all beginnings, then all ends."""
+
+    row: Integers  # of the sides of all nodes
+    node: Integers
+    cell: Integers  # beside it, in the stretch
+    inner: Integers  # the next node in the stretch
+    inward: Integers  # 1 or -1: from row to row, into the stretch
+
+
+def ends_of(spans: Integers) -> SpanEnds:
+    """Ends of stretches (n, 3): first node, last node, row of the first side."""
+    a, b, o = spans.T
+    one = np.ones_like(a)
+    pairs = (o, o + b - a), (a, b), (a, b - 1), (a + 1, b - 1), (one, -one)
+    return SpanEnds(*(np.concatenate(pair) for pair in pairs))
+
+
+def strains(view: Observation) -> Floats:
+    """Curvature and twist (n sides, 2, outputs), 1/m, of what was computed."""
+    nodes, spans = np.array(view.grid.side_nodes), np.array(view.grid.spans).reshape(-1, 3)
+    rods = np.array([zone.kind == "rod" for zone in view.grid.parts])
+    of_rod = np.repeat(rods, spans[:, 1] - spans[:, 0] + 1)
+    out = np.zeros((nodes.size, 2, view.columns))
+    if rods.any():
+        mine = nodes[of_rod]
+        k = view.element_strains[mine] / view.of_line("hn", mine)[:, None]
+        out[of_rod, 0], out[of_rod, 1] = np.hypot(k[:, 0], k[:, 1]), k[:, 2]
+        _end_rods(view, out, spans[rods])
+    if not rods.all():
+        out[~of_rod, 0] = view.bends[nodes[~of_rod]]
+        _end_catenaries(view, out, spans[~rods])
+    _bend_on_through_joints(view, out, spans, rods)
+    return out
+
+
+def _end_rods(view: Observation, out: Floats, spans: Integers) -> None:
+    """At the ends of rods: where no element sits, or stiffness jumps, the strain of the moment; twist of the cell."""
+    line, at = view.line, ends_of(spans)
+    bare = line.element[at.node] == 0  # a joint or an end without element: strain of the moment that is given
+    # the moment is one, the stiffness is not
+    jumps = ~bare & np.isin(at.node, view.changes) & (line.element[2 * at.cell + 1 - at.node] == 1)
+    if (given := np.flatnonzero(bare | jumps)).size:
+        out[at.row[given]] = _strain_of_moment(view, at.node[given], at.cell[given])
+    # an angular spring at a clamp bends, but does not twist
+    held = np.flatnonzero(~bare & ~jumps & np.isin(at.node, view.end_nodes))
+    if held.size:
+        part = line.hn[at.node[held]] / (0.5 * line.h[at.cell[held]])
+        out[at.row[held], 1] *= part[:, None]
+    if line.tension_twist.size:
+        beside = np.where(at.cell == at.node, at.cell + 1, at.cell - 1)
+        some = np.flatnonzero(np.tile(spans[:, 1] - spans[:, 0] > 1, 2))
+        out[at.row[some], 1] -= _twist_to_node(view, at.cell[some], beside[some])
+
+
+def _end_catenaries(view: Observation, out: Floats, spans: Integers) -> None:
+    """At the ends of catenaries: on from the nodes inside, along a straight line where there are four cells."""
+    cells = np.tile(spans[:, 1] - spans[:, 0], 2)
+    at = ends_of(spans)
+    some = np.flatnonzero(cells == 2), np.flatnonzero(cells == 3), np.flatnonzero(cells >= 4)
+    for k in some[:2]:
+        out[at.row[k], 0] = out[at.row[k] + at.inward[k], 0]
+    if (k := some[2]).size:
+        row, node, inward = at.row[k], at.node[k], at.inward[k]
+        x, x1, x2 = (view.of_line("s", node + m * inward) for m in range(3))
+        p = (x - x1) / (x2 - x1)
+        out[row, 0] = np.maximum(0.0, (1 - p) * out[row + inward, 0] + p * out[row + 2 * inward, 0])
+
+
+def _bend_on_through_joints(view: Observation, out: Floats, spans: Integers, rods: NDArray[np.bool_]) -> None:
+    """At a joint, curvature of a rod whose cell is too long to show how the bend fades: that of the catenary."""
+    before = np.flatnonzero((rods[:-1] != rods[1:]) & (spans[:-1, 1] == spans[1:, 0]))
+    if not before.size:
+        return
+    last, first = spans[before, 2] + spans[before, 1] - spans[before, 0], spans[before + 1, 2]
+    node, rod = spans[before + 1, 0], rods[before + 1]
+    cell, inner = np.where(rod, node, node - 1), np.where(rod, node + 1, node - 1)
+    k = np.flatnonzero(view.line.element[inner])
+    mine, its = np.where(rod, first, last)[k], np.where(rod, last, first)[k]
+    EI = view.stiffness(inner[k])[:, :2].mean(axis=1) * view.of_line("hn", inner[k])
+    long = view.line.h[cell[k], None] ** 2 * view.T[cell[k]] > UNRESOLVED**2 * EI
+    out[mine, 0] = np.where(long, out[its, 0], out[mine, 0])
+
+
+def _twist_to_node(view: Observation, cell: Integers, inner: Integers) -> Floats:
+    """Twist (n, outputs) 1/m by which tension turns the middle of cells more than their ends at nodes."""
+    h, T = view.line.h, view.T
+    more = (T[cell] - T[inner]) * (h[cell] / (h[cell] + h[inner]))[:, None]
+    return np.asarray((2.0 * view.line.tension_twist[cell] / h[cell])[:, None] * more)
+
+
+def _strain_of_moment(view: Observation, node: Integers, cell: Integers) -> Floats:
+    """Curvature and twist (n, 2, outputs) at rods' ends that carry given moments (at a joint that of its zone)."""
+    line = view.line
+    torque = np.zeros((node.size, view.columns))
+    if view.batch.turn.size:
+        for z, (first, last) in enumerate(line.torsion[:, :2]):
+            torque[(node == first) | (node == last)] = view.batch.turn[:, z, TORQUE]
+    inner = np.where(cell == node, cell + 1, cell)
+    hn = view.of_line("hn", inner)[:, None]
+    B = view.stiffness(inner) * hn
+    k0 = line.k0[inner][..., None] / hn
+    a1, d, M = view.directors(cell), view.d[cell], view.node_moment[node]
+    body = np.stack([dot(a1, M), dot(cross(d, a1), M), dot(d, M) + torque], axis=1)
+    if line.tension_twist.size:
+        k0 = k0 + np.zeros_like(body)
+        k0[:, 2] -= (2.0 * line.tension_twist[cell] / line.h[cell])[:, None] * view.T[cell]
+    k = k0 + np.divide(body, B, out=np.zeros_like(body), where=np.broadcast_to(B > 0, body.shape))
+    found = np.stack([np.hypot(k[:, 0], k[:, 1]), k[:, 2]], axis=1)
+    found[line.element[inner] == 0] = 0.0
+    return found
