@@ -39,8 +39,8 @@ def outputs_in(batch: Batch, line: Line, zones: tuple[Zone, ...]) -> list[Output
     arrays: dict[str, Any] = {name: getattr(line, name).copy() for name in ALONG_LINE if name not in OF_LINE}
     for k in range(batch.t.size):
         own: dict[str, Any] = {name: getattr(batch, name)[k].copy() for name in OF_LINE}
-        one = batch._make(x[k : k + 1].copy() for x in batch)
-        found.append(Output(line._replace(**arrays, **own), zones, one))
+        rows: Any = [x[k : k + 1].copy() for x in batch]
+        found.append(Output(line._replace(**arrays, **own), zones, Batch(*rows)))
     return found
 
 
@@ -100,14 +100,16 @@ class JoinedObservation(Observation):
 
     def __init__(self, outputs: Sequence[Output], sea: Sea, grid: JoinedGrid) -> None:
         lines, batches = [x.line for x in outputs], [x.batch for x in outputs]
-        along = {name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE}
+        along: dict[str, Any] = {
+            name: _joined([getattr(x, name) for x in lines], name not in NODES_OF_LINE) for name in ALONG_LINE
+        }
         along["h"][grid.begin[1:-1] - 1] = 0.0
         of: dict[str, Any] = {
             name: _joined([getattr(x, name)[0] for x in batches], False)[None] for name in NODES_OF_BATCH
         }
         of |= {name: _joined([getattr(x, name)[0] for x in batches], True)[None] for name in CELLS_OF_BATCH}
         rest = [name for name in Batch._fields if name not in (*of, *OF_LINE, "turn", "touch")]
-        heads = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
+        heads: dict[str, Any] = {name: np.concatenate([getattr(x, name) for x in batches]) for name in rest}
         super().__init__(lines[0]._replace(**along), sea, grid, Batch(**heads, **of))
         self.outputs, self.begin, self._joined_grid = outputs, grid.begin, grid
 
