@@ -1,54 +1,37 @@
 """The live view in a browser: pictures follow the text and the file, runs, new scenes, two browsers, lost connections.
 
-Needs playwright and a Chromium, as tests/view/test_report_browser.py.
+What it needs is said in tests/browsed.py.
 """
 
 from __future__ import annotations
 
 import json
-import os
 import random
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
 import pytest
+from browsed import Visited, opened_browser
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
 pytest.importorskip("starlette", reason='not installed: pip install "hybrid-cable[view]"')
-from viewed import SCENE, random_edit, served  # noqa: E402
+from viewed import SCENE, random_edit, served
 
-QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
 LONG = 400.0  # s: kernels may have to be compiled
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    found = os.environ.get("HYBRID_CHROMIUM") or next(
-        filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None
-    )
-    if found is None:
-        pytest.skip("no Chromium: not named by HYBRID_CHROMIUM, and not on PATH")
-    with sync_api.sync_playwright() as play:
-        opened = play.chromium.launch(executable_path=found, args=list(QUIET))
+    with opened_browser() as opened:
         yield opened
-        opened.close()
 
 
-class Visit:
-    """A page of the view, with what it complained of and asked for."""
+class Visit(Visited):
+    """A page of the view."""
 
     def __init__(self, browser: Any, address: str, **screen: Any) -> None:
-        self.context = browser.new_context(**({"viewport": {"width": 1400, "height": 900}} | screen))
-        self.page = self.context.new_page()
-        self.complaints: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
-        self.page.on("pageerror", lambda e: self.complaints.append(str(e)))
-        self.page.on("request", lambda r: self.asked.append(r.url))
-        self.page.goto(address)
+        super().__init__(browser, address, **screen)
         self.wait("window.view && view.ready && view.connected")
 
     def type(self, text: str) -> None:

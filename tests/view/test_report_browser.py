@@ -1,14 +1,11 @@
 """The report in a browser, without a screen: it opens, moves, explains itself, fits a phone, and complains of nothing.
 
-Needs playwright and a Chromium: named by HYBRID_CHROMIUM, or `chromium`, `chromium-browser` or `google-chrome` on PATH,
-or the one of `playwright install chromium`.
+What it needs is said in tests/browsed.py.
 """
 
 from __future__ import annotations
 
 import io
-import os
-import shutil
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -16,40 +13,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from browsed import Visited, opened_browser
 from PIL import Image
 from reported import reported
 
 import hybrid
 from hybrid.view.report import write_report
 
-sync_api = pytest.importorskip("playwright.sync_api", reason="playwright is not installed: pip install playwright")
-
-QUIET = ("--no-sandbox", "--disable-gpu", "--disable-quic", "--no-first-run", "--disable-background-networking")
-QUIET += ("--disable-component-update", "--disable-sync")
 EVENTS = [(5.5, 40.0, 60.0, "split", "bend 1.05 > 1 at s = 49 to 51 m"), (7.0, 0.0, 100.0, "snap", "a <b>peak</b>")]
-
-
-def chromium(own: str) -> str:
-    """A Chromium; own: where playwright keeps the one that it can download."""
-    named = os.environ.get("HYBRID_CHROMIUM")
-    if named and not Path(named).is_file():
-        pytest.fail(f"HYBRID_CHROMIUM names {named}, which is no file")
-    on_path = map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))
-    found = named or next(filter(None, on_path), None) or own
-    if not Path(found).is_file():
-        pytest.skip(
-            "no Chromium: not named by HYBRID_CHROMIUM, not on PATH, and `playwright install chromium` not done"
-        )
-    return found
 
 
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Any]:
-    with sync_api.sync_playwright() as play:
-        program = chromium(play.chromium.executable_path)
-        opened = play.chromium.launch(executable_path=program, args=list(QUIET))
+    with opened_browser() as opened:
         yield opened
-        opened.close()
 
 
 @pytest.fixture(scope="module")
@@ -58,19 +35,12 @@ def page_file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_report(result, tmp_path_factory.mktemp("report") / "run.html")
 
 
-class Visit:
-    """A page that is open, with what it said and asked for."""
+class Visit(Visited):
+    """A report that is open, with the seconds that it took."""
 
     def __init__(self, browser: Any, file: Path, **screen: Any) -> None:
-        self.context = browser.new_context(**({"viewport": {"width": 1280, "height": 900}} | screen))
-        self.page = self.context.new_page()
-        self.complaints: list[str] = []
-        self.asked: list[str] = []
-        self.page.on("console", lambda m: self.complaints.append(m.text) if m.type == "error" else None)
-        self.page.on("pageerror", lambda e: self.complaints.append(str(e)))
-        self.page.on("request", lambda r: self.asked.append(r.url))
         begin = time.perf_counter()
-        self.page.goto(file.resolve().as_uri())
+        super().__init__(browser, file.resolve().as_uri(), **({"viewport": {"width": 1280, "height": 900}} | screen))
         self.page.wait_for_function("window.report && window.report.ready", timeout=60_000)
         self.seconds = time.perf_counter() - begin
 
