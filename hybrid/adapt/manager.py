@@ -128,7 +128,6 @@ class DomainManager:
         self.zones = blank_zones(1, n)._replace(  # what the compiled run knows of them
             here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
         )
-        self.zones.parts[:], self.zones.H[:] = layout.parts, np.diff(layout.base)
         self.zones.clock[z.SHARE] = curvature_error or 0.0
         self.tolerance, self.zones.clock[z.LEFT] = tolerance, left
         for quantity, part in asked.items():
@@ -140,11 +139,8 @@ class DomainManager:
         self.calm_since, self.buffer = np.full(n, np.inf), np.zeros(n)
         self.calmed = np.zeros((2, n))  # of rods on their way out: which criterion was the loudest, and its ratio
         self.patience, self.released = np.ones(n), np.full(n, -np.inf)
-        self.shortest = SHORTEST * float(np.median(np.diff(layout.base)))
-        self._table, self._on_base = Table(blank_zone_job()), on_base or LineOnBase(cable, layout.base)
-        H, of = np.diff(layout.base), cable.piece(0.5 * (layout.base[:-1] + layout.base[1:]))
-        self.zones.clock[z.COMPLIANCE] = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
-        self.zones.clock[z.FREE_TWIST] = H @ cable.kappa[of, 2]
+        self._table, self.on_base = Table(blank_zone_job()), on_base or LineOnBase(cable, layout.base)
+        self.measure(layout)
         weight = np.abs(cable.submerged_weight)
         floor = tension_floor(cable.mean_bending, weight, scale)
         self.weightless = bool((floor < WEIGHTLESS * scale).any())
@@ -191,7 +187,7 @@ class DomainManager:
 
     def set_layout(self, layout: Layout) -> None:
         """Take over a layout: what the criteria need of its nodes."""
-        kinds = self._on_base.kinds(layout, self.free, self.scale)
+        kinds = self.on_base.kinds(layout, self.free, self.scale)
         kept = {name: getattr(self.zones, name) for name in OF_BASE}
         self.take(layout, all_zones(layout.base_of_cell.size, kinds=kinds, **kept))
         self.zones.rod[:], self.zones.since[:] = layout.rod, -np.inf
@@ -208,6 +204,15 @@ class DomainManager:
         self.layout, self.zones = layout, zones
         self.EI, self.w, self.floor, self.base_of_cell = kinds.EI, kinds.w, kinds.floor, kinds.base_of_cell
         self._update_ramping()
+
+    def measure(self, layout: Layout) -> None:
+        """What follows from the lengths of base cells."""
+        H, zones, cable = np.diff(layout.base), self.zones, self.cable
+        of = cable.piece(0.5 * (layout.base[:-1] + layout.base[1:]))
+        zones.parts[:], zones.H[:] = layout.parts, H
+        self.shortest = SHORTEST * float(np.median(H))
+        zones.clock[z.COMPLIANCE] = np.sum(H / np.maximum(cable.B[of, 2], 1e-300))
+        zones.clock[z.FREE_TWIST] = H @ cable.kappa[of, 2]
 
     def adopt_layout(self, new: Layout, change: Change, t: float) -> None:
         """Take over the layout of a change, at t."""

@@ -134,8 +134,10 @@ def fill_cells(line, reel):
 
 @inner
 def set_lengths(line, reel, t):
-    """Lengths of cells at t: those that are new are on their way to their true ones, by a quintic that ends at rest."""
+    """Lengths at t of cells that lacked something: on their way to their true ones, by a quintic that ends at rest."""
     for k in range(line.h.shape[0]):
+        if reel.since[k] == -np.inf:
+            continue
         c = cell(line, reel, k)
         line.h[c] = reel.true[k]
         x = (t - reel.since[k]) / reel.span[k]

@@ -204,6 +204,25 @@ def remember(line, reel):
 
 
 @inner
+def changes_length(line, reel, c):
+    """Whether the length of cell c of the line changes because line is paid out, and not because zones move."""
+    k = cell(line, reel, c)  # and back
+    return k >= growing(line, reel) or reel.since[k] > -np.inf
+
+
+@inner
+def leave_to_reel(line, zones, reel):
+    """Zones that move book nothing of lengths and stiffness that change because line is paid out."""
+    for c in range(zones.lengths.shape[0]):
+        if changes_length(line, reel, c):
+            zones.lengths[c] = line.h[c]
+    for j in range(growing(line, reel), zones.stiff.shape[0]):
+        i = node(line, reel, j)
+        for k in range(3):
+            zones.stiff[i, k] = line.kb[i, k]
+
+
+@inner
 def stretch_work(line, state, c):
     """Energy per length, N, that a cell takes up when its unstretched length grows and its ends stay."""
     T = state.T[c]
@@ -217,7 +236,7 @@ def book(line, old, new, reel, dt):
     booked = 0.5 * dt * (numbers[FLUX] + numbers[FLUX_BEFORE])
     for c in range(n):
         more = line.h[c] - before[c, 0]
-        if more != 0.0:
+        if more != 0.0 and changes_length(line, reel, c):
             booked -= 0.5 * more * (stretch_work(line, old, c) + stretch_work(line, new, c))
     for j in range(growing(line, reel), n + 1):
         i = node(line, reel, j)
@@ -261,6 +280,7 @@ def pay_out(table):
         take_riding_off(line, reel)
         pull = correct_force(line, job.sea, job.ends, tried, job.velocity, reel, job.report)
         note_pull(reel, clock[b.TRY_END], pull)
+        leave_to_reel(line, job.zones, reel)
         return 0
     # a step is accepted, and the states have changed places
     state, before = job.old, job.new
@@ -325,6 +345,7 @@ def lengthen(table):
     find_length(job.reel, job.clock[b.NOW])
     prepare(job.line, job.reel, job.clock[b.NOW])
     remember(job.line, job.reel)
+    leave_to_reel(job.line, job.zones, job.reel)
 
 
 @kernel

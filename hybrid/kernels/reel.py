@@ -77,6 +77,17 @@ def blank_reel(
     )  # fmt: skip
 
 
+class MovingZones(NamedTuple):
+    """Of zones that move (kernels.zone_step.Zones), what they take the work of lengths and stiffness from."""
+
+    lengths: Floats  # (N,) m, at the end of the last step; none where zones stay
+    stiff: Floats  # (N+1, 3) N m
+
+
+def zones_that_stay() -> MovingZones:
+    return MovingZones(np.zeros(0), np.zeros((0, 3)))
+
+
 class ReelJob(NamedTuple):
     """Arguments of the entries: two states in turn as kernels.run has them, and its clock, counts, work and report."""
 
@@ -92,6 +103,7 @@ class ReelJob(NamedTuple):
     report: Floats  # (REPORT_SIZE,) of the step
     reel: Reel
     X: Floats  # of the line's kernels.state.Work
+    zones: MovingZones
 
 
 def blank_reel_job() -> ReelJob:
@@ -99,7 +111,7 @@ def blank_reel_job() -> ReelJob:
     state, z = blank_state(1), np.zeros
     return ReelJob(
         blank_line(1), no_sea(1), no_ends(), state, state, z(CLOCK_SIZE), z(COUNT_SIZE, np.int64), z((2, WORKS)),
-        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0),
+        z((2, 3)), z(REPORT_SIZE), blank_reel(1), z(0), zones_that_stay(),
     )  # fmt: skip
 
 

@@ -28,13 +28,13 @@ from hybrid.model.initial_shape import (
     spare_shapes,
     twist_by_tension,
 )
-from hybrid.model.layout import Layout
+from hybrid.model.layout import Layout, of_rods
 from hybrid.model.line import line_on, spins_freely
 from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import DEFAULT_CELLS, Zone, ZonePlan, given_nodes, place_nodes, refuse_too_many, thinned
 from hybrid.model.mesh_grading import Grading
-from hybrid.model.payout import PayoutPlan, payout_plan
+from hybrid.model.payout import PayoutPlan, payout_of, payout_plan
 from hybrid.model.plane import in_plane, planar
 from hybrid.model.resolution import Resolution, first_resolution, follows_curvature, mesh_is_free
 from hybrid.model.scales import tension_scale
@@ -90,11 +90,9 @@ class Model:
     @property
     def mesh(self) -> Layout | tuple[Floats, tuple[Zone, ...]]:
         """What `build` makes a model of the same mesh from."""
-        if self.payout is not None:
-            return self.payout.begun, self.payout.zones
         if self.layout is None:
-            return self.line.s, self.zones
-        return self.layout.finest
+            return (self.line.s, self.zones) if self.payout is None else (self.payout.begun, self.payout.zones)
+        return self.layout.finest if self.payout is None else of_rods(self.payout.begun)
 
     @property
     def cells(self) -> int:
@@ -375,7 +373,9 @@ def _layout(scene: Scene, cable: Material, cuts: Sequence[float], resolution: Re
         return Layout(base, parts, np.ones(base.size - 1, bool))
     nearly = NEARLY if resolution.grading is not None else 1e-9
     parts = np.clip(np.ceil(np.diff(base) / cell - nearly), 1, MOST_PARTS).astype(int)
-    return Layout(base, parts, np.ones(base.size - 1, bool))
+    layout = Layout(base, parts, np.ones(base.size - 1, bool))
+    # of a line that is paid out catenaries have the cells of rods, so that whatever enters and leaves is of one kind
+    return layout if payout_of(scene) is None else of_rods(layout.nodes)
 
 
 def rod_cells(scene: Scene, cable: Material, s: Floats, grading: Grading | None = None) -> Floats:

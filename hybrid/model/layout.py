@@ -77,6 +77,11 @@ class Layout(_Fields):
         )
 
 
+def of_rods(s: Floats) -> Layout:
+    """Rods of one cell each, with nodes s (N+1,) m."""
+    return Layout(s, np.ones(s.size - 1, int), np.ones(s.size - 1, bool))
+
+
 def edges(flags: np.ndarray) -> list[int]:
     """Where runs of equal flags begin, and the end of the last."""
     changes = np.flatnonzero(flags[1:] != flags[:-1]) + 1

@@ -13,11 +13,13 @@ from hybrid.errors import Complaint, SceneError
 from hybrid.kernels import winch as w
 from hybrid.kernels.reel import PER_LENGTH
 from hybrid.kernels.state import Floats, Line
+from hybrid.model.layout import Layout
 from hybrid.model.line import line_on
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.material import Material, material
 from hybrid.model.mesh import Zone
 from hybrid.scene.payout import Payout
-from hybrid.scene.schema import Modules, Scene, Section
+from hybrid.scene.schema import AdaptiveModel, Modules, Scene, Section
 
 # Parts of a cell: a node enters when that much of the cell after it is out, and leaves when only that much is left.
 ENTERS, LEAVES = 0.85, 0.35
@@ -128,11 +130,33 @@ class PayoutPlan:
         line = line_on(self.cable, s, rods)
         return line._replace(bits=like.bits, plane=like.plane, footing=self._footing(like, s.size))
 
-    def zones_of(self, length: float) -> tuple[Zone, ...]:
-        """The zones of a line of that length, m."""
+    def layout(self, count: int, length: float, rod: np.ndarray) -> Layout:
+        """The cells of `count` material nodes and a length, m, where zones move; rod: (N,) bool."""
+        s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
+        return Layout(s, np.ones(s.size - 1, int), rod)
+
+    def line_on(self, layout: Layout, like: Line) -> tuple[LineOnBase, Line]:
+        """The line on the cells of a layout, and what makes it; like: another one, with the same forces."""
+        on_base = LineOnBase(self.cable, layout.base)
+        line = on_base.line(layout, like.bits, like.plane)
+        return on_base, line._replace(footing=self._footing(like, layout.base.size))
+
+    def at_winch(self, count: int, reach: float) -> np.ndarray:
+        """(N,) bool, cells that are rod where zones move: those that change, and as many before them as may be taken in
+
+        before others are rod; reach: m, what that is, if it is more than a few cells.
+        """
+        cells = count + self.layer.size - 1
+        begins = min(count - 1 - FEWEST_CELLS, int(np.searchsorted(self.nodes, self.nodes[count - 1] - reach)))
+        out = np.arange(cells) >= max(begins, 0)
+        return out if self.side else out[::-1]
+
+    def zones_of(self, length: float, zones: tuple[Zone, ...] | None = None) -> tuple[Zone, ...]:
+        """The zones of a line of that length, m; zones: those that it has, if they move."""
+        zones = zones or self.zones
         if self.side:
-            return (*self.zones[:-1], replace(self.zones[-1], s_b=length))
-        return (replace(self.zones[0], s_a=self.far - length), *self.zones[1:])
+            return (*zones[:-1], replace(zones[-1], s_b=length))
+        return (replace(zones[0], s_a=self.far - length), *zones[1:])
 
     def _footing(self, like: Line, nodes: int) -> Floats:
         """Bodies that press on the seabed; those of the nodes that come are none."""
@@ -162,7 +186,7 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
     points = [x for x in (at if side else length - at).tolist() if x < length]
     out = scene.cable.sections if side else scene.cable.sections[::-1]
     changes = [x for x in np.cumsum([x.length for x in out]).tolist() if x < length * (1 - 1e-9)]
-    fixed = max([joint, *points, *changes])
+    fixed = max([joint, *points, *changes, _catenary_up_to(scene)])
     near = int(np.searchsorted(s, fixed * (1 + 1e-12)))
     ride = riding_nodes(scene, line)
     fewest = FEWEST_CELLS + ride
@@ -194,6 +218,13 @@ def payout_plan(scene: Scene, line: Line, zones: tuple[Zone, ...]) -> PayoutPlan
         side, far, law, np.array(nodes), length, longest, shortest, zones, cable, _pieces(cable, side, far),
         payout.from_outside, winch, layer, line.s.copy(),
     )  # fmt: skip
+
+
+def _catenary_up_to(scene: Scene) -> float:
+    """Up to where, m from the far end, a scene whose zones move forces catenaries."""
+    wanted = scene.model.force_catenary if isinstance(scene.model, AdaptiveModel) else None
+    length = scene.length
+    return max([b if winch_side(scene) else length - a for a, b in wanted or ()], default=0.0)
 
 
 def riding_nodes(scene: Scene, line: Line) -> int:
@@ -390,6 +421,13 @@ def length_at(law: Floats, t: float) -> tuple[float, float, float]:
         rate = rate * x + value
         value = value * x + c
     return value, rate, twice
+
+
+def fastest(law: Floats) -> float:
+    """Largest size of the rate, m/s, that a law of length has."""
+    last = float(law[-1, 0])
+    t = np.unique(np.concatenate([np.linspace(0.0, last + 1.0, 501), law[:, 0], law[:, 0] + 1e-9 * (last + 1.0)]))
+    return max(abs(length_at(law, x)[1]) for x in t.tolist())
 
 
 def _extremes(law: Floats, length: float, duration: float) -> tuple[float, float]:

@@ -63,15 +63,22 @@ def payout_at_an_end(ends: Ends, cable: Cable) -> Iterator[Finding]:
 def payout_stands_alone(
     ends: Ends, cable: Cable, model: Model, contact: Contact, solver: str, resolution: Resolution | None
 ) -> Iterator[Finding]:
-    """Of zones that stay, without contact with itself, by elimination."""
+    """By elimination, without contact with itself, of models that nodes can enter."""
     found = _winch(ends)
     if found is None:
         return
     name, because = found[0], f"because line is paid out (ends.{found[0]}.payout)"
-    moving = isinstance(model, AdaptiveModel | CorrectedModel)
-    if moving or (isinstance(model, ZonesModel) and any(isinstance(x, CorrectedZone) for x in model.zones)):
-        expected = f"catenary, rod, or zones of both that stay, {because}"
-        yield Finding(("model",), expected, "write `model: catenary`, or `model: rod`", f"kind: {model.kind}")
+    corrected = isinstance(model, ZonesModel) and any(isinstance(x, CorrectedZone) for x in model.zones)
+    if corrected or isinstance(model, CorrectedModel):
+        expected = f"adaptive, catenary, rod, or zones of catenary and rod, {because}"
+        yield Finding(("model",), expected, "write `model: adaptive`, or `model: catenary`", f"kind: {model.kind}")
+    if isinstance(model, AdaptiveModel):
+        if model.curvature_error is not None:
+            yield Finding(("model", "curvature_error"), f"nothing, {because}, and its cells stay", "leave it out")
+        if model.joint == "curvature":
+            yield Finding(("model", "joint"), f"spherical, {because}", "leave it out")
+        if model.correct:
+            yield Finding(("model", "correct"), f"false, {because}", "leave it out, and make model.tolerance smaller")
     for i, item in enumerate(cable.attachments):
         if item.kind == "swivel":
             expected = f"no swivel, {because}"

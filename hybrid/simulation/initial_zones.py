@@ -17,10 +17,12 @@ from hybrid.model.bending_reference import LEFT
 from hybrid.model.build import Model, given_zones
 from hybrid.model.coarsen import picked
 from hybrid.model.layout import Layout
+from hybrid.model.payout import fastest
 from hybrid.model.resolution import Resolution, follows_curvature, requested_accuracy
 from hybrid.scene.schema import AdaptiveModel, Scene
 from hybrid.simulation.bending_correction import Correction
 from hybrid.simulation.equilibrium import equilibrium_of, solve_model
+from hybrid.simulation.payout_zones import rods_at_winch
 from hybrid.simulation.zone_switching import ZoneSwitching, on_layout
 from hybrid.solve.statics import Equilibrium
 
@@ -60,14 +62,24 @@ def manager_for(scene: Scene, model: Model, resolution: Resolution, criterion: U
     asked = shares_asked(scene, curvature_error)
     if curvature_error is not None:  # finer meshes have smaller errors: of second order
         curvature_error /= resolution.fineness**2
+    ramp = min(max(hold, FASTEST * step), SLOWEST * pace)
     manager = DomainManager(
-        model.cable, model.layout, resolution.zones * model.length, hold, given_zones(scene, model.layout),
-        model.tension_scale, criterion, min(max(hold, FASTEST * step), SLOWEST * pace),
+        model.cable, model.layout, resolution.zones * model.length, hold, _given(scene, model, ramp),
+        model.tension_scale, criterion, ramp,
         LEFT if model.corrected else 1.0, model.on_base,
         curvature_error, asked,
     )  # fmt: skip
     manager.load(model.ends.moments)
     return manager
+
+
+def _given(scene: Scene, model: Model, pace: float) -> np.ndarray:
+    """(n,) of base cells: 1 rod, -1 catenary, 0 adaptive; pace: s, ramp time of bending stiffness."""
+    assert model.layout is not None
+    if model.payout is None:
+        return given_zones(scene, model.layout)
+    paid = model.payout
+    return rods_at_winch(scene, paid, model, paid.count(paid.first), pace, fastest(paid.law))
 
 
 def shares_asked(scene: Scene, curvature_error: float | None) -> dict[int, float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
@@ -15,12 +16,13 @@ from hybrid.kernels.binding import Table
 from hybrid.kernels.books import CLOCK_SIZE
 from hybrid.kernels.energies import observe
 from hybrid.kernels.payout import fit_line, iterate, lengthen, pay_out, stand_still
-from hybrid.kernels.reel import Reel, blank_reel, blank_reel_job
+from hybrid.kernels.reel import MovingZones, Reel, blank_reel, blank_reel_job
 from hybrid.kernels.report import LENGTH_OUT, PAYOUT_RATE
 from hybrid.kernels.state import Batch, Ends, Floats, Line, State
 from hybrid.model.build import Model
+from hybrid.model.line_on_base import LineOnBase
 from hybrid.model.mesh import Zone
-from hybrid.model.payout import PayoutPlan, length_at, payout_of, winch_at
+from hybrid.model.payout import PayoutPlan, fastest, length_at, payout_of, winch_at
 from hybrid.outputs.observation import Observation
 from hybrid.outputs.probes import Observer
 from hybrid.scene.payout import SOURCES
@@ -49,6 +51,7 @@ class PayingOut:
         self.law, self.winch = self.plan.law.copy(), self.plan.winch.copy()
         self.count = self.plan.count(self.plan.first)  # material nodes that are out
         self.reel = self._blank(self.count)
+        self._rod: np.ndarray | None = None  # (N,) of a line whose zones move
         self.table, self._fitting, self._clock = Table(blank_reel_job()), Table(blank_reel_job()), np.zeros(CLOCK_SIZE)
 
     def _blank(self, count: int) -> Reel:
@@ -64,19 +67,26 @@ class PayingOut:
         reel.true[: count - 1], reel.true[count:] = np.diff(plan.nodes[:count]), -np.diff(plan.layer)
         return reel
 
-    def on(self, model: Model, length: float) -> Model:
-        """A model with the nodes of now and a length, m."""
-        line = self.plan.line(self.count, length, model.line)
+    def on(self, model: Model, length: float, rod: np.ndarray | None = None) -> Model:
+        """A model with the nodes of now and a length, m; rod: (N,) bool, of a line whose zones move."""
+        plan, layout, on_base = self.plan, None, None
+        if model.layout is None:
+            line, zones = plan.line(self.count, length, model.line), plan.zones_of(length)
+        else:
+            layout = plan.layout(self.count, length, model.layout.rod if rod is None else rod)
+            (on_base, line), zones = plan.line_on(layout, model.line), layout.zones
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
-        return replace(model, line=line, zones=self.plan.zones_of(length), sea=sea, length=length)
+        return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
 
-    def attach(self, run: CompiledRun, model: Model, stepper: Stepper) -> None:
-        """Let a run pay out its line from now on."""
+    def attach(self, run: CompiledRun, model: Model, stepper: Stepper, moving: MovingZones) -> None:
+        """Let a run pay out its line from now on; moving: of its zones."""
+        self._rod = model.layout.rod if model.layout is not None else None
         self.table.bind(
             line=model.line, sea=model.sea.values, ends=model.ends.values, old=run.states[0], new=run.states[1],
             clock=run.clock, counts=run.count, work=run.books.work, velocity=run.books.velocity,
             report=stepper.work.report, reel=self.reel, X=stepper.work.X,
+            zones=moving,
         )  # fmt: skip
         numbers = self.table.numbers
         asks = self.holds_tension or self.rides
@@ -91,6 +101,14 @@ class PayingOut:
     def holds_tension(self) -> bool:
         """Whether a winch holds a tension."""
         return bool(self.winch[w.TENSION])
+
+    @property
+    def fastest(self) -> float:
+        """Largest size of the rate, m/s, that is to be expected."""
+        if self.holds_tension:
+            most = float(self.winch[w.MAX_RATE])
+            return most if np.isfinite(most) else abs(float(self.winch[w.RATE_NOW]))
+        return fastest(self.law)
 
     def stand_still(self) -> None:
         """The line as it is now, and the force of its fairlead in the report of a state that no step has led to."""
@@ -118,15 +136,21 @@ class PayingOut:
         winch = self.winch
         return self.holds_tension and not winch[w.LEAST] <= winch[w.LENGTH_NOW] <= winch[w.MOST]
 
-    def change(self, run: CompiledRun, model: Model) -> tuple[Model, State, float]:
-        """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in."""
+    def change(
+        self, run: CompiledRun, model: Model, carry: Callable[[Model, np.ndarray], None] | None = None
+    ) -> tuple[Model, State, float]:
+        """The model and the state with one node more, or less, at the fairlead, and the energy, J, that it puts in.
+
+        carry: lets zones that move go on, with the model and (N,) which old cell each of its cells comes from.
+        """
         state, old, plan = run.state, self.reel, self.plan
         numbers = old.numbers
         enters = old.true[self.count - 1] > numbers[p.LONGEST]
         flow = self._flow(run)
+        source = self._came_from(enters, old.true.size)
         self.count += 1 if enters else -1
         length = float(numbers[p.LENGTH])
-        changed = self.on(model, length)
+        changed = self.on(model, length, model.layout.rod[source] if model.layout is not None else None)
         reel, side = self._blank(self.count), plan.side
         line, target = line_from_far_end(model.line, side, plan.far), line_from_far_end(changed.line, side, plan.far)
         seen = from_far_end(state, side)
@@ -139,8 +163,36 @@ class PayingOut:
         reel.true[self.count - 1] = length - plan.layer[0] - plan.nodes[self.count - 1]
         self.reel = reel
         self._fit(changed.line, reel, length, flow.t)
+        if carry is not None:
+            carry(changed, source)
         ends = model.ends.at(run.t)
         return changed, out, energy(changed.line, ends, out) - energy(model.line, ends, state)
+
+    def _came_from(self, enters: bool, cells: int) -> np.ndarray:
+        """Which of so many old cells those of a line come from in which a node enters, or leaves."""
+        grows, all_ = self.count - 1, np.arange(cells)
+        source = np.insert(all_, grows, grows) if enters else np.delete(all_, grows)
+        return source if self.plan.side else cells - 1 - source[::-1]
+
+    @property
+    def changing(self) -> np.ndarray:
+        """(N,) bool, cells whose length changes because line is paid out."""
+        reel = self.reel
+        found = (np.arange(reel.true.size) >= self.count - 1) | (reel.since > -np.inf)
+        return found if self.plan.side else found[::-1]
+
+    def as_now(self, model: Model) -> Model:
+        """A model whose zones move, and whose nodes are where they are now."""
+        assert model.layout is not None
+        self.lengthen()
+        length = float(self.reel.numbers[p.LENGTH])
+        layout = self.plan.layout(self.count, length, model.layout.rod)
+        on_base = LineOnBase(self.plan.cable, layout.base)
+        return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)
+
+    def fit(self, line: Line, t: float) -> None:
+        """Let a line of the same nodes have the length of now, at t (s)."""
+        self._fit(line, self.reel, float(self.reel.numbers[p.LENGTH]), t)
 
     def _fit(self, line: Line, reel: Reel, length: float, t: float) -> None:
         """Let a line have a length, m, at t (s): cells that grow hold the sections that come off the reel."""
@@ -176,9 +228,13 @@ class PayingOut:
                 batch.report[k, LENGTH_OUT], batch.report[k, PAYOUT_RATE], _ = length_at(self.law, t)
             length = float(batch.report[k, LENGTH_OUT])
             self._fit(line, reel, length, t)
-            zones.append(self.plan.zones_of(length))
+            zones.append(self.plan.zones_of(length, model.zones if model.layout is not None else None))
             for name, x in varied.items():
                 x[k] = getattr(line, name)
+        if model.layout is not None:  # lengths and stiffness of zones that move
+            kept, at = ~self.changing, np.arange(line.s.size)
+            nodes = at < self.count - 1 if self.plan.side else at > line.h.size - self.count + 1
+            varied["h"][:, kept], varied["kb"][:, nodes] = batch.h[:, kept], batch.kb[:, nodes]
         there = observer.on_varied(line, model.sea.values, zones[0], varied["s"])
         there.first_energy = observer.first_energy
         return there, there.look(batch._replace(h=varied["h"], kb=varied["kb"]), varied), zones[1:]
@@ -188,12 +244,14 @@ class PayingOut:
     def checkpoint(self) -> dict[str, Any]:
         """What the next steps depend on."""
         kept = {name: getattr(self.reel, name).copy() for name in KEPT}
-        return {"count": self.count, "law": self.law.copy(), **kept}
+        rods = {} if self._rod is None else {"rod": self._rod.copy()}
+        return {"count": self.count, "law": self.law.copy(), **kept, **rods}
 
     def restore(self, tree: Any, model: Model) -> Model:
         """Go on as `checkpoint` has written: the model as it was then.  ValueError: it is that of another line."""
         template = {"count": 0, "law": np.zeros((0, 8))}
         given = dict(tree)
+        rod = given.pop("rod", None)
         saved = matched({name: given.pop(name) for name in template}, template, "payout")
         count, law = saved["count"], saved["law"]
         if not (law.ndim == 2 and law.shape[1] == 8 and len(law) and (np.diff(law[:, 0]) >= 0.0).all()):
@@ -214,7 +272,11 @@ class PayingOut:
             raise ValueError("a length that no line has")
         for name, x in kept.items():
             getattr(self.reel, name)[:] = x
-        return self.on(model, float(self.reel.numbers[p.LENGTH]))
+        cells = count + self.rides
+        known = isinstance(rod, np.ndarray) and rod.shape == (cells,) and rod.dtype == bool
+        if model.layout is not None and not known:
+            raise ValueError(f"rods of another line than one of {cells} cells")
+        return self.on(model, float(self.reel.numbers[p.LENGTH]), rod)
 
     def go_on(self, begin: float, end: float, asked: tuple[float | None, float] | None) -> None:
         """From `begin` to `end`, s, a length that is set from Python goes where it was asked to, or on at its rate.

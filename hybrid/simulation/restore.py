@@ -21,7 +21,7 @@ from hybrid.adapt.user_criterion import UserCriterion
 from hybrid.errors import ResultError
 from hybrid.kernels.cache import kernel_hash
 from hybrid.model.build import MOST_FOLLOWING, MOST_PARTS, Model, build
-from hybrid.model.layout import Layout
+from hybrid.model.layout import Layout, of_rods
 from hybrid.model.mesh import MOST_CELLS, Zone
 from hybrid.model.mesh_grading import Grading
 from hybrid.model.output_points import OutputPoints
@@ -129,7 +129,7 @@ def restored_points(result: Result, length: float, far: float | None = None) -> 
 def mesh_tree(model: Model) -> Tree:
     """Where the nodes of a model are, and its zones, for a checkpoint."""
     if model.layout is not None:
-        return model.layout._asdict()
+        return (model.layout if model.payout is None else of_rods(model.payout.begun))._asdict()
     assert not isinstance(model.mesh, Layout)
     s, zones = model.mesh
     return {"s": s, "zones": [[x.kind, x.s_a, x.s_b] for x in zones]}

@@ -298,7 +298,7 @@ class TimeLoop:
             ratios, self._ratios = np.array(self._ratios[:count]), self._ratios[count:]
         if run.payout is not None:
             there, seen, zones = run.payout.look(observer, model, batch)
-            self._save(there, seen, there.values_of(seen), zones)
+            self._save(there, seen, there.values_of(seen, ratios), zones)
             observer.first_energy = there.first_energy
             return
         shift = run.correction.corrector.shift(errors, batch) if run.correction is not None else None

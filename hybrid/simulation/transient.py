@@ -31,6 +31,7 @@ from hybrid.simulation.diagnostics import borne_strain
 from hybrid.simulation.envelope import Envelope, marked_places, marks_on
 from hybrid.simulation.events import EventLog
 from hybrid.simulation.payout import PayingOut
+from hybrid.simulation.payout_zones import PaidZones, moving_zones
 from hybrid.simulation.plane_monitor import PlaneMonitor
 from hybrid.simulation.releases import let_go, overloaded, watch_forces
 from hybrid.simulation.self_watch import SelfWatch, let_touch_itself, refuse_start_in_itself
@@ -89,8 +90,10 @@ class Transient:
         self.nears_itself = False  # whether contact with itself has to begin after this step
         self.marked = marked_places(scene, model)
         self.payout = PayingOut(model) if model.payout is not None else None
+        self.paid_zones = None
         if self.payout is not None:
             model = self.payout.on(model, model.length)
+            self.paid_zones = PaidZones(scene, self.payout, switching) if switching is not None else None
         self._set_control(resolution)
         self.plane_monitor = PlaneMonitor(scene)
         self.plane_monitor.comes_back = switching is None and correction is None and self.payout is None
@@ -405,10 +408,7 @@ class Transient:
         if change is not None:
             self._switch(change)
         if self.payout is not None and self.payout.due:
-            model, state, booked = self.payout.change(self.run, self.model)
-            self.run.books.work[0, b.ZONES] += booked
-            self.set_model(model, state)
-            self.evaluate_forces()
+            self._change_length()
         if self._leaves:
             self._leaves = False
             state = self.state.copy()
@@ -424,6 +424,19 @@ class Transient:
         released, self._overloaded = self._overloaded, {}
         for k, why in released.items():
             self.release(k, why, new_leg=False)
+
+    def _change_length(self) -> None:
+        """A node enters at the winch, or leaves."""
+        assert self.payout is not None
+        zones = self.paid_zones
+        rods = zones.rods_before_leaving() if zones is not None else None
+        if rods is not None:
+            self._switch(rods)
+        carry = (zones.carry,) if zones is not None else ()
+        model, state, booked = self.payout.change(self.run, self.model, *carry)
+        self.run.books.work[0, b.ZONES] += booked
+        self.set_model(model, state)
+        self.evaluate_forces()
 
     def _come_back(self) -> None:
         """Go on in the plane that was left."""
@@ -454,8 +467,12 @@ class Transient:
         if cells is not None:
             booked = cells.change_zones(change)
         else:
+            if self.paid_zones is not None:
+                self.model = self.paid_zones.as_now(self.model)
             ends, sea = self.model.ends.at(self.t), self.model.sea.at(self.t)
             model, state, booked = self.switching.switch(change, self.t, ends, self.state, sea)
+            if self.payout is not None:
+                self.payout.fit(model.line, self.t)
             run.books.work[0, b.ZONES] += booked
         note_change(self.events, self.switching.manager.layout.base, self.t, change, booked)
         if cells is None:
@@ -493,7 +510,7 @@ class Transient:
         if self.itself is not None:
             self.itself.attach(model, self.run)
         if self.payout is not None:
-            self.payout.attach(self.run, model, self.stepper)
+            self.payout.attach(self.run, model, self.stepper, moving_zones(self.paid_zones))
         self.plane_monitor.attach(self.run, model.line)
         watch_forces(self.run, model)
         if self.switching is not None:

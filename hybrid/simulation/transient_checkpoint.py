@@ -59,6 +59,8 @@ def restore(run: Transient, saved: Mapping[str, Any]) -> None:
         model = replace(model, line=model.line._replace(plane=monitor.home))
     if run.payout is not None:
         model = run.payout.restore(saved["payout"], model)
+        if run.paid_zones is not None:
+            run.paid_zones.resume(model)
     state = state_for(model.line)
     run.set_model(model, state)
     complete = "report" in saved  # not in a checkpoint of 0.6

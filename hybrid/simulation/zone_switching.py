@@ -82,6 +82,15 @@ class ZoneSwitching:
         self.kinks[model.cable.point_nodes(base)] = True
         self._take_line(model.line, model.line.h)
 
+    def take_cells(self, model: Model) -> None:
+        """Go on with a model whose line has all of its stiffness and its true lengths: cells have come or gone."""
+        assert model.layout is not None
+        self.model = model
+        self.kinks = np.zeros(model.layout.base.size, bool)
+        self.kinks[model.cable.point_nodes(model.layout.base)] = True
+        self._take_line(model.line, model.line.h)
+        self.zones.true[:] = np.diff(model.line.s)
+
     def take(self, model: Model, zones: Zones) -> None:
         """Go on with a model of the same zones in other cells, which have been changed to."""
         assert model.layout is not None

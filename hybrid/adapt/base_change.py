@@ -1,0 +1,47 @@
+"""The base cells of a line change while it is paid out: what the domain manager remembers of those that stay."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from hybrid.adapt.manager import OF_BASE, DomainManager
+from hybrid.kernels import zone_step as z
+from hybrid.kernels.zone_step import blank_zones
+from hybrid.model.layout import Layout
+from hybrid.model.line_on_base import LineOnBase
+
+# Arrays of `Zones` that have no base cells; of base cells; of cells.
+OF_LINE = ("clock", "counts", "clamped", "tangents", "moments", "asked", "largest", "shares", "limits")
+CARRIED = ("leaving", "grown", "haste")
+OF_CELLS = ("past", "recent", "lack", "rate", "since", "keeps")
+
+
+def change_base(
+    manager: DomainManager, layout: Layout, source: np.ndarray, given: np.ndarray, on_base: LineOnBase
+) -> None:
+    """Let a manager go on with base cells of one cell each, of which some have come or gone.
+
+    source: (n,) which of the old base cells a new one is, or has come from; given: (n,) 1 rod, -1 catenary, 0 adaptive.
+    """
+    old, n, places = manager.zones, layout.rod.size, layout.starts[-1] + 1
+    assert (layout.parts == 1).all()
+    blank = blank_zones(1, n)._replace(
+        here=np.zeros(places, bool), plan=np.zeros(places, bool), calm=np.zeros(places, np.int64)
+    )
+    kept = {name: getattr(old, name) for name in OF_LINE} | {"ratios": old.ratios[:, source].copy()}
+    kept |= {name: getattr(old, name)[source] for name in CARRIED}
+    assert set(kept) <= set(OF_BASE)
+    cells = {name: getattr(old, name)[source] for name in OF_CELLS}
+    known, relaxing = old.counts[z.KNOWN], old.counts[z.RELAXING]
+    age, recent_age = manager.age, manager.recent_age
+    manager.zones = blank._replace(**kept)
+    for name in ("calm_since", "patience", "released", "buffer"):
+        setattr(manager, name, getattr(manager, name)[source])
+    manager.calmed, manager.seen = manager.calmed[:, source].copy(), manager.seen[:, source].copy()
+    manager.given, manager.free, manager.on_base = given, (given >= 0).astype(np.int8), on_base
+    manager.measure(layout)
+    manager.set_layout(layout)
+    for name, x in cells.items():
+        getattr(manager.zones, name)[:] = x
+    manager.zones.counts[z.KNOWN], manager.zones.counts[z.RELAXING] = known, relaxing
+    manager.age, manager.recent_age = age, recent_age

@@ -1,0 +1,103 @@
+"""Zones that move on a line that is paid out or taken in: against rods, against the mirror image, resumed."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import hybrid
+from hybrid.errors import SceneError
+
+ADAPTIVE = {"kind": "adaptive", "tolerance": 1e-3, "hold_time": 1.0, "rod_cell": 2.5}
+CHANGES = ("grow", "split", "shrink", "merge")
+
+
+def touching(rate: float = 0.8, model: Any = ADAPTIVE, side: str = "end", **more: Any) -> dict[str, Any]:
+    """100 m over 80 m that touch the seabed, paid out at a clamp that heaves by 1 m in 4 s."""
+    section = {
+        "length": 100.0, "mass": 5.0, "diameter": 0.05, "axial_stiffness": 2e6, "bending_stiffness": 500.0,
+        "torsional_stiffness": 400.0,
+    }  # fmt: skip
+    sign = 1.0 if side == "end" else -1.0
+    winch = {
+        "kind": "clamped", "position": [80, 0, 0], "tangent": [sign, 0, 0.5 * sign],
+        "payout": {"rate": rate, "ramp": 4.0, "longest": 110.0},
+        "motion": {"heave": {"amplitude": 1.0, "period": 4.0}, "ramp": 4.0},
+    }  # fmt: skip
+    far = {"kind": "pinned", "position": [0, 0, 0]}
+    return {
+        "environment": {"seabed": {"z": -18, "stiffness": 5e3, "damping": 5e2}},
+        "cable": {"sections": [section]}, "ends": {side: winch, "start" if side == "end" else "end": far},
+        "initial": "equilibrium", "model": model, "mesh": {"cells": 40}, "time": {"duration": 8.0, "step": 0.05},
+        "output": {"every": 0.5}, **more,
+    }  # fmt: skip
+
+
+def test_zones_move_while_line_is_paid_out() -> None:
+    """As rods within what the tolerance allows, and the energy is balanced as well; cells come in as rods."""
+    found, rods = hybrid.run(touching()), hybrid.run(touching(model="rod"))
+    assert sum(x.kind in CHANGES for x in found.events) >= 2
+    assert any(zone.kind == "catenary" for zone in found.zones[-1])
+    assert found["payout/length"][-1] > 104.0
+    for length, zones in zip(found["payout/length"], found.zones, strict=True):
+        assert (zones[-1].kind, zones[-1].s_b) == ("rod", pytest.approx(length, abs=1e-9))
+    assert np.abs(found["position"] - rods["position"]).max() < 1e-3 * 100.0
+    pulls = [np.linalg.norm(x["reaction_end"], axis=1) for x in (found, rods)]
+    assert np.abs(pulls[0] - pulls[1]).max() < 0.01 * pulls[1].mean()
+    left = [np.abs(x["work/scheme"]).max() for x in (found, rods)]
+    assert left[0] < 1.02 * left[1]
+
+
+def test_zones_move_while_line_is_taken_in_at_the_start() -> None:
+    """The line and its mirror image, to round-off."""
+    found, mirror = hybrid.run(touching(-0.8)), hybrid.run(touching(-0.8, side="start"))
+    assert sum(x.kind in CHANGES for x in found.events) >= 2
+    assert [len(x) for x in found.zones] == [len(x) for x in mirror.zones]
+    np.testing.assert_allclose(mirror["position"][:, ::-1], found["position"], atol=1e-6)
+    np.testing.assert_allclose(mirror["reaction_start"], found["reaction_end"], atol=1e-5 * 4000.0)
+
+
+def test_resumed_to_the_last_bit(tmp_path: Path) -> None:
+    whole = hybrid.run(touching())
+    hybrid.run(touching(time={"duration": 5.0, "step": 0.05}), output=tmp_path / "part.h5")
+    resumed = hybrid.resume(tmp_path / "part.h5", until=8.0)
+    for name in ("position", "tension", "reaction_end", "work/end", "work/zones"):
+        assert np.array_equal(whole[name], resumed[name], equal_nan=True), name
+    assert whole.zones[-1] == resumed.zones[-1]
+
+
+def test_a_step_is_taken_back() -> None:
+    """`save` and `restore` over cells that enter and zones that change."""
+    with hybrid.Simulation(touching()) as sim:
+        sim.advance(4.0)
+        saved = sim.save()
+        places = []
+        for _ in range(2):
+            sim.advance(6.0)
+            places.append(sim.forces().end.copy())
+            sim.restore(saved)
+    assert np.array_equal(*places)
+
+
+def test_a_winch_that_holds_a_tension_with_zones_that_move() -> None:
+    """Its length as with rods."""
+    lengths = []
+    for model in (ADAPTIVE, "rod"):
+        scene = touching(model=model)
+        scene["ends"]["end"] |= {"kind": "pinned"}
+        del scene["ends"]["end"]["tangent"]
+        winch = {"tension": 800.0, "inertia": 300.0, "damping": 50.0, "max_rate": 2.0, "ramp": 4.0}
+        scene["ends"]["end"]["payout"] = {"longest": 130.0, "winch": winch}
+        lengths.append(hybrid.run(scene)["payout/length"])
+    assert np.ptp(lengths[1]) > 3.0
+    assert np.abs(lengths[0] - lengths[1]).max() < 0.02
+
+
+@pytest.mark.parametrize("key", ["curvature_error", "joint", "correct"])
+def test_what_does_not_go_with_payout_is_refused(key: str) -> None:
+    model = ADAPTIVE | {key: {"curvature_error": 0.1, "joint": "curvature", "correct": True}[key]}
+    with pytest.raises(SceneError, match=f"model.{key}"):
+        hybrid.run(touching(model=model))
