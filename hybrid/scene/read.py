@@ -251,9 +251,10 @@ def _system() -> type[System]:
 
 def _resolve_motion_files(data: Any, folder: Path) -> None:
     """Make the paths of files of motions and loads absolute, so that the scene can be used from anywhere."""
-    points = data.get("points") if isinstance(data, dict) else None
+    points, bodies = (data.get(x) if isinstance(data, dict) else None for x in ("points", "bodies"))
     files = [*product(("ends",), ("start", "end"), ("motion", "force", "moment", "thrust", "payout"))]
     files += product(("points",), points if isinstance(points, dict) else (), ("motion", "force"))
+    files += product(("bodies",), bodies if isinstance(bodies, dict) else (), ("motion", "force", "moment"))
     files.append(("environment", "seabed", "depths"))
     for path in files:
         _make_absolute(_at(data, path), folder)
