@@ -120,14 +120,22 @@ class PayoutPlan:
         """Arc lengths, m, in order, of places in order."""
         return places if self.side else np.asarray(self.far - places[::-1])
 
-    def line(self, count: int, length: float, like: Line) -> Line:
-        """The line of `count` material nodes and a length, m; like: another one, with the same forces."""
+    def held_as(self, other: Material) -> Material:
+        """The cable, its ends held as those of another one are now."""
+        held = {name: getattr(other, name) for name in ("held_tangent", "held_twist")}
+        return replace(self.cable, **held)
+
+    def line(self, count: int, length: float, like: Line, cable: Material) -> Line:
+        """The line of `count` material nodes and a length, m; like: another one, with the same forces.
+
+        cable: as of `held_as`.
+        """
         s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
         middle = 0.5 * (s[:-1] + s[1:])
         ends = [zone.s_b for zone in self.zones]
         rod = np.array([x.kind == "rod" for x in self.zones])
         rods = rod[np.minimum(np.searchsorted(ends, middle), len(ends) - 1)]
-        line = line_on(self.cable, s, rods)
+        line = line_on(cable, s, rods)
         return line._replace(bits=like.bits, plane=like.plane, footing=self._footing(like, s.size))
 
     def layout(self, count: int, length: float, rod: np.ndarray) -> Layout:
@@ -135,9 +143,9 @@ class PayoutPlan:
         s = self.along(np.concatenate([self.nodes[:count], length - self.layer]))
         return Layout(s, np.ones(s.size - 1, int), rod)
 
-    def line_on(self, layout: Layout, like: Line) -> tuple[LineOnBase, Line]:
-        """The line on the cells of a layout, and what makes it; like: another one, with the same forces."""
-        on_base = LineOnBase(self.cable, layout.base)
+    def line_on(self, layout: Layout, like: Line, cable: Material) -> tuple[LineOnBase, Line]:
+        """The line on the cells of a layout, and what makes it; like, cable: as of `line`."""
+        on_base = LineOnBase(cable, layout.base)
         line = on_base.line(layout, like.bits, like.plane)
         return on_base, line._replace(footing=self._footing(like, layout.base.size))
 

@@ -70,11 +70,12 @@ class PayingOut:
     def on(self, model: Model, length: float, rod: np.ndarray | None = None) -> Model:
         """A model with the nodes of now and a length, m; rod: (N,) bool, of a line whose zones move."""
         plan, layout, on_base = self.plan, None, None
+        cable = plan.held_as(model.cable)
         if model.layout is None:
-            line, zones = plan.line(self.count, length, model.line), plan.zones_of(length)
+            line, zones = plan.line(self.count, length, model.line, cable), plan.zones_of(length)
         else:
             layout = plan.layout(self.count, length, model.layout.rod if rod is None else rod)
-            (on_base, line), zones = plan.line_on(layout, model.line), layout.zones
+            (on_base, line), zones = plan.line_on(layout, model.line, cable), layout.zones
         cells = line.h.size
         sea = model.sea if cells == model.cells else model.sea.on(cells)
         return replace(model, line=line, zones=zones, sea=sea, length=length, layout=layout, on_base=on_base)
@@ -187,7 +188,7 @@ class PayingOut:
         self.lengthen()
         length = float(self.reel.numbers[p.LENGTH])
         layout = self.plan.layout(self.count, length, model.layout.rod)
-        on_base = LineOnBase(self.plan.cable, layout.base)
+        on_base = LineOnBase(self.plan.held_as(model.cable), layout.base)
         return replace(model, layout=layout, on_base=on_base, zones=layout.zones, length=length)
 
     def fit(self, line: Line, t: float) -> None:

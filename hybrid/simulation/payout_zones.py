@@ -86,7 +86,7 @@ class PaidZones:
         assert model.layout is not None and model.on_base is not None
         paying, manager = self.paying, self.manager
         given = rods_at_winch(self.scene, paying.plan, model, paying.count, manager.pace, paying.fastest)
-        manager.cable = paying.plan.cable
+        manager.cable = paying.plan.held_as(model.cable)
         change_base(manager, model.layout, source, given, model.on_base)
         self.switching.take_cells(model)
 

@@ -531,3 +531,16 @@ def test_the_plan_says_how_long_the_line_will_be() -> None:
 def test_another_word_for_a_key_of_payout_is_understood(key: str, meant: str) -> None:
     text = refused(hanging({key: 1.0}, 5.0))
     assert f"did you mean {meant}" in text
+
+
+def test_a_far_end_that_is_let_go_stays_free_when_nodes_enter() -> None:
+    """A clamp that has been let go does not come back with the next node."""
+    scene = sagging("rod", 2e6, 2e4, duration=7.0)
+    scene["ends"]["start"] = {
+        "kind": "clamped", "position": [0, 0, 0], "tangent": [1, 0, -0.5], "release_at": {"time": 2.0}
+    }  # fmt: skip
+    result = hybrid.run(scene)
+    assert result["payout/length"][-1] > 103.0
+    moment = np.linalg.norm(result["moment_start"], axis=1)
+    assert moment[result.t < 1.9].min() > 1.0
+    assert moment[result.t > 2.1].max() < 1e-9
