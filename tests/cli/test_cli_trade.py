@@ -140,7 +140,7 @@ def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> 
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, bufsize=1)
     assert process.stdout is not None
     with process:
-        while json.loads(process.stdout.readline()).get("done") != 2:
+        while json.loads(process.stdout.readline()).get("done") != 1:
             pass
         process.send_signal(signal.SIGINT)
         _, err = process.communicate(timeout=PATIENCE)
@@ -149,7 +149,7 @@ def test_ctrl_c_leaves_what_is_done_and_the_same_command_goes_on(call: Call) -> 
     kept = {file.name: file.stat().st_mtime_ns for file in Path("long.trade/runs").glob("*.json")}
     missing = 4 - len(kept)  # on a busy machine more than one may be done when the signal comes
     words = "1 run is missing" if missing == 1 else f"{missing} runs are missing"
-    assert 2 <= len(kept) <= 3 and words in Path("long.trade/trade.md").read_text()
+    assert 1 <= len(kept) <= 3 and words in Path("long.trade/trade.md").read_text()
     said = call(*arguments)
     assert said.code == 0
     now = {file.name: file.stat().st_mtime_ns for file in Path("long.trade/runs").glob("*.json")}

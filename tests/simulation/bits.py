@@ -14,6 +14,7 @@ from hybrid.simulation import progress as reports
 from hybrid.store import writer as record
 
 CLOCKS = ("steps/cpu",)
+FEW_STEPS = 400  # cells x steps between two checkpoints
 CLOCK_ATTRIBUTES = ("created", "effort_cpu")
 
 
@@ -45,8 +46,8 @@ class Stopping:
     def __init__(self, monkeypatch, at_every_output: bool = True) -> None:
         monkeypatch.setattr(reports, "REPORT_EVERY", -1.0)
         monkeypatch.setattr(hybrid.solve.run, "CELL_STEPS", 1)  # a step a call
-        if at_every_output:  # checkpoints, which are otherwise some seconds apart
-            monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", 0)
+        if at_every_output:  # files flushed; checkpoints every few steps, which are otherwise some seconds apart
+            monkeypatch.setattr(hybrid.simulation.time_loop, "WORK", FEW_STEPS)
             monkeypatch.setattr(record, "_PAUSE", 0.0)
             monkeypatch.setattr(record, "_PART", 0.0)
         self.left, self.heard = -1, 0
