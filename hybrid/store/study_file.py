@@ -17,6 +17,7 @@ Layout::
 from __future__ import annotations
 
 import json
+import warnings
 from collections.abc import Iterable, Mapping, Sequence
 from datetime import UTC, datetime
 from importlib.metadata import version
@@ -55,6 +56,16 @@ class Column(NamedTuple):
     values: np.ndarray
 
 
+def _arrays_of(group: Any) -> dict[str, Any]:
+    """The arrays of a study by name, also while another process writes it or after that was killed.
+
+    A file that is written at this moment has the ending `partial` until it is complete; zarr warns of it.
+    """
+    with warnings.catch_warnings():
+        warnings.filterwarnings("ignore", message=r"Object at \S+\.partial is not recognized")
+        return dict(group.arrays())
+
+
 class StudyFile:
     """Results of a study that grow batch by batch."""
 
@@ -76,7 +87,7 @@ class StudyFile:
         self._status = np.asarray(self._group["status"][:])
         self.cases = int(self._group["case"].shape[0])
         # What is open already: to find and open an array in its folder takes longer than to write a chunk.
-        self._arrays = dict(self._group.arrays())
+        self._arrays = _arrays_of(self._group)
         self._coordinates: dict[str, np.ndarray] = {}
 
     @classmethod

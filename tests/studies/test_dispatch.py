@@ -129,3 +129,11 @@ def test_cases_of_a_worker_that_died_are_computed_alone(
     assert np.flatnonzero(file.status == FAILED).tolist() == [deadly] and (file.status != 0).all()
     assert pool.alone == [1, 1]
     assert values(file, "s").tolist() == [0.0, 1.0, 2.0]
+
+
+def test_a_study_is_opened_while_a_file_of_it_is_written(tmp_path: Path) -> None:
+    """What a writer has begun, or a killed one has left, is passed over without a warning."""
+    column = Column("", "", (), np.arange(CASES, dtype=float))
+    file = StudyFile.create(tmp_path / "s.zarr", {"x": column}, CASES, BATCH, {})
+    (tmp_path / "s.zarr" / "zarr.8c1e87.partial").write_bytes(b"{")
+    assert np.array_equal(StudyFile(tmp_path / "s.zarr").status, file.status)
