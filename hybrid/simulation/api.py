@@ -9,8 +9,6 @@ from __future__ import annotations
 
 import io
 import os
-import signal
-import threading
 import time as clock
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -41,6 +39,7 @@ from hybrid.simulation.case import Case
 from hybrid.simulation.error_control import ErrorController, comparison_resolutions
 from hybrid.simulation.error_report import write_errors
 from hybrid.simulation.first_use import compile_beside
+from hybrid.simulation.interrupts import interrupts
 from hybrid.simulation.mesh_survey import survey_resolution
 from hybrid.simulation.model_choice import choose_model, rods_instead, surveyed
 from hybrid.simulation.progress import ESTIMATION, PRE_RUN, RESULT, Listener, ProgressReporter, listener_of
@@ -57,9 +56,6 @@ from hybrid.store.stored_rows import remove_rows
 
 if TYPE_CHECKING:
     from hybrid.scene.system import System
-
-# s between two signals of which the second ends a run at once: process managers may send the same one twice.
-IMPATIENT = 1.0
 
 Record = Callable[[Resolution, Path | io.BytesIO], RunSample]
 
@@ -203,7 +199,7 @@ def _move_lines(
     from hybrid.simulation.system_run import run_system
 
     duration = system.require_time().duration
-    with _interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
+    with interrupts() as stopped, ProgressReporter(listener_of(progress), duration) as reporter:
         run_system(system, target, scene_text(system), reporter, stopped, source)
         if system.output.errors:
             from hybrid.simulation.system_errors import write_system_errors
@@ -387,41 +383,6 @@ def _target(output: str | Path | None, overwrite: bool) -> Path | io.BytesIO:
 def _supervised(case: Case, progress: bool | Listener) -> Iterator[None]:
     """Hear of interrupts, and report the progress, until a run is done."""
     duration = case.scene.require_time().duration
-    with _interrupts() as interrupted, ProgressReporter(listener_of(progress), duration) as reporter:
+    with interrupts() as interrupted, ProgressReporter(listener_of(progress), duration) as reporter:
         case.progress, case.interrupted = reporter, interrupted
         yield
-
-
-@contextmanager
-def _interrupts() -> Iterator[Callable[[], bool]]:
-    """Catch Ctrl-C and SIGTERM as a flag, so that a run ends between two steps and its file is complete.
-
-    A second one, `IMPATIENT` s later, is raised at once, as in a long compilation or search of an equilibrium.  A
-    signal for which nothing was raised, because the run ended or failed first, goes to the handler from before.
-    """
-    if threading.current_thread() is not threading.main_thread():
-        yield lambda: False
-        return
-    caught: list[int] = []
-    first = 0.0  # s of the clock
-
-    def catch(number: int, _frame: object) -> None:
-        nonlocal first
-        if caught and clock.monotonic() - first > IMPATIENT:
-            raise KeyboardInterrupt
-        first = first if caught else clock.monotonic()
-        caught.append(number)
-
-    before = {}
-    for number in (signal.SIGINT, signal.SIGTERM):
-        before[number] = signal.signal(number, catch)
-    try:
-        yield lambda: bool(caught)
-    except KeyboardInterrupt:
-        caught.clear()
-        raise
-    finally:
-        for number, handler in before.items():
-            signal.signal(number, handler)
-        if caught:
-            signal.raise_signal(caught[0])

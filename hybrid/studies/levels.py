@@ -16,6 +16,7 @@ import numpy as np
 
 import hybrid.studies.peers as peer_codes
 from hybrid.scene.read import SceneLike, as_scene
+from hybrid.simulation.interrupts import interrupts
 from hybrid.store.tradeoff_table import FAILED, Row
 from hybrid.studies.runs import RunStore, StudyProgress, level_spec
 from hybrid.studies.tradeoff import force_difference, peer_found
@@ -156,16 +157,16 @@ def trade_levels(
             kind = "adaptive" if model == FOLLOWING else model
             specs.append((level, model, level_spec(scene, kind, f"level {level}", asked, more)))
     others = peer_codes.peer_runs(scene) if peers else []
-    store = RunStore(Path(folder), progress, 1 + len(specs) + len(others))
-    goal = level_spec(scene, "rod", "reference", REFERENCE)
-    best, exact = store.get(goal, required=True)
-    rows = []
-    for level, model, spec in specs:
-        row, values = store.get(replace(spec, times=repeat))
-        rows.append(_row(level, model, row, values, exact, scene.length))
-    for peer in others:
-        row, values = peer_found(store, peer, repeat, scene)
-        rows.append(_row("A", peer.name, row, values, exact, scene.length))
+    with interrupts() as stopped:
+        store = RunStore(Path(folder), progress, 1 + len(specs) + len(others), stopped)
+        best, exact = store.get(level_spec(scene, "rod", "reference", REFERENCE), required=True)
+        rows = []
+        for level, model, spec in specs:
+            row, values = store.get(replace(spec, times=repeat))
+            rows.append(_row(level, model, row, values, exact, scene.length))
+        for peer in others:
+            row, values = peer_found(store, peer, repeat, scene)
+            rows.append(_row("A", peer.name, row, values, exact, scene.length))
     rows.sort(key=lambda row: row.level)
     facts = (*store.facts, *([("command", f"`{command}`")] if command else []))
     table = LevelTable(scene.title, best, tuple(rows), facts)

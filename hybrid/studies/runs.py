@@ -119,8 +119,11 @@ def _in_short(error: SceneError) -> str:
 class RunStore:
     """Computes runs, stores their results in the folder, and reports progress."""
 
-    def __init__(self, folder: Path, progress: Callable[[StudyProgress], None] | None, total: int) -> None:
-        self.folder, self.total = folder, total
+    def __init__(
+        self, folder: Path, progress: Callable[[StudyProgress], None] | None, total: int, stopped: Callable[[], bool]
+    ) -> None:
+        """stopped: whether to end before the next run, with KeyboardInterrupt."""
+        self.folder, self.total, self._stopped = folder, total, stopped
         self.done, self.computed, self._progress, self._warm = 0, 0, progress, set[str]()
         self.facts = facts_of_machine()  # now: the load is that before the first run
         try:
@@ -130,6 +133,8 @@ class RunStore:
             raise ResultError(f"{text}\n    try:      -o with a folder that can be made or written to") from None
 
     def report(self, what: str, part: float) -> None:
+        if self._stopped():
+            raise KeyboardInterrupt
         if self._progress is not None:
             self._progress(StudyProgress(self.done, self.total, what, part))
 

@@ -23,6 +23,7 @@ from hybrid.scene.accuracy import amount
 from hybrid.scene.analysis import LEAST_DAMPED
 from hybrid.scene.read import SceneLike, as_scene, validate_scene
 from hybrid.scene.schema import Scene
+from hybrid.simulation.interrupts import interrupts
 from hybrid.store.tradeoff_table import CHECK, DONE, FAILED, OURS, REFERENCE, Row, TradeTable, judged
 from hybrid.studies.runs import (
     COMPARED,
@@ -86,30 +87,32 @@ def trade(
     rod = "rod" if _refusal(scene, "rod", goal) == "" else kinds[0]
     specs = [replace(run_spec(scene, kind, x), times=repeat) for x in accuracies for kind in kinds]
     peer_runs = peer_codes.peer_runs(scene) if peers else []
-    store = RunStore(Path(folder), progress, 2 + len(specs) + len(peer_runs))
-
-    best, reference_values = store.get(run_spec(scene, rod, goal), required=True)
-    check, _ = _compared(store, run_spec(scene, rod, _coarser(goal)), reference_values, scene.length)
-    rows = [replace(best, status=REFERENCE), replace(check, status=CHECK) if check.status != FAILED else check]
-    limits: list[tuple[float | None, float | None]] = [(None, None), (None, None)]
-    largest = _largest_end_force(reference_values)
-    try:
-        for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
-            rows.append(_compared(store, spec, reference_values, scene.length)[0])
-            limits.append(_bounds(want, largest))
-        for peer_run in peer_runs:
-            rows.append(_peer_row(store, peer_run, repeat, scene, reference_values))
+    with interrupts() as stopped:
+        store = RunStore(Path(folder), progress, 2 + len(specs) + len(peer_runs), stopped)
+        best, reference_values = store.get(run_spec(scene, rod, goal), required=True)
+        rows = [replace(best, status=REFERENCE)]
+        limits: list[tuple[float | None, float | None]] = [(None, None)]
+        largest = _largest_end_force(reference_values)
+        try:
+            check, _ = _compared(store, run_spec(scene, rod, _coarser(goal)), reference_values, scene.length)
+            rows.append(replace(check, status=CHECK) if check.status != FAILED else check)
             limits.append((None, None))
-    finally:
-        position, end_force = _bounds(wanted, largest)
-        table = TradeTable(
-            scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
-            (*store.facts, *_measured(store, repeat, command, peer_runs)), store.total - len(rows),
-        )  # fmt: skip
-        table = judged(table, limits)
-        table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
-        table.write(store.folder, "trade.png")
-        plot_trade(table, store.folder / "trade.png", overwrite=True)  # the folder is of this program
+            for spec, want in zip(specs, [x for x in checks for _ in kinds], strict=True):
+                rows.append(_compared(store, spec, reference_values, scene.length)[0])
+                limits.append(_bounds(want, largest))
+            for peer_run in peer_runs:
+                rows.append(_peer_row(store, peer_run, repeat, scene, reference_values))
+                limits.append((None, None))
+        finally:
+            position, end_force = _bounds(wanted, largest)
+            table = TradeTable(
+                scene.title, target, scene.length, largest, position, end_force, tuple(rows), tuple(notes),
+                (*store.facts, *_measured(store, repeat, command, peer_runs)), store.total - len(rows),
+            )  # fmt: skip
+            table = judged(table, limits)
+            table = replace(table, rows=tuple(sorted(table.rows, key=lambda row: _order(row, kinds))))
+            table.write(store.folder, "trade.png")
+            plot_trade(table, store.folder / "trade.png", overwrite=True)  # the folder is of this program
     return table
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import json
+import signal
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import pairwise
@@ -349,6 +350,32 @@ def test_an_interrupted_ladder_leaves_a_table_and_goes_on(
     assert_drawn(tmp_path / "trade.png")
     whole = hybrid.trade(scene(), tmp_path, **LADDER)
     assert len(counted) == 5 and whole.missing == 0 and len(whole.rows) == 6
+
+
+class Dying:
+    """An object at whose end a signal comes: Python drops what is raised there."""
+
+    def __del__(self) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+
+@pytest.mark.slow  # a ladder of runs
+def test_a_signal_where_python_drops_exceptions_is_not_lost(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, counted: list[str]
+) -> None:
+    real = runs.run
+
+    def run(scene: hybrid.Scene, *args: Any, **more: Any) -> hybrid.Result:
+        result = real(scene, *args, **more)
+        if len(counted) == 1:
+            Dying()
+        return result
+
+    monkeypatch.setattr(runs, "run", run)
+    with pytest.raises(KeyboardInterrupt):
+        hybrid.trade(scene(), tmp_path, **LADDER)
+    assert len(counted) == 1
+    assert "(5 runs are missing)" in (tmp_path / "trade.md").read_text()
 
 
 @pytest.mark.slow  # a ladder of runs
