@@ -372,7 +372,8 @@ class DomainManager:
             return np.zeros(self.layout.rod.size, bool)
         T = state.T + self.pace / self.age * (state.T - self.past)
         falls = (T < LOST_TENSION * state.T) & (self.past > state.T) & (self.floor[:-1] < WEIGHTLESS * self.scale)
-        return np.asarray(np.logical_or.reduceat(falls, self.layout.first[:-1]))
+        # not by `layout`, which cells that follow leave behind between two reviews
+        return np.asarray(np.bincount(self.zones.kinds.base_of_cell, falls, self.layout.rod.size) > 0.0)
 
     def rules(self, state: State) -> Rules:
         """The rules at the tensions of a state."""
