@@ -120,8 +120,8 @@ class Sample(Table):
 
 
 TAKES = (
-    "max", "min", "mean", "deviation", "skewness", "period", "significant", "extreme", "fractile", "damage", "history",
-    "profile",
+    "max", "min", "mean", "median", "deviation", "skewness", "period", "significant", "extreme", "fractile", "damage",
+    "history", "profile",
 )  # fmt: skip
 
 
@@ -140,8 +140,9 @@ class Kept(Table):
         | None
     ) = Field(default=None, description="arc length, or several; absent: the worst along the line [m]")
     take: Annotated[tuple[Literal[TAKES], ...], Field(min_length=1)] = Field(  # type: ignore[valid-type]
-        default=("max",), description="what of its history: max, min, mean, deviation, skewness, period, significant, "
-        "extreme (most probable largest in `hours`), fractile (90 % of that), damage, history, profile (max along s)"
+        default=("max",), description="what of its history: max, min, mean, median, deviation, skewness, period, "
+        "significant, extreme (most probable largest in `hours`), fractile (90 % of that), damage, history, "
+        "profile (max along s)"
     )  # fmt: skip
     times: tuple[Number, Number] | None = Field(default=None, description="only from one time to another [s]")
     hours: Positive = Field(default=3.0, description="of extreme and fractile [h]")

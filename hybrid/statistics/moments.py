@@ -59,6 +59,21 @@ def mean_over_time(t: Floats, x: Floats) -> Floats:
     return np.asarray(np.trapezoid(x, t, axis=0) / (t[-1] - t[0]))
 
 
+def median_over_time(t: ArrayLike, x: ArrayLike) -> Floats:
+    """What histories x (nt, ...) at times t (nt,) s are below for half of the time; linear between samples."""
+    times, values = checked(t, x)
+    lasts = np.diff(times).reshape(-1, *[1] * (values.ndim - 1))
+    least, most = np.minimum(values[1:], values[:-1]), np.maximum(values[1:], values[:-1])
+    width = np.where(most > least, most - least, 1.0)
+    low, high = values.min(axis=0), values.max(axis=0)
+    for _ in range(60):  # to round-off
+        middle = 0.5 * (low + high)
+        part = np.where(most > least, np.clip((middle - least) / width, 0.0, 1.0), middle >= least)
+        enough = (part * lasts).sum(axis=0) >= 0.5 * (times[-1] - times[0])
+        low, high = np.where(enough, low, middle), np.where(enough, middle, high)
+    return np.asarray(high)
+
+
 def summary(t: ArrayLike, x: ArrayLike) -> Summary:
     """What histories x (nt, ...) at times t (nt,) s amount to; ResultError if they are no histories.
 

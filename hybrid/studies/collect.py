@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from hybrid.errors import ResultError
+from hybrid.errors import HybridError, ResultError
 from hybrid.scene.study import Kept
 from hybrid.statistics import extremes, moments
 from hybrid.store.histories import history_of, lies_along
@@ -32,7 +32,7 @@ OF_SUMMARY = {
     "period": ("crossing_period", "s"), "significant": ("significant_range", None),
 }  # fmt: skip
 WORDS = {
-    "max": "largest", "min": "smallest", "mean": "mean of", "deviation": "standard deviation of",
+    "max": "largest", "min": "smallest", "mean": "mean of", "median": "median of", "deviation": "standard deviation of",
     "skewness": "skewness of", "period": "period between up-crossings of the mean of",
     "significant": "significant range of", "extreme": "most probable largest",
     "fractile": "90 % fractile of the largest", "damage": "fatigue damage", "history": "history",
@@ -70,16 +70,35 @@ def names_of(wanted: Mapping[str, Kept]) -> dict[str, tuple[str, str]]:
     return found
 
 
-def collected(result: Result, wanted: Mapping[str, Kept]) -> dict[str, tuple[Variable, Floats]]:
-    """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken.
+class NotAlwaysThere(ResultError):
+    """A quantity of this run has times without a value, such as a touchdown point while nothing touches."""
 
-    ResultError for a quantity that the result does not have, or what cannot be taken of it.
+
+class Collected(NamedTuple):
+    """What is kept of a result, and the reasons for what is not, by name.
+
+    absent: the first reason that has nothing to do with the values of this run, such as a quantity that it does not
+    have; "": there is none.
     """
-    found: dict[str, tuple[Variable, Floats]] = {}
+
+    kept: dict[str, tuple[Variable, Floats]]
+    reasons: dict[str, str]
+    absent: str
+
+
+def collected(result: Result, wanted: Mapping[str, Kept]) -> Collected:
+    """What is wanted of a result, by name: `<name>_<take>`, or the name alone where one thing is taken."""
+    kept: dict[str, tuple[Variable, Floats]] = {}
+    reasons, absent = {}, ""
     for key, (name, take) in names_of(wanted).items():
-        of = result if wanted[name].line is None else result.line(str(wanted[name].line))
-        found[key] = _taken(of, name, wanted[name], take)
-    return found
+        try:
+            of = result if wanted[name].line is None else result.line(str(wanted[name].line))
+            kept[key] = _taken(of, name, wanted[name], take)
+        except (HybridError, KeyError, AttributeError) as error:
+            reasons[key] = str(error).splitlines()[0]
+            if not isinstance(error, NotAlwaysThere):
+                absent = absent or reasons[key]
+    return Collected(kept, reasons, absent)
 
 
 def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, Floats]:
@@ -113,7 +132,8 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
         if history.s is None:
             raise ResultError(f"'{name}' has no profile: it is no quantity along the line")
         along = "s" if kept.line is None else f"{own}_s"
-        return Variable(unit, f"{WORDS[take]}: {about}", (along,), {along: ("m", history.s)}), values.max(axis=0)
+        variable = Variable(unit, f"{WORDS[take]}: {about}", (along,), {along: ("m", history.s)})
+        return variable, np.fmax.reduce(values, axis=0)
     if take == "history":
         if history.s is not None and at is None:
             raise ResultError(f"a history of '{name}' is at a place\n    try:      at: [0]")
@@ -121,14 +141,17 @@ def _taken(result: Result, own: str, kept: Kept, take: str) -> tuple[Variable, F
         axes = {time: ("s", history.t)} | places
         return Variable(unit, about, (time, *dims), axes), values if dims else values.reshape(-1)
     flat = values.reshape(history.t.size, -1)
+    if take not in ("max", "min") and not np.isfinite(flat).all():
+        raise NotAlwaysThere(f"'{name}' has times or places without a value, and {take} needs all of them")
     text = f"{WORDS[take]} {about}"
     if take in ("extreme", "fractile"):
         found = [_extreme(history.t, flat[:, k], kept.hours, take) for k in range(flat.shape[1])]
         return _placed(Variable(unit, f"{text} ({kept.hours:g} h)", dims, places), np.array(found))
     if take in ("max", "min"):
-        return _placed(
-            Variable(unit, text, dims, places), flat.max(axis=0) if take == "max" else flat.min(axis=0), take
-        )
+        worst = (np.fmax if take == "max" else np.fmin).reduce(flat, axis=0)
+        return _placed(Variable(unit, text, dims, places), worst, take)
+    if take == "median":
+        return _placed(Variable(unit, text, dims, places), moments.median_over_time(history.t, flat))
     attribute, other = OF_SUMMARY[take]
     summary = moments.summary(history.t, flat)
     variable = Variable(unit if other is None else other, text, dims, places)

@@ -23,7 +23,7 @@ from hybrid.store.study_file import FAILED, OPEN, StudyFile, counts_of
 from hybrid.studies.cases import Cases
 from hybrid.studies.cluster import client_of
 from hybrid.studies.outcomes import has_something_new, write_outcomes
-from hybrid.studies.workers import NOT_KEPT, Job, Outcome, compute_batch
+from hybrid.studies.workers import Job, Outcome, compute_batch
 
 # Batches that a worker has, or waits for.
 AHEAD = 3
@@ -136,7 +136,7 @@ class _Batches:
     def _keep(self, k: int, outcomes: list[Outcome]) -> None:
         """Write a batch, and those that have waited for it; or let it wait."""
         if k == 0:
-            _refuse_what_is_never_kept(outcomes)
+            _refuse_what_is_never_kept(outcomes[0])
         self._computed[k] = outcomes
         for each in sorted(self._computed):
             first_open = np.flatnonzero(self._file.status == OPEN)[0]
@@ -146,13 +146,12 @@ class _Batches:
             self._written()
 
 
-def _refuse_what_is_never_kept(outcomes: list[Outcome]) -> None:
-    """ResultError if of the first batch nothing could be kept, for the reason of `collect`: so it would be of all."""
-    reasons = {one.reason for one in outcomes}
-    if len(reasons) == 1 and (reason := reasons.pop()).startswith(NOT_KEPT):
+def _refuse_what_is_never_kept(first: Outcome) -> None:
+    """ResultError if the first case has nothing of what is to be kept of every one, whatever the size of batches is."""
+    if first.absent:
         raise ResultError(
-            f"of the first {len(outcomes)} cases nothing could be kept: {reason.removeprefix(NOT_KEPT)}\n"
-            "    try:      another collect"
+            f"of case 0 something cannot be kept, and so of all like it: {first.absent}\n"
+            "    try:      another collect; where other cases have it, one of these first"
         )
 
 

@@ -27,7 +27,8 @@ def write_outcomes(file: StudyFile, batch: int, outcomes: list[Outcome]) -> None
                 why.append(f"{name}, whose times or places are not those of the cases before")
                 del kept[name]
         if why:
-            one = one._replace(reason=NOT_KEPT + "; ".join(why), kept=kept)
+            before = [one.reason.removeprefix(NOT_KEPT)] if one.reason else []
+            one = one._replace(reason=NOT_KEPT + "; ".join(before + why), kept=kept)
         for name, (variable, _) in one.kept.items():
             variables.setdefault(name, variable)
         fitting.append(one)

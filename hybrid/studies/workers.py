@@ -39,6 +39,7 @@ class Outcome(NamedTuple):
     cpu: float
     steps: int
     kept: dict[str, tuple[Variable, np.ndarray]]
+    absent: str = ""  # why something can be kept of no run like this one; "": it can
 
 
 def compute_batch(job: Job) -> list[Outcome]:
@@ -66,7 +67,7 @@ def _computed(job: Job, row: dict[str, Any]) -> Outcome:
         events = ", ".join([*(k for k in EVENTS_BY_WEIGHT if k in kinds), *sorted(kinds - set(EVENTS_BY_WEIGHT))])
         logged = next(iter(result.lines.values()), result)
         steps = len(logged["steps/t"]) if "steps/t" in logged else 0
-        try:
-            return Outcome(DONE, "", events, spent, steps, collected(result, job.wanted))
-        except (HybridError, KeyError, AttributeError) as error:
-            return Outcome(FAILED, NOT_KEPT + str(error).splitlines()[0], events, spent, steps, {})
+        found = collected(result, job.wanted)
+        why = "; ".join(f"{name}: {reason}" for name, reason in found.reasons.items())
+        status = DONE if found.kept else FAILED
+        return Outcome(status, NOT_KEPT * bool(why) + why, events, spent, steps, found.kept, found.absent)

@@ -57,6 +57,16 @@ def test_moments_of_a_sine_and_of_uneven_times() -> None:
         assert found.t_maximum % 5.0 == pytest.approx(1.25, abs=0.02)
 
 
+def test_median_is_that_of_the_time() -> None:
+    """Half of the time is spent below it, however steps are spread; of a steady history it is its value."""
+    rng = np.random.default_rng(3)
+    t = np.sort(np.concatenate([np.linspace(0.0, 4.0, 401), rng.uniform(0.0, 1.0, 4000)]))
+    x = np.stack([t**2, np.full_like(t, 7.0), -t], axis=1)
+    found = moments.median_over_time(t, x)
+    assert found == pytest.approx([4.0, 7.0, -2.0], rel=1e-3) and found[1] == 7.0
+    assert np.median(x[:, 0]) < 2.0  # of the samples it is another
+
+
 def test_skewness_is_that_of_scipy() -> None:
     x = np.random.default_rng(2).gamma(2.0, size=200_000)
     fine = moments.summary(np.arange(x.size) * 1.0, np.repeat(x, 1))

@@ -131,6 +131,26 @@ def test_cases_of_a_worker_that_died_are_computed_alone(
     assert values(file, "s").tolist() == [0.0, 1.0, 2.0]
 
 
+@pytest.mark.parametrize("batch", [1, 2, 4])
+def test_what_a_batch_is_decides_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, batch: int) -> None:
+    """What case 0 lacks ends the study, and what others lack does not, however many cases share its batch."""
+    monkeypatch.setattr("test_dispatch.BATCH", batch)
+
+    def lacking(*cases: int) -> Pool:
+        def compute(job: Job) -> list[Outcome]:
+            rows = [outcome(row["x"]) for row in job.rows]
+            return [
+                one._replace(absent="no such") if row["x"] in cases else one
+                for one, row in zip(rows, job.rows, strict=True)
+            ]
+
+        return Pool(compute, list(range(CASES)))
+
+    with pytest.raises(ResultError, match="no such"):
+        computed(tmp_path / "first.zarr", lacking(0), monkeypatch)
+    assert (computed(tmp_path / "rest.zarr", lacking(*range(1, CASES)), monkeypatch).status == DONE).all()
+
+
 def test_a_study_is_opened_while_a_file_of_it_is_written(tmp_path: Path) -> None:
     """What a writer has begun, or a killed one has left, is passed over without a warning."""
     column = Column("", "", (), np.arange(CASES, dtype=float))

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -14,9 +15,10 @@ from killed_studies import killed_study
 import hybrid
 from hybrid.cli.commands import main
 from hybrid.errors import ResultError, SceneError
-from hybrid.scene.study import read_study, study_from
+from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.store.study_file import DONE, FAILED, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
+from hybrid.studies.collect import collected
 
 SCENE = """
 environment: {fluid: {density: 1025}}
@@ -263,6 +265,42 @@ def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> 
                 folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, workers=1,
                 overwrite=(tmp_path / "x.zarr").exists(),
             )  # fmt: skip
+
+
+def test_what_is_not_always_there_costs_nothing_else(folder: Path) -> None:
+    """Where a touchdown comes and goes its largest value is that of the outputs that have one, its mean has a reason."""
+    t = np.linspace(0.0, 3.0, 4)
+    result = SimpleNamespace(
+        units={"tdp": "m", "pull": "N"}, line=None, values={"t": t, "tdp": np.array([1.0, np.nan, 3.0, 2.0]), "pull": t}
+    )
+    found = collected(Histories(result), {
+        "tdp": Kept(quantity="tdp", take=("max", "min", "mean")), "pull": Kept(quantity="pull", take=("median",)),
+    })  # fmt: skip
+    assert {name: float(values) for name, (_, values) in found.kept.items()} == {
+        "tdp_max": 3.0,
+        "tdp_min": 1.0,
+        "pull": 1.5,
+    }
+    assert list(found.reasons) == ["tdp_mean"] and not found.absent
+    assert collected(Histories(result), {"x": Kept(quantity="depth")}).absent
+
+
+class Histories:
+    """Of a result what `collected` asks for: histories of one value."""
+
+    def __init__(self, result: SimpleNamespace) -> None:
+        self.units, self._values = result.units, result.values
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._values
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        if name not in self._values:
+            raise ResultError(f"no '{name}'")
+        return self._values[name]
+
+    def dims(self, name: str) -> tuple[str, ...]:
+        return ("t",)
 
 
 def test_names_that_mean_two_things_are_refused(folder: Path, tmp_path: Path) -> None:
