@@ -1,6 +1,7 @@
 """Lines that break from their points, and points that give way: what may break, and the system after it.
 
-The ends that come loose are joined to a free point of their own without mass, which is what a free end is.
+The ends that come loose are joined to a free point of their own without mass, which is what a free end is; one that
+was clamped bends there no more.
 """
 
 from __future__ import annotations
@@ -10,6 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from hybrid.model.release import without_clamp
 from hybrid.model.system import SystemModel
 from hybrid.scene.points import Failure, FreePoint
 from hybrid.scene.system import System
@@ -55,8 +57,14 @@ def after_failure(model: SystemModel, weakness: Weakness) -> SystemModel:
     joints = [[j if j < points else j + 1 for j in pair] for pair in model.joints]  # bodies come behind the points
     for line, k in ends:
         joints[line][k] = points
+    models, seats = [*model.models], model.seats.copy()
+    for line, k in ends:
+        bare = without_clamp(models[line].line, -k)
+        if bare is not models[line].line:
+            models[line] = replace(models[line], line=bare)
+        seats[line, k] = 0.0
     shape = model.models[ends[0][0]].start.r[-ends[0][1]]
     return replace(
         model, free=(*model.free, weakness.name), joints=tuple((a, b) for a, b in joints),
-        places=np.vstack([model.places, shape]), loose=loose,
+        places=np.vstack([model.places, shape]), loose=loose, models=tuple(models), seats=seats,
     )  # fmt: skip

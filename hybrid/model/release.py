@@ -24,13 +24,13 @@ def without_hold(model: Model, k: int, t: float) -> Model:
         held_tangent=(tangent[0] and k != 0, tangent[1] and k != 1),
         held_twist=(twist[0] and k != 0, twist[1] and k != 1),
     )
-    line, ends, on_base = _without_clamp(model.line, -k), model.ends.released_at(k, t), None
+    line, ends, on_base = without_clamp(model.line, -k), model.ends.released_at(k, t), None
     if model.layout is not None:
         line, on_base = with_spin_inertia(line, cable), LineOnBase(cable, model.layout.base)
     return replace(model, line=line, cable=cable, ends=ends, on_base=on_base)
 
 
-def _without_clamp(line: Line, node: int) -> Line:
+def without_clamp(line: Line, node: int) -> Line:
     """The line without the element between an end and its clamp; without a clamp, the line itself."""
     if not line.element[node]:
         return line

@@ -112,8 +112,8 @@ def _clamp_findings(system: System, name: str, key: str, held: ClampedConnection
         yield Finding(at, expected, "give `bending_stiffness` to all sections, and `model: rod`", "clamped")
     if held.tangent is None and not isinstance(system.points[point], FreePoint):
         yield Finding((*at, "tangent"), "the direction of the line at this end", "add `tangent: [0, 0, 1]`", "nothing")
-    if system.breaks(name, key):
-        expected = f"an end that turns freely; the line is clamped at point {point}"
+    if system.breaks(name, key) and isinstance(system.points[point], FreePoint):
+        expected = f"an end that turns freely; the line is clamped at the free point {point}"
         yield Finding(("lines", name, "break_at"), expected, "let it break at its other end, or leave the clamp out")
     if getattr(system.points[point], "break_at", None) is not None:
         expected = f"a point at which lines turn freely; line {name} is clamped there"

@@ -1,6 +1,7 @@
 """Lines of a system that break in mid-motion: when, what goes on, and the event.
 
-Nothing is stored between a line that turns freely and its point, so no energy goes with it.
+Nothing is stored between a line that turns freely and its point, so no energy goes with it; what bends between the
+end of a line and its clamp goes with the clamp.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ import numpy as np
 from hybrid.kernels.bodies import DONE, WORK
 from hybrid.kernels.report import FORCE_A
 from hybrid.model.failure import Weakness, after_failure, weaknesses
+from hybrid.simulation.releases import elastic
 
 if TYPE_CHECKING:
     from hybrid.simulation.system_run import SystemRun
@@ -63,17 +65,24 @@ class Failures:
 
     def _break(self, k: int, why: str) -> None:
         run, x = self._run, self.all[k]
-        self._part(k)
-        text = f"{x.name} {why}; what came loose is free from here on"
         line, end = x.ends[0]
+        old, state = run.model.models[line], run.state.lines[line]
+        self._part(k)
+        new, energy = run.model.models[line], 0.0
+        if new is not old:
+            energy = elastic(new, run.t, state) - elastic(old, run.t, state)
+            run.lines[line].books.work[0, end] += energy
+        text = f"{x.name} {why}; what came loose is free from here on"
         s = float(run.model.models[line].line.s[-end])
-        run.recorder.event(run.t, s, s, "end released", text, energy=0.0)
+        run.recorder.event(run.t, s, s, "end released", text, energy=energy)
 
     def _part(self, k: int) -> None:
         """Take the ends off their point, in a solver of its own."""
         run = self._run
         run.model = after_failure(run.model, self.all[k])
         self.broken.append(k)
+        for line, model in zip(run.lines, run.model.models, strict=True):
+            line.follow(model)
         done = run.solver.body_work[:, DONE:WORK].copy()
         run.make_solver()
         run.solver.body_work[:, DONE:WORK] = done

@@ -102,6 +102,16 @@ class LineResult:
             self.events.event(0.0, 0.0, self.model.length, "stability not judged", text)
         self.judge(t, sharpest(x.line, x.ends, state), state)
 
+    def follow(self, model: Model) -> None:
+        """Go on with another model of the same cells, after what waits has been recorded."""
+        if model is self.model:
+            return
+        self.write_down()
+        self.model, first = model, self.observer.first_energy
+        self.observer = self.observer.on(model.line, model.sea.values, model.zones)
+        self.observer.first_energy = first
+        self.diagnostics.follow(model)
+
     # --- steps and outputs --------------------------------------------------------------------------
 
     def end_forces(self, state: State, report: Floats) -> Floats:

@@ -107,6 +107,8 @@ def clamp_moment(system: System, model: SystemModel, solver: SystemSolver, point
         return None
     moment = np.zeros(3)
     for line, end in here:
+        if (model.names.index(line), int(end == "end")) in model.loose:
+            continue
         report = solver.work[model.names.index(line)].report
         moment += report[MOMENT_A : MOMENT_A + 3] if end == "start" else -report[MOMENT_A + 3 : MOMENT_A + 6]
     return moment

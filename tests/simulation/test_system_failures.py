@@ -91,6 +91,34 @@ def test_energy_after_a_break_is_kept_to_second_order() -> None:
     assert lost[1] < 0.4 * lost[0] < 0.02 * 30 * 9.81 * 5, lost
 
 
+@pytest.mark.parametrize("held", ["point", "body"])
+def test_a_clamped_line_that_breaks_is_the_cable_that_is_let_go(held: str) -> None:
+    """Shape, end forces and energies as of `release_at` of one cable, the energy of the clamp that is lost included."""
+    rod = SECTION | {"length": 4.0, "axial_stiffness": 1e4, "bending_stiffness": 200.0}
+    clamps = {"start": {"tangent": [1, 0, 0]}, "end": {"tangent": [0, 0, -1]}}
+    places = {"start": [0, 0, 0], "end": [2.5, 0, -2.5]}
+    more = {"time": {"duration": 0.6, "step": 0.01}, "output": {"every": 0.05, "points": 9}}
+    ends = {k: {"kind": "clamped", "position": places[k]} | clamps[k] for k in places}
+    ends["end"]["release_at"] = {"time": 0.2}
+    cable = {"cable": {"sections": [rod]}, "ends": ends, "initial": "equilibrium", "model": "rod", "mesh": {"cells": 8}}
+    one = hybrid.run(cable | more | {"dimension": 3})
+    points: dict[str, Any] = {"a": {"position": places["start"]}, "b": {"position": places["end"]}}
+    bodies = {"bodies": {"hull": {"position": [2.5, 0, 0]}}} if held == "body" else {}
+    if bodies:
+        points["b"] = {"body": "hull", "place": [0, 0, -2.5]}
+    line = {"start": "a", "end": "b", "connections": clamps, "sections": [rod], "mesh": {"cells": 8}}
+    result = hybrid.run({"points": points, "lines": {"l": line | {"break_at": {"time": 0.2}}}} | bodies | more)
+    two = result.lines["l"]
+    lost, also = (next(x.energy for x in r.events if x.kind == "end released") for r in (one, result))
+    assert lost < -0.1 and also == pytest.approx(lost, rel=1e-6)
+    assert np.linalg.norm(one.position[-1, -1] - one.position[0, -1]) > 0.1
+    assert np.abs(one.position - two.position).max() < 1e-7
+    assert np.abs(one.bending_moment - two.bending_moment).max() < 1e-5 * one.bending_moment.max()
+    for name in ("energy/kinetic", "work/end"):
+        assert np.abs(one[name] - two[name]).max() < 1e-6 * abs(lost), name
+    assert np.abs(result["points/b/moment"][-1]).max() == 0.0 < np.abs(result["points/b/moment"][0]).max()
+
+
 def test_a_mooring_of_a_body_breaks() -> None:
     """A body on two lines keeps the momentum that the other line gives it, and its fairlead goes on with it."""
     bodies = {"float": {"initial_guess": [0, 0, -8], "mass": 40.0, "inertia": [4.0, 4.0, 4.0]}}
