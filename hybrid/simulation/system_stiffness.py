@@ -13,13 +13,13 @@ from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A, MOMENT_A
 from hybrid.kernels.state import Floats
 from hybrid.model.bodies import angles_of, frame_of
-from hybrid.model.clamps import seat_of
+from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system
 from hybrid.scene.bodies import FixedBody, FreeBody
 from hybrid.scene.points import Fairlead, FixedPoint
 from hybrid.scene.read import SceneLike, as_scene_or_system, parse_either, scene_text
 from hybrid.scene.suggestions import nearest
-from hybrid.scene.system import System
+from hybrid.scene.system import JoinedLine, System
 from hybrid.simulation.system_start import equilibrium_of_system
 from hybrid.solve.system import SystemSolver, SystemState
 from hybrid.solve.system_statics import SystemEquilibrium
@@ -49,7 +49,8 @@ class Offsets:
     """What lines do to a point or body that is held beside its equilibrium, without friction on the seabed.
 
     distance: (n,) m along a heading; force: (n, 3) N of the lines on it, inertial; moment: (n, 3) N m about the origin
-    of a body; restoring: (n,) N, force against the offset; tension: (n,) N, the largest by the name of each line.
+    of a body or a point to which lines are clamped; restoring: (n,) N, force against the offset; tension: (n,) N, the
+    largest by the name of each line.
     """
 
     at: str
@@ -103,15 +104,13 @@ def stiffness(scene: SceneLike | System, at: str) -> Stiffness:
 
 def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], heading: float = 0.0) -> Offsets:
     """Forces of the lines on `point:NAME` or `body:NAME` held at distances (m) from its equilibrium along a heading
-    (deg, counter-clockwise from the x axis), at the height and rotation that it has there.
+    (deg, counter-clockwise from the x axis), at the height and rotation that it has there; a point to which lines are
+    clamped keeps their directions.
 
     Errors: as of `stiffness`; the distance at which no equilibrium is found is in the message.
     """
     system = _system(scene)
     kind, name = _target(system, at)
-    if kind == "point" and name in system.rigid:
-        expected = f"a point at which lines turn freely, or a body: lines are clamped at point {name}"
-        raise SceneError([Complaint("offsets", at, expected, "make a small body of the point, with a fairlead")])
     try:
         known = bool(len(distances)) and bool(np.isfinite([*distances, heading]).all())
     except (TypeError, ValueError):
@@ -123,6 +122,9 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     model = build_system(system)
     found = equilibrium_of_system(system, model, np.inf)
     place = _place(system, model, found, name) if kind == "point" else None
+    rigid = kind == "point" and name in system.rigid
+    if rigid:
+        system = system.model_copy(update={"lines": _clamped_as_they_lie(system, model, found, name)})
     free = [body.name for body in model.bodies]
     rotation = np.zeros(3)
     if kind == "body":
@@ -164,8 +166,8 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
     total = np.array(forces).reshape(-1, 3)
     by_line = dict(zip(model.names, np.array(tensions).reshape(len(forces), -1).T, strict=True))
     return Offsets(
-        at, heading, np.array(distances, float), total, np.array(moments).reshape(-1, 3) if kind == "body" else None,
-        -total @ along, by_line,
+        at, heading, np.array(distances, float), total,
+        np.array(moments).reshape(-1, 3) if kind == "body" or rigid else None, -total @ along, by_line,
     )  # fmt: skip
 
 
@@ -208,6 +210,21 @@ def _place(system: System, model: SystemModel, found: SystemEquilibrium, point: 
     """Where a point is in an equilibrium."""
     line, end = system.lines_at(point)[0]
     return np.asarray(found.state.lines[model.names.index(line)].r[-(end == "end")]).copy()
+
+
+def _clamped_as_they_lie(
+    system: System, model: SystemModel, found: SystemEquilibrium, point: str
+) -> dict[str, JoinedLine]:
+    """The lines, with inertial directions of an equilibrium for those that are clamped to a free point."""
+    axes = found.state.bodies[len(model.bodies) + model.rigid.index(point), FRAME:V].reshape(3, 3)
+    lines = dict(system.lines)
+    for name, end in system.clamped_at(point):
+        tangent, normal = seated(model.seats[model.names.index(name), int(end == "end")], axes)
+        connections = lines[name].connections
+        held = getattr(connections, end).model_copy(update={"tangent": tangent, "normal": normal})
+        connections = connections.model_copy(update={end: held})
+        lines[name] = lines[name].model_copy(update={"connections": connections})
+    return lines
 
 
 def _held(system: System, kind: str, name: str, place: Floats, rotation: Floats) -> System:

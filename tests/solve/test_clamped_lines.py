@@ -69,6 +69,15 @@ def equilibrium(tables: dict[str, Any]) -> SystemRun:
     return SystemRun(hybrid.System.model_validate(tables), io.BytesIO(), "", moves=False)
 
 
+def test_offsets_of_a_point_to_which_lines_are_clamped() -> None:
+    """At its place nothing holds it, neither force nor moment; beside it the lines pull back, with the directions kept."""
+    curve = hybrid.offsets(in_pieces([16], (0, 1), TWISTED), "point:cut16", [0.0, 0.5], heading=30.0)
+    tension = max(float(x.max()) for x in curve.tension.values())
+    assert curve.moment is not None and np.abs(curve.moment[0]).max() < 1e-6 * tension
+    assert np.abs(curve.force[0]).max() < 1e-6 * tension < curve.restoring[1]
+    assert np.abs(curve.moment[1]).max() > 1e-3
+
+
 @pytest.mark.parametrize("normal", [TWISTED, UNTWISTED])
 @pytest.mark.parametrize(("cuts", "flips"), [([16], (0, 0)), ([16], (1, 1)), ([8, 16, 30], (0, 1, 1, 0))])
 def test_a_rod_cut_at_any_node_is_the_same_rod(cuts: list[int], flips: tuple[int, ...], normal: Any) -> None:
