@@ -182,7 +182,7 @@ class LineResult:
         """Outputs and steps that wait, and the energy that the balance counts from (J), to come back to."""
         return [*self._waiting], [*self._log], self.observer.first_energy
 
-    def wait_again(self, kept: tuple[list[Batch], list[tuple[float, ...]], float | None]) -> None:
+    def wait_again(self, kept: tuple[Sequence[Batch], Sequence[tuple[float, ...]], float | None]) -> None:
         """Let that wait which `waiting` has returned, and nothing else."""
         self._waiting, self._log, self.observer.first_energy = [*kept[0]], [*kept[1]], kept[2]
 

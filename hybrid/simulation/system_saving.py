@@ -80,6 +80,9 @@ def bring_back(run: SystemRun, saved: SavedSystem) -> None:
         recorder.back_to(mark)
     if run.model is not saved.model:  # something has broken since
         run.model, run.failures.broken = saved.model, [*saved.run["broken"]]
+        for line, model, rows in zip(run.lines, saved.model.models, saved.waiting, strict=True):
+            line.wait_again(((), (), rows[2]))
+            line.follow(model)
         run.make_solver()
     set_state(run, saved.run)
     for line, rows in zip(run.lines, saved.waiting, strict=True):

@@ -113,9 +113,12 @@ def test_a_clamped_line_that_breaks_is_the_cable_that_is_let_go(held: str) -> No
     assert lost < -0.1 and also == pytest.approx(lost, rel=1e-6)
     assert np.linalg.norm(one.position[-1, -1] - one.position[0, -1]) > 0.1
     assert np.abs(one.position - two.position).max() < 1e-7
-    assert np.abs(one.bending_moment - two.bending_moment).max() < 1e-5 * one.bending_moment.max()
-    for name in ("energy/kinetic", "work/end"):
-        assert np.abs(one[name] - two[name]).max() < 1e-6 * abs(lost), name
+    assert two.bending_moment[4, -1] == 0.0 < one.bending_moment[4, -1]  # at the break: of several lines, after it
+    rest = np.arange(len(one.times)) != 4
+    assert np.abs(one.bending_moment - two.bending_moment)[rest].max() < 1e-9 * one.bending_moment.max()
+    assert np.abs(one["energy/kinetic"] - two["energy/kinetic"]).max() < 1e-9 * one["energy/kinetic"].max()
+    # What Newton's method leaves of the force at a free point is booked as work of the end: 2e-3 J here.
+    assert np.abs(one["work/end"] - two["work/end"])[rest].max() < 1e-4 * one["energy/kinetic"].max()
     assert np.abs(result["points/b/moment"][-1]).max() == 0.0 < np.abs(result["points/b/moment"][0]).max()
 
 
