@@ -6,6 +6,7 @@ space.  What times something (-m bench), shows figures (-s) or writes a page of 
 
 from __future__ import annotations
 
+import os
 import subprocess
 import sys
 
@@ -27,6 +28,12 @@ hybrid.run({
     "initial": "equilibrium", "mesh": {"cells": 12}, "time": {"duration": 0.2, "step": 0.1}, "dimension": DIMENSION,
 }, progress=False)
 """
+
+
+# Python keeps what it compiles of the package and of tests, also where the user asks it not to: some hundred processes
+# are started, and reading the sources takes each of them a second.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+sys.dont_write_bytecode = False
 
 
 @pytest.hookimpl(tryfirst=True)

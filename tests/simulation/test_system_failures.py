@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences
+from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
 from hybrid.errors import SceneError
@@ -151,7 +151,7 @@ def test_a_mooring_of_a_body_breaks() -> None:
 def test_a_stopped_run_goes_on_bit_for_bit(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Stopped before the break, between two breaks and after both."""
     monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
     stopping = Stopping(monkeypatch)
     points = {"left": {"break_at": {"time": 0.8}}}
     made, whole, path = scene({"b": {"break_at": {"time": 0.5}}}, points), tmp_path / "whole.h5", tmp_path / "run.h5"

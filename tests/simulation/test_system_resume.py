@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from bits import Stopping, differences
+from bits import FEW_STEPS, Stopping, differences
 
 import hybrid
 import hybrid.simulation.system_run
@@ -109,9 +109,9 @@ SCENES = {"mooring": mooring(), "spar": spar(), "clamped": clamped()}
 
 @pytest.fixture
 def stopping(monkeypatch: pytest.MonkeyPatch) -> Stopping:
-    """Hears of every step, with a checkpoint at each."""
+    """Hears of every step, with a checkpoint every few and where the run is stopped."""
     monkeypatch.setattr(hybrid.simulation.system_run, "LOOK", 1)
-    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", FEW_STEPS)
     return Stopping(monkeypatch)
 
 
@@ -153,8 +153,9 @@ def test_a_run_goes_on_beyond_its_end_as_if_it_had_been_that_long(tmp_path: Path
         assert [tuple(e) for e in long.events] == [tuple(e) for e in more.events]
 
 
-def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping) -> None:
+def test_a_running_result_shows_all_lines(tmp_path: Path, stopping: Stopping, monkeypatch: pytest.MonkeyPatch) -> None:
     """Every line has an output as soon as the points have it; extremes are those up to now."""
+    monkeypatch.setattr(hybrid.simulation.system_run, "WORK", 0)  # the file is written at every step
     path, seen = tmp_path / "run.h5", []
 
     def look(progress: Any) -> None:
