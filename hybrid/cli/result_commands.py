@@ -27,6 +27,7 @@ from hybrid.cli.app import (
     window,
     words,
 )
+from hybrid.errors import ResultError
 
 if TYPE_CHECKING:
     from hybrid.cli.console import Console
@@ -109,7 +110,8 @@ def report(
         with session(as_json, quiet) as console:
             from hybrid.view.study_report import write_study_report
 
-            page = write_study_report(result, output or result.with_suffix(".html"), overwrite=overwrite)
+            beside = result.resolve().with_suffix(".html") if result.name in ("", "..") else result.with_suffix(".html")
+            page = write_study_report(result, output or beside, overwrite=overwrite)
             console.done(f"{page.stat().st_size / 1e6:.1f} MB", page, size=page.stat().st_size)
         return
     with session(as_json, quiet) as console, opened_line(result, line) as (opened, result):
@@ -130,7 +132,7 @@ def _comparison(
         names = [file.stem for file in files]
         names = [str(file) for file in files] if len(set(names)) < len(names) else names
         if len(set(names)) < len(names):
-            raise UsageError(f"{', '.join(map(str, files))}: a result is compared with itself")
+            raise ResultError(f"{', '.join(map(str, files))}: a result is compared with itself")
         opened = [stack.enter_context(opened_line(file, line))[0] for file in files]
         target = output or files[0].with_name("_".join(file.stem for file in files) + ".html")
         page = hybrid.compare(dict(zip(names, opened, strict=True)), target, overwrite=overwrite)

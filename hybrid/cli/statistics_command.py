@@ -44,16 +44,19 @@ def stats(
             raise ResultError(f"{result} holds the lines {', '.join(opened.lines)}\n    try:      --line {first}")
         from hybrid.store.statistics_table import rows_of
 
+        facts: dict[str, Any] = {}
+        if curve is not None:
+            s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
+            facts = _fatigue_facts(opened, s, damage, times)
         rows = rows_of(opened, names, at, times, hours * HOUR)
         for row in rows:
             console.json("statistics", **row)
         console.show(lambda: _table(rows, hours))
         for text in dict.fromkeys(row["no_extreme"] for row in rows if "no_extreme" in row):
             console.note(f"note: no extreme of {hours:g} h: {text}")
-        facts: dict[str, Any] = {}
+        for text in [row["between_outputs"] for row in rows if "between_outputs" in row]:
+            console.note(f"note: {text}")
         if curve is not None:
-            s, damage = opened.damage(curve, strength=strength, section=section, times=times, at=at)
-            facts = _fatigue_facts(opened, s, damage, times)
             console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")
         console.json("done", file=str(result), status=opened.status, fatigue=facts)
 

@@ -91,6 +91,13 @@ def _show(console: Console, found: Any, folder: Path, wall: float, netcdf: Path 
     for text, numbers in sorted(reasons.items(), key=lambda x: -len(x[1]))[:REASONS_SHOWN]:
         console.json("failed", reason=text, cases=numbers)
         console.note(f"note: {len(numbers)} failed, such as case {numbers[0]}: {text}")
+    lacking = done.isel(case=done["reason"].values != "")
+    if lacking["case"].size:
+        text = str(lacking["reason"].values[0])
+        console.json("not_kept", reason=text, cases=lacking["case"].values.tolist())
+        console.note(
+            f"note: {lacking['case'].size} not kept in full, such as case {int(lacking['case'].values[0])}: {text}"
+        )
     empty = [row["name"] for row in rows if row["case"] is None]
     if empty:
         console.note(f"note: {', '.join(empty)}: in no case (too few peaks or up-crossings in the record)")

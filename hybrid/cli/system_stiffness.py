@@ -46,6 +46,8 @@ def show_holding(
         if reach is None:
             fix = "add --reach 20 (m), the largest offset to either side"
             raise SceneError([Complaint("--offsets", offsets, "how far", fix)])
+        if not reach > 0.0:
+            raise SceneError([Complaint("--reach", f"{reach:g}", "a length > 0, in m", "--reach 20")])
         curve = hybrid.offsets(asked, offsets, np.linspace(-reach, reach, COUNT).tolist(), heading)
         console.json(
             "offsets", at=curve.at, heading=curve.heading, distance=curve.distance.tolist(),

@@ -252,6 +252,9 @@ def study_from(data: Mapping[str, Any], folder: str | Path = ".") -> Study:
 
 
 def _validated(data: Any, root: Node, complaints: list[Complaint], file: str, folder: Path) -> Study:
+    if isinstance(data, dict) and "scene" not in data and {"cable", "lines"} & set(data):
+        fix = "a file with `scene: scene.yaml` and `vary: ...`, see docs/studies.md"
+        raise SceneError([Complaint("study", "a scene", "a study, which names a scene and what is varied", fix)], file)
     if not isinstance(data, dict):
         raise SceneError([Complaint("study", "no table", "a table with scene and vary", "see docs/studies.md")], file)
     try:

@@ -11,7 +11,7 @@ from hybrid.errors import Complaint, ComputationError, Outcome, SceneError
 from hybrid.kernels.assembly import JOINED
 from hybrid.kernels.bodies import ARM, FRAME, PLACE, STATE, STIFFNESS, V
 from hybrid.kernels.report import FORCE_A, MOMENT_A
-from hybrid.kernels.state import Floats
+from hybrid.kernels.state import Floats, State
 from hybrid.model.bodies import angles_of, frame_of
 from hybrid.model.clamps import seat_of, seated
 from hybrid.model.system import SystemModel, build_system
@@ -162,13 +162,24 @@ def offsets(scene: SceneLike | System, at: str, distances: Sequence[float], head
                         moment += -m if k else m
         forces.append(force)
         moments.append(moment)
-        tensions.append([float(x.T.max()) for x in here.state.lines])
+        tensions.append([_largest_tension(x, here.solver.work[l].report) for l, x in enumerate(here.state.lines)])
     total = np.array(forces).reshape(-1, 3)
     by_line = dict(zip(model.names, np.array(tensions).reshape(len(forces), -1).T, strict=True))
     return Offsets(
         at, heading, np.array(distances, float), total,
         np.array(moments).reshape(-1, 3) if kind == "body" or rigid else None, -total @ along, by_line,
     )  # fmt: skip
+
+
+def _largest_tension(state: State, report: Floats) -> float:
+    """Of the cells of a line, and of its ends, where the force of what holds it is known, N."""
+    d = state.e / np.linalg.norm(state.e, axis=1, keepdims=True)
+    largest = float(state.T.max())
+    for k in (0, 1):
+        t = 1.5 * d[-k] - 0.5 * d[(1, -2)[k]] if len(d) > 1 else d[0]
+        force = report[FORCE_A + 3 * k : FORCE_A + 3 * k + 3] * (1.0 - 2.0 * k)
+        largest = max(largest, float(force @ t / np.linalg.norm(t)))
+    return largest
 
 
 def _system(scene: SceneLike | System) -> System:

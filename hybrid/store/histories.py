@@ -176,11 +176,11 @@ class Histories:
         tension = history_of(self, "tension", times, at)
         if law.kind == "T-N":
             if strength is None or section is not None or not 0.0 < strength < np.inf:
-                expected = "strength=..., in N, above 0, and no section"
+                expected = "strength=... (--strength N), in N, above 0, and no section"
                 raise ResultError(f"the curve '{law.name}' is of ranges of tension\n    expected: {expected}")
             return np.asarray(tension.s), fatigue.damage(tension.values, law, concentration / strength)
         if section is None or strength is not None or len(section) != 3 or not all(0.0 < x < np.inf for x in section):
-            fix = "section=(area m2, outer diameter m, Young's modulus Pa)"
+            fix = "section=(area m2, outer diameter m, Young's modulus Pa), --section A,D,E, and no strength"
             raise ResultError(f"the curve '{law.name}' is of ranges of stress\n    try:      {fix}")
         bends = _bends(self, times, at)
         found = []

@@ -40,6 +40,8 @@ def locked(path: Path | None) -> Iterator[None]:
     try:
         lock.acquire()
     except Timeout:
+        if not beside.exists():  # nobody holds it: it cannot be made there
+            raise ResultError(f"{path} cannot be written\n    try:      a folder you may write to") from None
         advice = "another name with -o, or wait until it has ended"
         raise ResultHeld(f"{path} is being written by another process\n    try:      {advice}") from None
     except OSError as error:

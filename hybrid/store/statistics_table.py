@@ -10,10 +10,14 @@ import numpy as np
 from hybrid.errors import ResultError
 from hybrid.statistics.extremes import THREE_HOURS, of_record
 from hybrid.statistics.moments import summary
+from hybrid.store.envelope import extreme
 from hybrid.store.histories import Window, history_of, lies_along, usual_names
 
 if TYPE_CHECKING:
     from hybrid.store.reader import Result
+
+# Part of the largest value at the outputs by which that of every step must be above it to be worth a note.
+WORTH_A_NOTE = 0.01
 
 
 def rows_of(
@@ -23,7 +27,8 @@ def rows_of(
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
-    where the quantity is largest; times: from and to, s.
+    where the quantity is largest; times: from and to, s.  A row with `between_outputs` says how far every step went
+    beyond what its outputs show.
     """
     rows = []
     for name in usual_names(result) if names is None else names:
@@ -48,8 +53,24 @@ def rows_of(
                 row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
             except ResultError as error:
                 row["no_extreme"] = str(error).splitlines()[0]
+            if at is None and (text := _between_outputs(result, name, history.t, found.maximum)):
+                row["between_outputs"] = text
             rows.append(row)
     return rows
+
+
+def _between_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> str:
+    """What the envelope of every step knows of the largest value between the times t (n,) s; "": nothing more."""
+    found = extreme(result, name, "max")
+    if found is None or not t[0] <= found.t <= t[-1]:
+        return ""
+    if not found.value - largest > WORTH_A_NOTE * abs(largest):
+        return ""
+    unit = result.units[name]
+    return (
+        f"{name}: {found.value:.5g} {unit} between outputs, at s = {found.s:.5g} m, t = {found.t:.5g} s, "
+        f"{float(largest):.5g} {unit} at them; shorter output.every has it in its statistics"
+    )
 
 
 def _number(value: Any) -> float | None:

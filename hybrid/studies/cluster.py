@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import re
 import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
@@ -30,6 +31,8 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
     }  # fmt: skip
     with dask.config.set(settings), ExitStack() as stack:
         if scheduler is not None:
+            if not re.search(r":\d+$|^inproc://", scheduler):
+                raise ResultError(f"'{scheduler}' is no address of a scheduler\n    expected: such as tcp://host:8786")
             stack.enter_context(_quiet("distributed"))
             try:
                 yield stack.enter_context(distributed.Client(scheduler, timeout="20s", set_as_default=False))

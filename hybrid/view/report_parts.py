@@ -223,8 +223,8 @@ def statistics_html(result: Result) -> str:
     """Statistics of the histories, as a section that opens; empty for a result with too few outputs."""
     if len(result.times) < 3 or not result.times[-1] > result.times[0]:
         return ""
-    rows = []
-    for x in rows_of(result):
+    rows, found = [], rows_of(result)
+    for x in found:
         extreme = x["extreme"] or {}
         numbers = [x["mean"], x["deviation"], x["minimum"], x["maximum"], x["significant_range"]]
         longer = [extreme.get("most_probable"), extreme.get("fractile")]
@@ -252,12 +252,15 @@ def statistics_html(result: Result) -> str:
         "Of the time from the first output to the last, starts of loads and motions included; along the cable where a "
         "quantity is largest. Significant range: mean of the largest third between up-crossings of the mean; period: "
         "mean time between them; in 3 h: most probable largest value of three hours, by peaks over a threshold, and "
-        "what it does not exceed with 90 %. “–”: too few peaks or cycles."
+        "what it does not exceed with 90 %. “–”: too few peaks or cycles. End forces are those of every step, all "
+        "else is that of the outputs."
     )
+    beyond = [x["between_outputs"] for x in found if "between_outputs" in x]
+    more = f"<p>{escape('; '.join(beyond))}.</p>" if beyond else ""
     return (
         f'<section id="statistics"><details><summary>Statistics of {len(rows)} histories</summary>'
         f'<p class="quiet">{note} <code>hybrid stats</code> has other times, places and hours.</p>'
-        f"{table_html(rows, head, numbers=len(head) - 1)}</details></section>"
+        f"{table_html(rows, head, numbers=len(head) - 1)}{more}</details></section>"
     )
 
 

@@ -50,6 +50,16 @@ def call(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.Capture
     yield run
 
 
+def test_a_folder_that_is_no_study_is_refused(call: Call) -> None:
+    code, _, err = call("report", ".")
+    assert code == 1 and "is no study" in err
+
+
+def test_a_result_is_not_compared_with_itself(call: Call) -> None:
+    code, _, err = call("report", "run.h5", "run.h5")
+    assert code == 1 and "compared with itself" in err and "bug" not in err
+
+
 def test_report_writes_a_page_beside_the_result_and_says_its_size(call: Call) -> None:
     code, out, err = call("report", "run.h5")
     size = Path("run.html").stat().st_size

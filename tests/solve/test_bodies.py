@@ -266,6 +266,9 @@ def test_offsets_are_equilibria_beside_the_place() -> None:
     slope = (curve.restoring[2] - curve.restoring[0]) / 2.0
     assert abs(slope / stiff[0, 0] - 1.0) < 0.02
     assert set(curve.tension) == {"a", "b", "c"} and curve.tension["a"][0] > curve.tension["a"][2]
+    there = hybrid.static(moored())  # the largest tension is that of an end, above that of any cell
+    for name in curve.tension:
+        assert curve.tension[name][1] == pytest.approx(there.lines[name].tension[-1].max(), rel=1e-9)
     assert curve.moment is not None and curve.moment.shape == (3, 3)
     with pytest.raises(SceneError, match="body:buoy"):
         hybrid.stiffness(moored(), "body:boy")

@@ -13,6 +13,7 @@ from hybrid.errors import ResultError
 from hybrid.statistics import fatigue, moments
 from hybrid.store.bends import bends_of
 from hybrid.store.histories import history_of
+from hybrid.store.statistics_table import rows_of
 
 SCENE = {
     "environment": {"fluid": {"density": 1025.0}},
@@ -54,6 +55,19 @@ def test_statistics_are_of_steps_and_of_outputs(result: hybrid.Result) -> None:
     assert tension.deviation[7] == pytest.approx(one.deviation, rel=1e-12)
     assert tension.crossing_period[-1] == pytest.approx(5.0, rel=2e-3)
     assert result.statistics(["tension"], at=[10.0, 20.0])["tension"].mean.shape == (2,)
+
+
+def test_what_outputs_have_missed_is_said() -> None:
+    """Every step has a larger tension than the outputs here: the row says so, where the window has that moment."""
+    result = hybrid.run(SCENE | {"time": {"duration": 8.0, "step": 0.1}, "output": {"every": 2.5}})
+    (row,) = rows_of(result, ["tension"])
+    k = int(np.argmax(result["envelope/tension_max"]))
+    most, t = result["envelope/tension_max"][k], result["envelope/tension_t_max"][k]
+    assert most > 1.01 * row["maximum"] and row["maximum"] == result.tension.max()
+    assert f"{most:.5g} N between outputs" in row["between_outputs"] and f"t = {t:.5g} s" in row["between_outputs"]
+    assert 2.5 < t < 5.0 and "between_outputs" not in rows_of(result, ["tension"], times=(5.0, None))[0]
+    fine = hybrid.run(SCENE | {"time": {"duration": 8.0, "step": 0.1}, "output": {"every": 0.1}})
+    assert "between_outputs" not in rows_of(fine, ["tension"])[0]
 
 
 def test_extremes_and_their_negative(result: hybrid.Result) -> None:

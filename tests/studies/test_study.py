@@ -18,6 +18,7 @@ from hybrid.errors import ResultError, SceneError
 from hybrid.scene.study import Kept, read_study, study_from
 from hybrid.store.study_file import DONE, FAILED, OPEN, StudyFile
 from hybrid.studies.cases import cases_of, short_names
+from hybrid.studies.cluster import client_of
 from hybrid.studies.collect import collected
 
 SCENE = """
@@ -160,6 +161,16 @@ def test_complaints_have_line_and_column(folder: Path) -> None:
         read_study(file)
     assert [(c.line, c.where) for c in refused.value.complaints] == [(3, "vary.A"), (4, "colect")]
     assert "collect" in refused.value.complaints[1].fix
+
+
+def test_a_scene_is_no_study(folder: Path) -> None:
+    with pytest.raises(SceneError, match="names a scene and what is varied"):
+        read_study(folder / "scene.yaml")
+
+
+def test_an_address_without_a_port_is_refused() -> None:
+    with pytest.raises(ResultError, match="tcp://host:8786"), client_of(None, "foo"):
+        pass
 
 
 # ---- runs -----------------------------------------------------------------------------------------
