@@ -54,7 +54,7 @@ def stats(
         console.show(lambda: _table(rows, hours))
         for text in dict.fromkeys(row["no_extreme"] for row in rows if "no_extreme" in row):
             console.note(f"note: no extreme of {hours:g} h: {text}")
-        for text in [row["between_outputs"] for row in rows if "between_outputs" in row]:
+        for text in [row["beyond_outputs"] for row in rows if "beyond_outputs" in row]:
             console.note(f"note: {text}")
         if curve is not None:
             console.show(lambda: f"fatigue by {curve}: {_fatigue_text(facts)}")

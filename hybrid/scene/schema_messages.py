@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Mapping
 from typing import Any, Literal, get_args, get_origin
@@ -267,6 +268,8 @@ def _number_in_text(text: str, unit: str) -> str:
     words = text.split()
     if not words:
         return "give a number"
+    if _is_number(text) and not math.isfinite(float(text)):
+        return "give a finite number"
     if _is_number(text):
         return f"write {text.strip()} without quotes"
     if _is_number(text.replace(",", ".")):

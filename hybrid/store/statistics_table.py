@@ -27,8 +27,8 @@ def rows_of(
     """One row for each history: its summary, and the extreme of `duration` (s) or why there is none.
 
     names: None for the usual ones that are not zero throughout and are known at all outputs; at: arc lengths, m, None:
-    where the quantity is largest; times: from and to, s.  A row with `between_outputs` says how far every step went
-    beyond what its outputs show.
+    where the quantity is largest; times: from and to, s.  A row with `beyond_outputs` says how far all nodes
+    and steps went beyond what its outputs show.
     """
     rows = []
     for name in usual_names(result) if names is None else names:
@@ -53,14 +53,14 @@ def rows_of(
                 row["extreme"] = of_record(history.t, values[:, k], duration)._asdict()
             except ResultError as error:
                 row["no_extreme"] = str(error).splitlines()[0]
-            if at is None and (text := _between_outputs(result, name, history.t, found.maximum)):
-                row["between_outputs"] = text
+            if at is None and (text := _beyond_outputs(result, name, history.t, found.maximum)):
+                row["beyond_outputs"] = text
             rows.append(row)
     return rows
 
 
-def _between_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> str:
-    """What the envelope of every step knows of the largest value between the times t (n,) s; "": nothing more."""
+def _beyond_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> str:
+    """What the envelope of all nodes and steps knows of the largest value in the times t (n,) s; "": nothing more."""
     found = extreme(result, name, "max")
     if found is None or not t[0] <= found.t <= t[-1]:
         return ""
@@ -68,8 +68,8 @@ def _between_outputs(result: Result, name: str, t: np.ndarray, largest: Any) -> 
         return ""
     unit = result.units[name]
     return (
-        f"{name}: {found.value:.5g} {unit} between outputs, at s = {found.s:.5g} m, t = {found.t:.5g} s, "
-        f"{float(largest):.5g} {unit} at them; shorter output.every has it in its statistics"
+        f"{name}: {found.value:.5g} {unit} at s = {found.s:.5g} m, t = {found.t:.5g} s, of all nodes and steps, "
+        f"{float(largest):.5g} {unit} at the outputs; a shorter output.every or more output.points show more of it"
     )
 
 

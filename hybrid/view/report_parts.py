@@ -255,7 +255,7 @@ def statistics_html(result: Result) -> str:
         "what it does not exceed with 90 %. “–”: too few peaks or cycles. End forces are those of every step, all "
         "else is that of the outputs."
     )
-    beyond = [x["between_outputs"] for x in found if "between_outputs" in x]
+    beyond = [x["beyond_outputs"] for x in found if "beyond_outputs" in x]
     more = f"<p>{escape('; '.join(beyond))}.</p>" if beyond else ""
     return (
         f'<section id="statistics"><details><summary>Statistics of {len(rows)} histories</summary>'

@@ -46,6 +46,7 @@ CASES = {
     # --- values
     "negative": (SUSPENSION, MASS, "mass: §-1", "cable.sections[0].mass", "check the sign"),
     "with unit": (SUSPENSION, MASS, "mass: §2 kg/m", "cable.sections[0].mass", "write the number alone, 2; the unit is kg/m"),
+    "quoted nan": (SUSPENSION, MASS, 'mass: §"nan"', "cable.sections[0].mass", "give a finite number"),
     "quoted": (SUSPENSION, MASS, 'mass: §"2"', "cable.sections[0].mass", "write 2 without quotes"),
     "comma": (SUSPENSION, "gravity: 9.8", "gravity: §9,8", "environment.gravity", "9.8"),
     "nan": (SUSPENSION, MASS, "mass: §.nan", "cable.sections[0].mass", "finite"),

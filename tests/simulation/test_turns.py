@@ -150,7 +150,7 @@ def wound(folder: Path, turns: float, over: float, until: float) -> dict:
 
 
 @pytest.mark.parametrize(("every", "step"), [(25.0, 25.0), (25.0, 5.0), (1.0, 1.0), (25.0, None), (1.0, None)])
-def test_turns_between_outputs(tmp_path, every, step):
+def test_turns_beyond_outputs(tmp_path, every, step):
     """27 turns in 1000 s: 1.3385 N m, however long steps and outputs are; only steps that are cut are an event."""
     time = {"duration": 1100.0} | ({"step": step} if step else {"tolerance": 1e-3})
     scene = taut(second=wound(tmp_path, 27, 1000, 1100), time=time, output={"every": every})

@@ -33,7 +33,7 @@ def test_histories_profiles_and_single_values() -> None:
         hybrid.plot_quantity(result, "position", at=50.0)
 
 
-def test_the_envelope_has_peaks_between_outputs(tmp_path: Path) -> None:
+def test_the_envelope_has_peaks_beyond_outputs(tmp_path: Path) -> None:
     """A chain that swings, saved at its turning points: its largest tension is between them, and in the picture."""
     scene = hybrid.load_scene(EXAMPLE, ["time.duration=0.84", "output.every=0.84"])
     result = hybrid.run(scene, tmp_path / "run.h5", progress=False)
