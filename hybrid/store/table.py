@@ -60,15 +60,17 @@ class Table:
         for k in range(1, len(self.fields) if self.waiting else 0):
             self._write_column(k)
 
-    def commit(self) -> None:
+    def commit(self, at_once: bool = True) -> None:
         """Write the scale, which tells readers that the rows are complete.
 
-        Flushed by itself: where its numbers cannot be written, HDF5 then stops before its new length, while a flush of
-        the whole file goes on with all lengths (rows of zeros in 1 of 40 files of a full disk).
+        at_once: flushed by itself: where its numbers cannot be written, HDF5 then stops before its new length, while a
+        flush of the whole file goes on with all lengths (rows of zeros in 1 of 40 files of a full disk).  Not needed
+        where numbers do not wait in memory (store.hdf5_file).
         """
         if self.waiting:
             self._write_column(0)
-            self._datasets[0].flush()
+            if at_once:
+                self._datasets[0].flush()
             self.count += self.waiting
             self.drop()
 

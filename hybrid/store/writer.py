@@ -48,7 +48,7 @@ from hybrid.store.format import (
 )
 from hybrid.store.hdf5_file import check_target, created, drafted, give_up, hold_metadata, in_memory, unwritable
 from hybrid.store.integrity import sign
-from hybrid.store.lines import GROUP, add_parts, of_all, of_part
+from hybrid.store.lines import GROUP, add_parts, in_turn, of_all, of_part
 from hybrid.store.named_arrays import Tree, pack
 from hybrid.store.table import Table
 from hybrid.store.template import template
@@ -381,8 +381,11 @@ class Recorder:
 
     def _write(self, tables: Sequence[Table], packed: bytes = b"") -> None:
         waiting = [table for table in tables if table.waiting]
-        for table in waiting:
-            table.write()
+        for together in in_turn(waiting):
+            for table in together:
+                table.write()
+            if len(together) < len(waiting):
+                self._file.flush()
         for part in (self, *self._parts.values()):
             for name, values in part._replaced.items():
                 if name not in part._fixed:
@@ -394,12 +397,13 @@ class Recorder:
         # HDF5 may write in any order between two flushes.  So: the data, then the scales that
         # say it is there, and t last, which says that the zones of the output are there too; that of the parts before.
         self._file.flush()
-        last = [part._outputs for part in self._parts.values()], [self._outputs]
-        first = [table for table in waiting if not any(table in x for x in last)]
-        for tables in (first, *([x for x in each if x in waiting] for each in last)):
-            for table in tables:
-                table.commit()
-            if tables:
+        outputs = {id(part._outputs) for part in self._parts.values()}
+        last = [x for x in waiting if id(x) in outputs], [x for x in waiting if x is self._outputs]
+        first = [x for x in waiting if id(x) not in outputs and x is not self._outputs]
+        for tables in (first, *last):
+            for together in in_turn(tables):
+                for table in together:
+                    table.commit(at_once=not self._parts)
                 self._file.flush()
 
     def close(self, status: str = "complete", message: str = "") -> None:

@@ -60,3 +60,42 @@ def test_what_was_written_stays(limit: int, tmp_path: Path) -> None:
     if len(t):  # and then it has a checkpoint of these very rows
         with opened(path) as file:
             assert read_checkpoint(file).rows["t"] == len(t)
+
+
+LINES = """
+import io, resource, sys
+sys.path[:0] = [{here!r}]
+from hybrid.errors import ResultError
+from test_result_file import ONE, recorder, values
+parts = {{name: recorder(io.BytesIO()) for name in ("a", "b", "c")}}
+for part in parts.values():
+    part.lay_by()
+resource.setrlimit(resource.RLIMIT_FSIZE, ({limit}, {limit}))
+kept = []  # nothing is let go of before the end
+try:
+    with recorder({path!r}, parts=parts) as r:
+        kept.append(r)
+        for i in range(4000):
+            for x in (*parts.values(), r):
+                x.save(float(i), values(float(i)), ONE)
+            if i % 20 == 19:
+                r.flush()
+except ResultError as error:
+    print(error)
+"""
+
+
+@pytest.mark.parametrize("limit", [531_782, 1_289_002])
+def test_what_was_written_of_several_lines_stays(limit: int, tmp_path: Path) -> None:
+    """Lines have all outputs that their system has, with their numbers."""
+    path, here = tmp_path / "run.h5", Path(__file__).parent
+    code = LINES.format(here=str(here), limit=limit, path=str(path))
+    env = os.environ | {"PYTHONPATH": str(Path(hybrid.__file__).parents[1]), "PYTHONDONTWRITEBYTECODE": "1"}
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, env=env)
+    assert (done.returncode, done.stderr) == (0, ""), done.stderr[-2000:]
+    assert str(path) in done.stdout and "cannot be written" in done.stdout and "free" in done.stdout
+    result = open_result(path)
+    for line in result.lines.values():
+        t = line.times
+        assert len(t) >= len(result.times) and (t == range(len(t))).all() and (line.tension[:, 0] == 10.0 * t).all()
+    assert bool(len(result.times)) == (limit > 1_000_000)

@@ -17,7 +17,7 @@ import pytest
 import hybrid
 from hybrid.errors import ResultError
 from hybrid.store.format import Field
-from hybrid.store.hdf5_file import SLOTS
+from hybrid.store.hdf5_file import SLOTS, created, hold_metadata, in_memory
 from hybrid.store.reader import Result, open_result
 from hybrid.store.records import Event, Zone
 from hybrid.store.writer import Recorder
@@ -441,3 +441,24 @@ def test_results_that_wait_to_be_parts_keep_no_file_open(tmp_path: Path) -> None
         for name, line in result.lines.items():
             assert line.title == name and [e.text for e in line.events] == [f"of {name}"]
             assert np.array_equal(line.tension[0], values(0.0)["tension"])
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="HDF5's function is not reached through h5py there")
+def test_what_is_known_of_a_dataset_of_many_goes_when_it_is_closed(tmp_path: Path) -> None:
+    """Else closing the file takes time that grows with more than the square of its datasets."""
+    with in_memory() as made:
+        for k in range(20):
+            made.create_dataset(f"x{k}", (0,), maxshape=(None,), chunks=(64,), dtype=float)
+        made.flush()
+        image = made.id.get_file_image()
+    with created(tmp_path / "many.h5", image, many=True) as file:
+        hold_metadata(file)
+        for k in range(20):
+            data = file[f"x{k}"]
+            data.resize((5,))
+            data[:] = 1.0
+        del data
+        file.flush()
+        assert file.id.get_mdc_size()[3] < 40  # entries of 20 datasets that were closed
+    with h5py.File(tmp_path / "many.h5") as file:
+        assert all(file[f"x{k}"].shape == (5,) for k in range(20))
