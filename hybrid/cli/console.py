@@ -147,7 +147,8 @@ class Console:
             yield None if self.quiet else lambda now: self.json("progress", **asdict(now), left=now.left)
             return
         columns = (BarColumn(24), MofNCompleteColumn(), TextColumn("{task.description}", markup=False))
-        with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True) as bar:
+        shown = self._err.is_terminal  # elsewhere an empty line would be left of it
+        with Progress(*columns, TimeElapsedColumn(), console=self._err, transient=True, disable=not shown) as bar:
             task, begun = bar.add_task("starting workers"), [-1, 0.0]
 
             def tell(now: StudyRunning) -> None:

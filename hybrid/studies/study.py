@@ -28,7 +28,7 @@ from hybrid.model.plan import plan
 from hybrid.scene.study import Kept, Study, read_study, study_from
 from hybrid.simulation.api import run, static
 from hybrid.store.lock import locked
-from hybrid.store.study_file import OWN, Column, StudyFile, open_study
+from hybrid.store.study_file import OPEN, OWN, Column, StudyFile, open_study
 from hybrid.studies.cases import Cases, cases_of, digest_of, scene_of
 from hybrid.studies.collect import names_of, usual
 from hybrid.studies.dispatch import AHEAD, StudyRunning, compute_open_batches
@@ -71,9 +71,10 @@ def study(
     _refuse_unknown_lines(cases, wanted)
     identity = _identity(cases, wanted, asked.derive)
     with locked(target):
-        if target.exists() and overwrite:
-            StudyFile(target)  # nothing else is removed
-            rmtree(target)
+        if target.exists():
+            there = StudyFile(target)  # nothing else is removed
+            if overwrite or (there.attributes["identity"] != identity and (there.status == OPEN).all()):
+                rmtree(target)
         if target.exists():
             file = StudyFile(target)
             _refuse_other(file, identity)

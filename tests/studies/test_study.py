@@ -265,7 +265,7 @@ def test_equilibria(folder: Path, tmp_path: Path) -> None:
 
 
 def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> None:
-    """A quantity that no result has, or one with several values: said after the first batch, and nothing is written."""
+    """A quantity that no result has, or one with several values: said after the first batch; a corrected study takes the place."""
     vary = {"cable.sections[0].mass": [6, 8]}
     for wrong, text in (
         ({"quantity": "tensoin"}, "did you mean"),
@@ -273,8 +273,7 @@ def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> 
     ):
         with pytest.raises(ResultError, match=text):
             hybrid.study(
-                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, workers=1,
-                overwrite=(tmp_path / "x.zarr").exists(),
+                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, workers=1
             )  # fmt: skip
 
 
