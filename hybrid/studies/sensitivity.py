@@ -21,6 +21,8 @@ DESIGNS = ("saltelli", "morris")
 LEVELS = 4
 # Resamples of the intervals.
 RESAMPLES = 200
+# Cases of which correlations are computed.
+LEAST = 3
 
 
 class Influence(NamedTuple):
@@ -55,7 +57,7 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
 
     study: the folder of its results; result: a number that was kept of each run.  A study sampled by `saltelli` has
     indices of Sobol, by `morris` elementary effects, any other rank correlations.  ResultError for a result that is not
-    there, or a design of which cases have failed.
+    there or known of too few cases, or a design of which cases have failed.
     """
     found = open_study(study)
     if result not in found or found[result].dims != ("case",) or found[result].dtype.kind != "f":
@@ -74,6 +76,8 @@ def sensitivity(study: str | Path, result: str) -> list[Influence]:
         if done.size != _size(method, len(bounds), sample["count"]):
             raise ResultError(f"{study} crosses a design of {method} with lists of values: analyse one value at a time")
         return _of_design(method, bounds, found, values)
+    if done.sum() < LEAST:
+        raise ResultError(f"{int(done.sum())} of {done.size} cases have a '{result}'\n    expected: {LEAST} at least")
     return _ranked(found, values, done)
 
 
@@ -106,7 +110,7 @@ def _ranked(found: Any, values: np.ndarray, done: np.ndarray) -> list[Influence]
     rows = []
     for name in json.loads(found.attrs["variables"]):
         column = found[name].values
-        if column.dtype.kind == "f" and np.ptp(column[done]) > 0.0 and done.sum() > 2 and np.ptp(values[done]) > 0.0:
+        if column.dtype.kind == "f" and np.ptp(column[done]) > 0.0 and np.ptp(values[done]) > 0.0:
             rank = spearmanr(column[done], values[done])
             rows.append(Influence(name, "rank", float(rank.statistic), np.nan, float(rank.pvalue)))
     return _in_order(rows, "first")

@@ -77,8 +77,12 @@ def _subtitle(found: Any, counts: dict[str, int]) -> str:
 
 
 def _failures(found: Any) -> str:
-    """Reasons of failures, those of most cases first."""
-    failed = found["status"].values == FAILED
+    """Reasons of failures, and of what could not be kept of cases that are done, those of most cases first."""
+    failed, reason = found["status"].values == FAILED, found["reason"].values
+    return _reasons(found, failed, "failed") + _reasons(found, ~failed & (reason != ""), "not kept in full")
+
+
+def _reasons(found: Any, failed: np.ndarray, what: str) -> str:
     if not failed.any():
         return ""
     reasons: dict[str, list[int]] = {}
@@ -88,7 +92,7 @@ def _failures(found: Any) -> str:
         f"<li><b>{len(numbers)} case{'s' * (len(numbers) > 1)}</b>, such as {numbers[0]}: {escape(text)}</li>"
         for text, numbers in sorted(reasons.items(), key=lambda item: -len(item[1]))
     )
-    return f'<div class="attention" role="alert"><h2>{int(failed.sum())} failed</h2><ul>{rows}</ul></div>'
+    return f'<div class="attention" role="alert"><h2>{int(failed.sum())} {what}</h2><ul>{rows}</ul></div>'
 
 
 def _ranges(found: Any, results: list[str]) -> str:

@@ -52,6 +52,11 @@ def test_indices_of_sobol(tmp_path: Path) -> None:
     assert list(found) == ["a", "b", "c"]  # the strongest first
 
 
+def test_too_few_cases_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ResultError, match="2 of 8 cases"):
+        hybrid.sensitivity(stored(tmp_path, "latin_hypercube", 8, ishigami, failed=6), "y")
+
+
 def test_elementary_effects_of_a_linear_function(tmp_path: Path) -> None:
     """Slope times range, without deviation."""
     bounds = {"a": (0.0, 2.0), "b": (1.0, 2.0), "c": (5.0, 9.0)}
