@@ -28,7 +28,7 @@ def client_of(workers: int | None, scheduler: str | None) -> Iterator[Any]:
         # and the study would wait for ever for workers that are not there.
         "distributed.deploy.lost-worker-timeout": "1h",
         "distributed.worker.profile.enabled": False,  # it stops the worker a hundred times a second to look at it
-        # What a scheduler and a worker do while nothing happens takes 5 % of a core at dask's intervals, of 20 to 500 ms;
+        # While nothing happens scheduler and worker take 5 % of a core at dask's intervals, of 20 to 500 ms, here 1 %;
         # batches take seconds.
         "distributed.admin.tick.interval": "1s", "distributed.admin.tick.limit": "1 minute",
         "distributed.admin.system-monitor.gil.enabled": False,
