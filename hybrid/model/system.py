@@ -51,6 +51,7 @@ class SystemModel:
     fairleads: Floats  # (L, 2, 3) m, of ends at free bodies, in axes of the body
     seats: Floats  # (L, 2, SEAT) frames of ends that turn with a free body or point (kernels.carried_frames)
     known: Mapping[str, KnownMotion]  # of bodies that are held or moved
+    scenes: Mapping[str, Scene]  # of the lines by name, with their points where the system has them
     loose: frozenset[tuple[int, int]] = frozenset()  # ends (line, 0 or 1) that have left their points
 
     @property
@@ -84,12 +85,13 @@ class SystemModel:
 
 
 def build_system(
-    system: System, places: Floats | None = None, bodies: Floats | None = None, seats: Floats | None = None
+    system: System, places: Floats | None = None, bodies: Floats | None = None, before: SystemModel | None = None
 ) -> SystemModel:
     """Make the model that a system requires.
 
     places: (P, 3) m of the free points, bodies: (B, STATE) of the free bodies and the points behind them, None: where
-    the scene has them; seats: (L, 2, SEAT) of a model that was made before, None: as the first shapes lie.
+    the scene has them; before: a model of the same system that was made before, whose seats hold, None: as the first
+    shapes lie.
     Raises SceneError where a line cannot be meshed.
     """
     rigid = system.rigid
@@ -120,7 +122,8 @@ def build_system(
             place = point.place if isinstance(point, Fairlead) else (0.0, 0.0, 0.0)
             at[name] = tuple((row[PLACE:FRAME] + row[FRAME:V].reshape(3, 3) @ np.array(place)).tolist())
             joint[name], fairleads[name] = len(free) + carriers.index(carrier), place
-    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats)
+    seats, scenes = (None, {}) if before is None else (before.seats, before.scenes)
+    maker = _Lines(system, at, bodies, {x: joint[x] - len(free) for x in fairleads}, seats, scenes)
     maker.turn_points()
     models = [maker.model(name) for name in system.lines]
     known = maker.known
@@ -131,7 +134,7 @@ def build_system(
     return SystemModel(
         tuple(system.lines), tuple(models), free, rigid, tuple((joint.get(a, -1), joint.get(b, -1)) for a, b in ends),
         places, made, maker.bodies, np.array([[fairleads.get(p, (0.0, 0.0, 0.0)) for p in pair] for pair in ends]),
-        maker.seats, known,
+        maker.seats, known, maker.scenes,
     )  # fmt: skip
 
 
@@ -139,14 +142,18 @@ class _Lines:
     """Makes the models of lines, with their clamps."""
 
     def __init__(
-        self, system: System, at: Mapping[str, Any], bodies: Floats, rows: Mapping[str, int], seats: Floats | None
-    ) -> None:
-        """at: places of the points that are joined; rows: of `bodies`, of the points that are carried by one."""
+        self, system: System, at: Mapping[str, Any], bodies: Floats, rows: Mapping[str, int], seats: Floats | None,
+        scenes: Mapping[str, Scene],
+    ) -> None:  # fmt: skip
+        """at: places of the points that are joined; rows: of `bodies`, of the points that are carried by one; scenes:
+
+        of lines, that are known.
+        """
         self._system, self._at, self.bodies, self._rows = system, at, bodies.copy(), rows
         self._given, self._names = seats, list(system.lines)
         self.seats = np.zeros((len(self._names), 2, SEAT)) if seats is None else seats
         self._at_rigid = {end: x for p in system.rigid for end, x in directions_at_rigid(system, p).items()}
-        self._scenes: dict[str, Scene] = {}  # of lines, with their points where the system has them
+        self.scenes = dict(scenes)  # of lines, with their points where the system has them
         self.known: dict[str, KnownMotion] = {}  # motions of bodies, which are added when first asked for
 
     def turn_points(self) -> None:
@@ -188,9 +195,9 @@ class _Lines:
 
     def _scene(self, name: str, carried: Sequence[str], directions: Mapping[str, Any] | None) -> Scene:
         """The scene of a line between the places of its points; of one that is carried, with the point."""
-        if name not in self._scenes:
-            self._scenes[name] = self._system.scene_of(name)
-        return self._system.scene_of(name, carried, self._at, directions, self._scenes[name])
+        if name not in self.scenes:
+            self.scenes[name] = self._system.scene_of(name)
+        return self._system.scene_of(name, carried, self._at, directions, self.scenes[name])
 
     def _directions(self, name: str, left: Sequence[str] = ()) -> dict[str, Any]:
         """Inertial directions in which the line is clamped, by end; left: points whose axes are not known yet."""

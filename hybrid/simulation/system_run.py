@@ -59,7 +59,8 @@ class SystemRun:
         self.model = build_system(system)
         names = self.model.names
         guesses = system.guesses
-        self.scenes = [system.scene_of(name, system.carried(name), guesses) for name in names]
+        known = self.model.scenes
+        self.scenes = [system.scene_of(name, system.carried(name), guesses, scene=known[name]) for name in names]
         self.times = output_times(self.scenes[0]) if moves else []
         self.found = None
         if source is None:

@@ -61,7 +61,7 @@ def _starts(system: System, model: SystemModel) -> Iterator[Start]:
     yield "lines hung between the first places", SystemState([x.start for x in model.models], model.body_places)
     places = balanced_places(system, model)
     if places is not None and len(model.places) + len(model.body_places):
-        there = build_system(system, *places, model.seats)
+        there = build_system(system, *places, model)
         yield "lines hung between places that balance", SystemState([x.start for x in there.models], there.body_places)
 
 

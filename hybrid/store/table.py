@@ -23,19 +23,23 @@ class Table:
     def __init__(self, file: h5py.Group, group: str, fields: Sequence[Field]) -> None:
         self.fields, self._names = tuple(fields), [f"{group}/{field.name}".lstrip("/") for field in fields]
         self.move(file)
-        self._types = [NUMBERS.get(f.dtype) or x.get_type() for f, x in zip(fields, self._datasets, strict=True)]
         self.scale = self._names[0] if fields else ""  # the first dataset says how many rows are complete
         self._blocks: list[list[np.ndarray]] = []  # waiting to be written, each with one array (n, ...) per field
         self.waiting = self.bytes_waiting = 0  # rows in them, and their bytes
         self.count = 0  # written rows
 
     def move(self, file: h5py.Group) -> None:
-        """Write to the datasets of the same names of another file, or of a group of it."""
-        self._datasets = [h5d.open(file.id, name.encode()) for name in self._names]
+        """Write to the datasets of the same names of another file, or of a group of it; opened when rows come."""
+        self._file: h5py.Group | None = file
+        self._datasets: list[h5d.DatasetID] = []
 
     def leave(self) -> None:
         """Hold no datasets, until `move`."""
-        self._datasets = []
+        self._file, self._datasets = None, []
+
+    def _open(self) -> None:
+        if self._file is not None and not self._datasets:
+            self._datasets = [h5d.open(self._file.id, name.encode()) for name in self._names]
 
     def drop(self) -> None:
         """Forget the rows that wait."""
@@ -57,6 +61,8 @@ class Table:
 
     def write(self) -> None:
         """Write the waiting rows to all datasets but the scale."""
+        if self.waiting:
+            self._open()
         for k in range(1, len(self.fields) if self.waiting else 0):
             self._write_column(k)
 
@@ -68,6 +74,7 @@ class Table:
         where numbers do not wait in memory (store.hdf5_file).
         """
         if self.waiting:
+            self._open()
             self._write_column(0)
             if at_once:
                 self._datasets[0].flush()
@@ -78,7 +85,7 @@ class Table:
         parts, data = [block[k] for block in self._blocks], self._datasets[k]
         column = np.ascontiguousarray(parts[0] if len(parts) == 1 else np.concatenate(parts))
         data.set_extent((self.count + len(column), *column.shape[1:]))
-        write_rows(data, self.count, column, self._types[k])
+        write_rows(data, self.count, column, NUMBERS.get(self.fields[k].dtype) or data.get_type())
 
 
 def write_rows(data: h5d.DatasetID, begin: int, rows: np.ndarray, kind: Any = None) -> None:
