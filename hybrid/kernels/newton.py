@@ -24,6 +24,9 @@ from hybrid.kernels.report import RESIDUAL, RESIDUAL_NODE, SELF_CONTACT_ENERGY
 from hybrid.kernels.step import LARGEST_STEP_TURN, begin_step, end_step, find_rates
 from hybrid.kernels.zone_torque import AFTER_STEP, BEFORE_MARCH, CORRECT
 
+# The same of a step of a line that may touch itself: longer ones feed the vibrations that contact leaves.
+LARGEST_CONTACT_TURN = 0.3
+
 # Contact of the line with itself: places of `contact` (address, what is asked, whether it is near), and what is asked
 # (kernels.self_contact).
 ADDRESS, ASKED, NEAR = range(3)
@@ -135,6 +138,12 @@ def ask_contact(contact, table, what):
 
 
 @inner
+def most_turn(contact):
+    """The largest turn, rad, of a chord in a step."""
+    return LARGEST_STEP_TURN if contact[ADDRESS] == 0 else LARGEST_CONTACT_TURN
+
+
+@inner
 def start_step(plane, space, task, line, sea, old, new, work, contact, contact_table):
     """Predict the end of a step; the task with its spectral radius, its scheme, and the largest turn and its cell.
 
@@ -175,7 +184,7 @@ def solve(
     s = Scheme(0.0, 0.0, 0.0, 0.0, 0.0, task.cv, task.ca)
     if task.what == STEP:
         task, s, turn, where = start_step(plane, space, task, line, sea, old, new, work, contact, contact_table)
-        if not turn < LARGEST_STEP_TURN:
+        if not turn < most_turn(contact):
             return TURNED_TOO_FAR, 0, turn, where
     cv, ca = s.cv, s.ca
     before, left = math.inf, math.inf
@@ -246,7 +255,7 @@ def solve(
             if contact[ADDRESS] != 0:
                 work.report[SELF_CONTACT_ENERGY] = ask_contact(contact, contact_table, FINISH)
             turn, cell = end_step(plane, space, line, sea, ends, old, new, s, task, was, now, work, strains)
-            if not turn < LARGEST_STEP_TURN:
+            if not turn < most_turn(contact):
                 outcome, where = TURNED_TOO_FAR, cell
             elif cut_short:
                 outcome = CUT_SHORT

@@ -35,6 +35,8 @@ from hybrid.kernels.self_contact_friction import (
 from hybrid.kernels.self_contact_law import FORCE, WX, WY, P, Q, add_gradient, add_product
 from hybrid.kernels.self_contact_pairs import (
     ENERGY,
+    FADED,
+    FADES,
     FRESH,
     FRICTION,
     GRIPS,
@@ -52,6 +54,7 @@ from hybrid.kernels.self_contact_pairs import (
     STALE,
     STORED,
     TRIED,
+    WIDEST,
     Contact,
     blank_contact,
     farthest_from_mean,
@@ -188,20 +191,24 @@ def take_vector(contact, column):
 
 @inner
 def find_solution(line, ends, contact, work):
-    """GMRES: contact.x = the correction of the nodes in contact, from that of a line without it; False: not finite."""
+    """GMRES: contact.x = the correction of the nodes in contact; False: not finite.
+
+    It begins at zero, where the residual is A^-1 (b + g), which falls as Newton converges.  The correction x0 of a line
+    without contact stays large, as the force of contact is left out of b: what SOLVED leaves of it would never fall.
+    """
     x, z, V, H = contact.x, contact.z, contact.basis, contact.hessenberg
     count, per, rhs, solution = contact.counts[NODES], unknowns(contact), MOST_PRODUCTS + 2, MOST_PRODUCTS + 3
     for k in range(count):
         i = contact.nodes[k]
         for j in range(per):
-            x[i, j] = work.x[i, 1 + j]
+            x[i, j] = 0.0
     if not respond(line, ends, contact, work, True):
         return False
     s = 0.0
     for k in range(count):
         i = contact.nodes[k]
         for j in range(per):
-            y = z[i, 1 + j] * length_of(contact, j, i)
+            y = (work.x[i, 1 + j] + z[i, 1 + j]) * length_of(contact, j, i)
             V[0, per * k + j] = y
             s += y * y
     s = math.sqrt(s)
@@ -235,7 +242,7 @@ def find_solution(line, ends, contact, work):
             s = 0.0
             for j in range(done):
                 s += H[j, solution] * V[j, per * k + m]
-            x[i, m] = work.x[i, 1 + m] + s / length_of(contact, m, i)
+            x[i, m] = s / length_of(contact, m, i)
     return True
 
 
@@ -314,10 +321,11 @@ def place(contact, old, u):
 
 
 @inner
-def prepare(line, ends, contact, old, u, dt):
-    """Before a try of a step of dt: how much of the prediction is safe, and whether the step comes to contact.
+def prepare(line, ends, contact, old, u, now, dt):
+    """Before a try of a step of dt from the time now: how much of the prediction is safe, and whether the step comes to contact.
 
-    The size of the law follows the speed of what meets, and stays while anything touches.
+    The size of the law follows the speed of what meets.  While anything touches it fades to what still moves: what is
+    at rest must not depend on how fast it came there.  It does not grow then, which would put energy in.
     """
     numbers, speed = contact.numbers, contact.numbers[SPEED]
     for i in range(u.shape[0]):
@@ -330,7 +338,12 @@ def prepare(line, ends, contact, old, u, dt):
     numbers[SPEED] = 0.0
     limit(line, ends, contact, 0.0)
     near = numbers[SPEED] > 0.0 or contact.counts[POINTS] > 0
-    numbers[SPEED] = speed if contact.counts[POINTS] > 0 else numbers[SPEED] / dt
+    seen = numbers[SPEED] / dt
+    if contact.counts[POINTS] > 0:
+        since = now - numbers[FADED] if numbers[FADED] < now else 0.0
+        faded = speed / (1.0 + speed * since / (FADES * numbers[WIDEST]))
+        seen = min(speed, max(faded, seen))
+    numbers[SPEED], numbers[FADED] = seen, now
     return near
 
 
@@ -385,7 +398,7 @@ def contact_task(table):
     if rubs and phase in (PREPARE, REST):
         keep_last(contact, job.clock[NOW])
     if phase == PREPARE:
-        near = prepare(line, ends, contact, old, work.u, job.clock[TRY_END] - job.clock[NOW])
+        near = prepare(line, ends, contact, old, work.u, job.clock[NOW], job.clock[TRY_END] - job.clock[NOW])
         job.call[NEAR] = 1 if near else 0
         return contact.numbers[PART]
     if phase == LIMIT:

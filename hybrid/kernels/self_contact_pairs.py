@@ -40,6 +40,8 @@ from hybrid.kernels.state import Floats
 WINDOW = 2.7  # diameters of arc length within which pieces are neighbours: TURNED of it is more than OUTER
 SAFE = 0.8  # part of the way to where the force is infinite that a correction may go
 IMPACT = 25.0  # size of the law over m' v^2 in a collision at the speed v
+# The speed of the law falls by half while strands go so many diameters at it: a collision takes two or three.
+FADES = 10.0
 MOST_PRODUCTS = 60  # of GMRES
 PAIRS_OF_NODE = 8  # that are kept at most
 LEAST_KEEPS = 0.05  # diameters, of KEEPS
@@ -48,7 +50,7 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
 (
     PART,  # of a correction that is safe
     ENERGY,  # J, of contact
-    SPEED,  # m/s, with which pieces may meet in the step that is prepared
+    SPEED,  # m/s, of the law: with which pieces met; it fades while they touch
     WIDEST,
     NARROWEST,  # m, diameters
     REACH,  # m, distance within which pairs are looked at
@@ -60,8 +62,9 @@ LEAST_NEAR, FORESEEN = 0.5, 2.0  # of `near`: what is looked for; the most of wh
     HORIZON,  # s, for which it is foreseen how near the line comes to itself; 0: not asked
     KEEPS,  # m, for displacements up to which the pairs kept are all that there are; < 0: none are kept
     ROLLS,  # 1 where friction turns strands about themselves; 0: nothing holds their spin, and it is left out
-) = range(14)
-NUMBERS = 14
+    FADED,  # s, time up to which SPEED has faded; nan: it has not begun
+) = range(15)
+NUMBERS = 15
 WATCH, COLLECT = -1, -2  # beside LIMIT and TOUCH: how near the line is to itself; keep pairs for all of a step
 POINTS, NODES, OVERFLOW, GRIPS, FRESH, PAIRS, STALE = range(7)  # of `counts`; STALE: the tree is of other positions
 COUNTS = 7

@@ -14,6 +14,7 @@ from hybrid.kernels.self_contact import blank_contact_job, contact_task
 from hybrid.kernels.self_contact_friction import AT, GRIP, HELD, PIECE
 from hybrid.kernels.self_contact_law import DISTANCE, FORCE, NORMAL, WX, WY, P, Q
 from hybrid.kernels.self_contact_pairs import (
+    FADED,
     FRESH,
     FRICTION,
     GRIPS,
@@ -62,7 +63,8 @@ class SelfContact:
         contact.stiff[:] = np.maximum(STIFFNESS * bends / contact.width**2, TENSION * tension_scale * (bends == 0.0))
         contact.mass[:] = line.mass / pieces
         contact.numbers[WIDEST], contact.numbers[FRICTION] = contact.width.max(), friction
-        contact.numbers[SINCE], contact.numbers[NARROWEST] = np.nan, contact.width.min()
+        contact.numbers[SINCE], contact.numbers[FADED] = np.nan, np.nan
+        contact.numbers[NARROWEST] = contact.width.min()
         holds_twist = (
             line.spin.all()
             and bool((line.element * line.kb[:, 2])[[0, -1]].any())
@@ -130,7 +132,9 @@ class SelfContact:
         latest = numbers[SINCE] == t
         grips = contact.fresh[: counts[FRESH]] if latest else contact.grips[: counts[GRIPS]]
         stored = float(numbers[TRIED] if latest else numbers[STORED])
-        return {"speed": float(numbers[SPEED]), "stored": stored, "grips": grips.copy()}
+        return {
+            "speed": float(numbers[SPEED]), "faded": float(numbers[FADED]), "stored": stored, "grips": grips.copy(),
+        }  # fmt: skip
 
     def restore(self, saved: Mapping[str, Any]) -> None:
         """Go on from `checkpoint`; of another mesh with what lies on sample points of both.  ValueError: no grips."""
@@ -138,6 +142,7 @@ class SelfContact:
         if grips.ndim != 2 or grips.shape[1] != GRIP or not np.isfinite(grips).all():
             raise ValueError(f"self_contact/grips: expected rows of {GRIP} finite numbers")
         numbers[SPEED], numbers[STORED], numbers[SINCE] = saved["speed"], saved["stored"], np.nan
+        numbers[FADED] = saved.get("faded", np.nan)
         counts[GRIPS] = 0
         if self.contact.grips.size:
             grips = grips[: len(self.contact.grips)].copy()

@@ -12,7 +12,7 @@ from bits import Stopping, differences, went_on
 import hybrid
 from hybrid.kernels.books import FRICTION
 from hybrid.kernels.energies import observe
-from hybrid.kernels.self_contact_pairs import ENERGY
+from hybrid.kernels.self_contact_pairs import ENERGY, POINTS, SPEED
 from hybrid.kernels.self_distance import LEAST_DISTANCE
 from hybrid.simulation.transient import Transient
 from hybrid.view.summary import facts_of
@@ -162,6 +162,24 @@ def test_strands_of_a_loop_stay_a_diameter_apart() -> None:
         np.abs(result[name]).max() for name in result.names if name.startswith("work/") and name != "work/scheme"
     )
     assert result["work/scheme"].max() < 1e-3 * put_in
+
+
+def test_what_is_at_rest_does_not_depend_on_the_speed_of_the_collision() -> None:
+    """The law that a collision has made stiff fades."""
+    found = []
+    for speed in (0.0, 30.0):
+        simulation = hybrid.Simulation(hybrid.validate_scene(looped()))
+        simulation.advance(8.2)
+        run = simulation._loop.run
+        contact = run.run.contact.contact
+        assert contact.counts[POINTS] > 0
+        contact.numbers[SPEED] = max(speed, contact.numbers[SPEED])
+        simulation.advance(9.0)
+        found.append((float(run.state.T[-1]), run.run.contact.least_distance))
+        assert contact.numbers[SPEED] < 1.0
+    (tension, distance), (other, apart) = found
+    assert other == pytest.approx(tension, rel=2e-3)
+    assert apart == pytest.approx(distance, rel=2e-3)
 
 
 def test_friction_holds_a_loop_and_its_work_is_booked() -> None:
