@@ -57,6 +57,10 @@ class Table:
                 _keep(value, self.numbers[at:end].copy())
             self._bound[name] = value
 
+    def hold(self, **values: Any) -> None:
+        """Keep values alive whose numbers have been put in their places already."""
+        self._bound.update(values)
+
     def part(self, name: str) -> slice:
         """Where the numbers of a value are."""
         begin, end, _ = self._places[name]

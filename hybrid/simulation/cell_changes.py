@@ -389,12 +389,12 @@ class CellChanges:
         if run.push.size:
             at = self._layout(k, n)
             run.pushes = at.push, at.next_push
-        run.table.bind(
+        run.table.hold(
             line=line, sea=sea, old=run.states[0], new=run.states[1], was=run.pushes[0], now=run.pushes[1], work=work,
             books=books,
         )  # fmt: skip
         switching.take(model, zones)
-        switching.table.bind(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
+        switching.table.hold(line=line, sea=sea, old=run.states[0], new=run.states[1], zones=zones)
         owner.take(model, work)
 
 
