@@ -28,7 +28,7 @@ from hybrid.errors import EVENTS_BY_WEIGHT
 from hybrid.store.reader import Result
 
 MODELS = ("rod", "catenary", "zones", "adaptive")
-LONGEST = 20.0  # s of wall time: a case that takes longer has failed
+LONGEST = 20.0  # s of processor time: a case that takes longer has failed
 # Kinds of events that are no doubt about an answer: what the scene asked for, in other words.
 NEWS = {"end rotated in", "stability not judged", "zones fixed", "static friction neglected", "undamped"}
 DOUBTS = tuple(kind for kind in EVENTS_BY_WEIGHT if kind not in NEWS)
@@ -82,18 +82,18 @@ class TooLong(Exception):
 
 @contextmanager
 def deadline(seconds: float) -> Iterator[None]:
-    """Raise TooLong after so many seconds of wall time."""
+    """Raise TooLong after so many seconds of processor time."""
 
     def stop(*_: object) -> None:
         raise TooLong(f"more than {seconds:g} s")
 
-    before = signal.signal(signal.SIGALRM, stop)
-    signal.setitimer(signal.ITIMER_REAL, seconds)
+    before = signal.signal(signal.SIGPROF, stop)
+    signal.setitimer(signal.ITIMER_PROF, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_REAL, 0.0)
-        signal.signal(signal.SIGALRM, before)
+        signal.setitimer(signal.ITIMER_PROF, 0.0)
+        signal.signal(signal.SIGPROF, before)
 
 
 def compute(case: Case) -> Result:

@@ -61,7 +61,7 @@ TEXTS: dict[str, tuple[bytes, bool]] = {
     "ten megabytes of points": ((HEAD + TAIL.replace("equilibrium", "") + "output: {points: [" + "0.5, " * 2_000_000 + "]}\n").encode(), False),
     "ten megabytes of keys": ((HEAD + TAIL + "".join(f"k{i}: {i}\n" for i in range(700_000))).encode(), False),
 }  # fmt: skip
-SOON = 10.0  # s: a reader that takes longer hangs
+SOON = 10.0  # s of processor time: a reader that takes longer hangs
 
 
 def _read(content: bytes, name: str = "fuzz.yaml") -> tuple[Said, list[str]]:
