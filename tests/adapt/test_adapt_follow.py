@@ -13,6 +13,7 @@ from problems import order
 import hybrid
 from hybrid.adapt.manager import DomainManager
 from hybrid.kernels import books as b
+from hybrid.kernels import zone_step as z
 from hybrid.kernels.binding import Table
 from hybrid.kernels.cell_errors import CURVATURE, MOMENT, TENSION
 from hybrid.kernels.state import no_sea
@@ -43,6 +44,18 @@ def planned(curvature_error, shape, n=8, parts=64, length=10.0):
     for _ in range(5):  # for so long two cells must be too short before they become one
         plan_nodes(table.numbers)
     return zones._replace(here=manager.zones.plan.copy())
+
+
+def test_where_tension_is_lost_is_read_on_the_cells_of_now() -> None:
+    """Cells that follow change between two reviews, and the manager knows the layout of the last one."""
+    what = cable(10.0)
+    before, now = (layout(np.linspace(0.0, 10.0, 9), parts, "R" * 8) for parts in (4, 1))
+    managers = [DomainManager(what, x, 1e-2, 1.0, np.zeros(8, int), 1e12, curvature_error=0.03) for x in (before, now)]
+    manager, other = managers
+    manager.take(before, other.zones)  # as a change of cells leaves it
+    manager.zones.counts[z.KNOWN], manager.zones.past[:], manager.age = 1, 100.0, 1.0
+    state = state_on(on(what, now), hanging(0.5, 3.0)[0], lambda s: np.where(abs(s - 4.4) < 0.6, 1.0, 90.0))
+    assert manager._losing_tension(state).tolist() == [x == 3 for x in range(8)]
 
 
 @pytest.mark.parametrize("share", [0.01, 0.04])

@@ -28,7 +28,7 @@ from hybrid.cli.commands import main
 
 # s of processor time that a plan may foretell of a run that is made; longer ones are not: their plan said how long.
 LONGEST_PLANNED = 1.0
-# s of wall time after which a command is stopped: a plan promises an order of magnitude, of a machine with one user.
+# s of processor time after which a command is stopped: a plan promises an order of magnitude, of a machine with one user.
 LONGEST = 60.0
 # Bytes of address space that a command may take beyond what the process has.
 MEMORY = 4 * 2**30
