@@ -10,6 +10,7 @@ import numpy as np
 import hybrid
 import hybrid.simulation.time_loop
 import hybrid.solve.run
+from hybrid.kernels.cache import cache_folder
 from hybrid.simulation import progress as reports
 
 CLOCKS = ("steps/cpu",)
@@ -37,6 +38,11 @@ def differences(a: Path, b: Path) -> list[str]:
             if not np.array_equal(x.attrs.get(name), y.attrs.get(name)):
                 out.append(f"other attribute: {name}: {x.attrs.get(name)!r}, {y.attrs.get(name)!r}")
     return out
+
+
+def machine_code() -> set[Path]:
+    """Files of the kernels that have been compiled."""
+    return {*cache_folder().rglob("*.nbc")}
 
 
 class Stopping:

@@ -7,7 +7,7 @@ import time
 from pathlib import Path
 
 import pytest
-from bits import differences
+from bits import differences, machine_code
 
 import hybrid
 from hybrid.store.checkpoint import read_checkpoint
@@ -38,12 +38,13 @@ def kills(name: str, count: int, folder: Path, seed: int) -> dict[str, int]:
     def start(code: str, *arguments: str) -> subprocess.Popen[bytes]:
         return subprocess.Popen([sys.executable, "-c", code, *arguments], stderr=subprocess.PIPE)
 
-    for _ in range(2):  # kernels may have to be compiled
+    compiled: set[Path] | None = None
+    while compiled != (compiled := machine_code()):  # timed again if kernels had to be compiled
         begin = time.monotonic()
         process = start(RUN, scene, str(whole), *settings)
         said = process.communicate()[1].decode()
         assert process.returncode == 0, said
-    wall = time.monotonic() - begin
+        wall = time.monotonic() - begin
     went = {
         "killed": 0,
         "before there was a file": 0,
