@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -60,6 +61,13 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 @pytest.fixture(scope="module")
 def found(folder: Path) -> object:
     return hybrid.study(folder / "heave.yaml", workers=2, batch=2)
+
+
+@pytest.fixture(scope="module")
+def scheduler() -> Iterator[str]:
+    """Address of a scheduler with one worker, for studies that are not about how it starts: that takes seconds."""
+    with client_of(1, None) as client:
+        yield client.scheduler.address
 
 
 # ---- cases ----------------------------------------------------------------------------------------
@@ -213,7 +221,7 @@ def test_a_second_call_does_what_is_missing(folder: Path, found: object, monkeyp
     assert again.equals(found)
 
 
-def test_open_batches_are_computed_again(folder: Path, found: object, tmp_path: Path) -> None:
+def test_open_batches_are_computed_again(folder: Path, found: object, tmp_path: Path, scheduler: str) -> None:
     import shutil
 
     copy = tmp_path / "copy.zarr"
@@ -222,7 +230,7 @@ def test_open_batches_are_computed_again(folder: Path, found: object, tmp_path: 
     file.reopen([2, 3])
     assert file.open_batches() == [1] and (file.status == OPEN).sum() == 2
     before = hybrid.open_study(copy)["cpu"].values
-    after = hybrid.study(folder / "heave.yaml", copy, workers=1)
+    after = hybrid.study(folder / "heave.yaml", copy, scheduler=scheduler)
     assert after["force_max"].equals(found["force_max"])
     changed = np.flatnonzero(after["cpu"].values != before)
     assert set(changed.tolist()) <= {2, 3} and changed.size
@@ -256,15 +264,15 @@ def test_one_case_again_with_its_whole_result(folder: Path, found: object, tmp_p
         hybrid.study_case(folder / "heave.zarr", 9)
 
 
-def test_equilibria(folder: Path, tmp_path: Path) -> None:
+def test_equilibria(folder: Path, tmp_path: Path, scheduler: str) -> None:
     """A study at rest is the statics of each scene."""
     vary = {"cable.sections[0].mass": [6, 8]}
-    rest = hybrid.study(folder / "scene.yaml", tmp_path / "rest.zarr", vary=vary, static=True, workers=1)
+    rest = hybrid.study(folder / "scene.yaml", tmp_path / "rest.zarr", vary=vary, static=True, scheduler=scheduler)
     expected = hybrid.static(hybrid.load_scene(folder / "scene.yaml", ["cable.sections[0].mass=6"])).tension.max()
     assert rest["tension_max"].values[0] == pytest.approx(expected, rel=1e-12)
 
 
-def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> None:
+def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path, scheduler: str) -> None:
     """A quantity that no result has, or one with several values: said after the first batch; a corrected study takes the place."""
     vary = {"cable.sections[0].mass": [6, 8]}
     for wrong, text in (
@@ -273,7 +281,7 @@ def test_what_can_never_be_kept_ends_the_study(folder: Path, tmp_path: Path) -> 
     ):
         with pytest.raises(ResultError, match=text):
             hybrid.study(
-                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, workers=1
+                folder / "scene.yaml", tmp_path / "x.zarr", vary=vary, collect={"x": wrong}, static=True, scheduler=scheduler
             )  # fmt: skip
 
 
@@ -337,12 +345,18 @@ def test_files_are_those_beside_the_scene(folder: Path, tmp_path: Path, monkeypa
 
 
 @pytest.mark.parametrize("batch", [1, 3])
-def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path, batch: int) -> None:
+def test_lengths_that_differ_lose_profiles_alone(folder: Path, tmp_path: Path, scheduler: str, batch: int) -> None:
     """Where one section is longer a profile has other places: it is left out, and what is one number is kept."""
     kept = {"t": {"quantity": "tension", "take": ["max", "profile"]}}
     vary = {"cable.sections[0].length": [60, 62, 60]}
     found = hybrid.study(
-        folder / "scene.yaml", tmp_path / "l.zarr", vary=vary, collect=kept, static=True, workers=1, batch=batch
+        folder / "scene.yaml",
+        tmp_path / "l.zarr",
+        vary=vary,
+        collect=kept,
+        static=True,
+        scheduler=scheduler,
+        batch=batch,
     )
     assert np.isfinite(found["t_profile"].values[[0, 2]]).all()
     assert found["status"].values.tolist() == [DONE] * 3 and np.isfinite(found["t_max"].values).all()
@@ -391,7 +405,7 @@ output: {every: 0.5, quantities: {gap: {kind: clearance, line: port, point: [0, 
 """
 
 
-def test_several_lines(folder: Path, tmp_path: Path) -> None:
+def test_several_lines(folder: Path, tmp_path: Path, scheduler: str) -> None:
     """Each case is the run of its scene: of one line, of another whose name is no word, of what stands beside them."""
     (folder / "lines.yaml").write_text(LINES)
     vary = {"m": {"keys": ["lines.port.sections[0].mass", "lines.star-board.sections[0].mass"], "values": [3, 4]},
@@ -401,7 +415,9 @@ def test_several_lines(folder: Path, tmp_path: Path) -> None:
         "other": {"quantity": "end_force_end", "line": "star-board", "take": ["mean"]},
         "gap": {"quantity": "gap", "take": ["min"]},
     }
-    found = hybrid.study(folder / "lines.yaml", tmp_path / "lines.zarr", vary=vary, collect=collect, workers=1)
+    found = hybrid.study(
+        folder / "lines.yaml", tmp_path / "lines.zarr", vary=vary, collect=collect, scheduler=scheduler
+    )
     assert (found.status.values == DONE).all() and found.sizes["case"] == 4
     text = LINES.replace("mass: 3", "mass: 4").replace("position: [0, 0, 0]", "position: [-1, 0, 0]")
     (tmp_path / "one.yaml").write_text(text)
@@ -415,7 +431,7 @@ def test_several_lines(folder: Path, tmp_path: Path) -> None:
     again = hybrid.studies.study.case_of(tmp_path / "lines.zarr", int(last.case))
     assert again.gap.min() == float(last.gap)
     usual = hybrid.study(
-        folder / "lines.yaml", tmp_path / "usual.zarr", vary={"m": [3.0]} | {"m": vary["m"]}, workers=1
+        folder / "lines.yaml", tmp_path / "usual.zarr", vary={"m": [3.0]} | {"m": vary["m"]}, scheduler=scheduler
     )
     assert {"port_tension_max", "star_board_end_force_end_mean"} <= set(usual.data_vars)
 
