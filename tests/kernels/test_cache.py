@@ -66,7 +66,6 @@ def answer(folder: Path, script: str) -> float:
         "HYBRID_CACHE_DIR": str(folder / "cache"),
         "PYTHONWARNINGS": "error",
         "PYTHONDONTWRITEBYTECODE": "1",
-        "NUMBA_OPT": "1",  # compiled in less time, and run for a moment
     }
     command = [sys.executable, "-c", script]
     done = subprocess.run(command, env=environment, cwd=folder, capture_output=True, text=True)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 import textwrap
 import time
 from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -55,23 +57,46 @@ def shorten(path: Path) -> None:
     path.write_bytes(path.read_bytes()[:-8])
 
 
+CASES = {"rods": ["model=rod"], "model left open": [], "accuracy": ["accuracy={tension: 0.3%}", "time={duration: 12}"]}
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], Path]:
+    """A folder with a whole run of a case, and with one that was stopped and its files."""
+
+    @cache
+    def make(name: str) -> Path:
+        folder = tmp_path_factory.mktemp("made")
+        with pytest.MonkeyPatch.context() as patched:
+            stopping = Stopping(patched)
+            with pytest.MonkeyPatch.context() as other:
+                other.setattr(cases, "MOST_IN_MEMORY", 10**9)
+                hybrid.run(scene(*CASES[name]), folder / "whole.h5").close()
+            patched.setattr(cases, "MOST_IN_MEMORY", 0)
+            assert len(interrupted(scene(*CASES[name]), folder / "run.h5", stopping)) == 3
+        return folder
+
+    return make
+
+
 @pytest.mark.parametrize("harm", [None, Path.unlink, spoil, shorten])
-@pytest.mark.parametrize("settings", [["model=rod"], [], ["accuracy={tension: 0.3%}", "time={duration: 12}"]])
+@pytest.mark.parametrize("name", CASES)
 def test_a_stopped_run_goes_on_bit_for_bit(
-    settings: list[str], harm: Callable[[Path], None] | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    name: str,
+    harm: Callable[[Path], None] | None,
+    made: Callable[[str], Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """With the files, and without one of them: then all runs to compare with are computed again."""
-    stopping = Stopping(monkeypatch)
-    with monkeypatch.context() as other:
-        other.setattr(cases, "MOST_IN_MEMORY", 10**9)
-        hybrid.run(scene(*settings), tmp_path / "whole.h5").close()
-    found = interrupted(scene(*settings), tmp_path / "run.h5", stopping)
-    assert len(found) == 3
+    Stopping(monkeypatch)
+    for file in made(name).iterdir():
+        shutil.copy(file, tmp_path)
     computed: list[object] = []
     sample = cases.Case.sample
     monkeypatch.setattr(cases.Case, "sample", lambda self, *x: computed.append(x) or sample(self, *x))
     if harm is not None:
-        harm(found[1])
+        harm(rows(tmp_path)[1])
     hybrid.resume(tmp_path / "run.h5").close()
     assert differences(tmp_path / "whole.h5", tmp_path / "run.h5") == []
     assert (len(computed) >= 3) == (harm is not None)
