@@ -68,7 +68,7 @@ def test_a_page_of_two_files(tmp_path: Path, capsys: pytest.CaptureFixture[str])
     figures = json.loads(re.search(r'id="index">(.*?)</script>', page, re.S)[1])["figures"]  # type: ignore[index]
     assert [trace["name"] for trace in figures[0]["data"]] == ["near", "far"]
     capsys.readouterr()
-    assert command("report", files[0], files[0]) == 2
+    assert command("report", files[0], files[0]) == 1  # refused before anything is done
     assert "compared with itself" in capsys.readouterr().err
 
 
