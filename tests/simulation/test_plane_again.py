@@ -57,7 +57,7 @@ def test_a_run_that_comes_back_is_resumed_bit_for_bit(tmp_path: Path, monkeypatc
     """From before it leaves its plane, from space, and from the plane again."""
     scene = storm(333.0)
     hybrid.run(scene, tmp_path / "unbroken.h5").close()
-    stopping = Stopping(monkeypatch, at_every_output=False)
+    stopping = Stopping(monkeypatch)
     assert went_on(scene, tmp_path / "run.h5", stopping, [2000, 1000]) == 2
     assert differences(tmp_path / "unbroken.h5", tmp_path / "run.h5") == []
 
