@@ -87,6 +87,12 @@ def test_two_workers_and_overhead(folder: Path) -> None:
         f"{1e3 * alone:.1f} ms, one worker {1e3 * cpu:.1f} ({cpu / alone - 1:+.1%}), two {1e3 * cpu_of_two:.1f} "
         f"({cpu_of_two / alone - 1:+.1%}), all of the study included"
     )
+    missed = []
+    if one < 1.8 * two:
+        missed.append("two workers 1.8 x one")
+    if cpu > 1.08 * alone:
+        missed.append("8 % of processor time over bare runs")
+    assert not missed, missed
 
 
 def test_memory_of_a_worker_is_flat(folder: Path) -> None:
