@@ -12,13 +12,17 @@ import yaml
 from ruamel.yaml.resolver import implicit_resolvers
 from yaml.cyaml import CParser
 
-# Levels of tables within tables: a scene has eight, and deeper ones are ruamel.yaml's to refuse.
+# Levels of tables within tables: a scene has eight.
 DEEPEST = 100
 _TAG = "tag:yaml.org,2002:"
 
 
+class TooDeep(Exception):
+    """Tables or lists within more than DEEPEST others, on which ruamel.yaml would spend seconds."""
+
+
 def composed(text: str) -> yaml.Node | None:
-    """The tree of a text; None: ruamel.yaml has to say what is wrong with it."""
+    """The tree of a text; None: ruamel.yaml has to say what is wrong with it; TooDeep."""
     parser = CParser(text)
     try:
         return _tree(parser)
@@ -52,7 +56,7 @@ def _tree(parser: Any) -> yaml.Node:
             opened.append(node)
             inside.append([])
             if len(inside) > DEEPEST:
-                raise _Odd
+                raise TooDeep
         elif kind is yaml.MappingEndEvent or kind is yaml.SequenceEndEvent:
             values = inside.pop()
             pairs = zip(values[::2], values[1::2], strict=True)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 import warnings
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -31,6 +31,8 @@ SHOWN = 60
 MOST_VALUES = 500_000
 # Characters beyond which ruamel.yaml would take longer than all the rest of reading a scene, a tenth of a second.
 LONG = 10_000
+# Brackets beyond which they may be nested so deeply that ruamel.yaml would take seconds.
+MANY = 100
 
 # Names of points, bodies and lines are keys too: they may begin with a digit, and have hyphens and blanks in them.
 _PATH = re.compile(r"[A-Za-z_]\w*(\[\d+\])*(\.\w[\w -]*(\[\d+\])*)*")
@@ -102,17 +104,24 @@ def from_text(text: str) -> tuple[Node, list[Complaint]]:
         raise Unreadable(Complaint("scene", "nothing", "a scene", "begin with a table `cable:`", 1, 1))
     complaints: list[Complaint] = []
     try:
-        return _build(top, (), complaints, (), iter(range(MOST_VALUES))), complaints
+        if _values(top, (), {}) > MOST_VALUES:
+            given = f"more than {MOST_VALUES} values, aliases written out"
+            fix = "write it without aliases of aliases"
+            raise Unreadable(Complaint("YAML", given, "a scene of fewer", fix, *_place(top)))
+        return _build(top, (), complaints), complaints
     except RecursionError:
         raise Unreadable(Complaint("YAML", "nested too deeply", "a scene", _WRITE_OUT, 1, 1)) from None
 
 
 def _composed(text: str) -> Any:
     """The tree of a text as YAML sees it."""
-    if len(text) > LONG:
-        from hybrid.scene.yaml_nodes import composed
+    if len(text) > LONG or text.count("[") + text.count("{") > MANY:
+        from hybrid.scene.yaml_nodes import TooDeep, composed
 
-        found = composed(text)
+        try:
+            found = composed(text)
+        except TooDeep:
+            raise RecursionError from None
         if found is not None:
             return found
     return YAML(typ="safe", pure=True).compose(text)
@@ -154,21 +163,35 @@ def _odd_character(text: str, error: ReaderError) -> Complaint:
     return Complaint("YAML", given, "a text that YAML can read; it has no such characters", "take it out", line, column)
 
 
-def _build(node: Any, path: Place, complaints: list[Complaint], inside: tuple[int, ...], room: Iterator[int]) -> Node:
-    """The tree below a node of YAML, aliases written out; `room`: one for each value that there may still be."""
-    place = (node.start_mark.line + 1, node.start_mark.column + 1)
-    if next(room, None) is None:
-        given = f"more than {MOST_VALUES} values, aliases written out"
-        raise Unreadable(Complaint("YAML", given, "a scene of fewer", "write it without aliases of aliases", *place))
-    if id(node) in inside:
-        complaints.append(Complaint(dotted(path), "an alias of itself", "a value", "write it out", *place))
-        return Node(None, place)
-    inside = (*inside, id(node))
+def _place(node: Any) -> Spot:
+    return node.start_mark.line + 1, node.start_mark.column + 1
+
+
+def _values(node: Any, path: Place, known: dict[int, int]) -> int:
+    """Values below a node of YAML and itself, aliases written out, each node counted once; Unreadable for a cycle."""
+    if id(node) in known:
+        if known[id(node)] == 0:
+            fault = "an alias of itself", "a value", "write it out"
+            raise Unreadable(Complaint(dotted(path), *fault, *_place(node)))
+        return known[id(node)]
+    below: Any = ()
     if node.id == "sequence":
-        entries = [_build(entry, (*path, i), complaints, inside, room) for i, entry in enumerate(node.value)]
+        below = enumerate(node.value)
+    elif node.id == "mapping":
+        below = ((str(key.value), value) for key, value in node.value)
+    known[id(node)] = 0  # open
+    known[id(node)] = 1 + sum(_values(value, (*path, at), known) for at, value in below)
+    return known[id(node)]
+
+
+def _build(node: Any, path: Place, complaints: list[Complaint]) -> Node:
+    """The tree below a node of YAML, aliases written out."""
+    place = _place(node)
+    if node.id == "sequence":
+        entries = [_build(entry, (*path, i), complaints) for i, entry in enumerate(node.value)]
         return Node(entries, place)
     if node.id == "mapping":
-        return _build_table(node, path, complaints, inside, room, place)
+        return _build_table(node, path, complaints, place)
     written = f'"{node.value}"' if node.style in ("'", '"') else str(node.value)
     return Node(_scalar(node), place, written)
 
@@ -177,8 +200,6 @@ def _build_table(
     node: Any,
     path: Place,
     complaints: list[Complaint],
-    inside: tuple[int, ...],
-    room: Iterator[int],
     place: Spot,
 ) -> Node:
     table = Node({}, place)
@@ -200,7 +221,7 @@ def _build_table(
             table.value[before] = number
             continue
         if key_node.tag == "tag:yaml.org,2002:merge":
-            built = _build(value_node, path, complaints, inside, room)
+            built = _build(value_node, path, complaints)
             for source in built.value if isinstance(built.value, list) else [built]:
                 if isinstance(source.value, dict):
                     merged = {**source.value, **merged}
@@ -220,7 +241,7 @@ def _build_table(
             fix = f"keep one of them; the first is in line {first[0]}"
             complaints.append(Complaint(dotted((*path, key)), f"{key} twice", "every key once", fix, *spot))
             continue
-        value = _build(value_node, (*path, key), complaints, inside, room)
+        value = _build(value_node, (*path, key), complaints)
         if value.value is None and not value.written:
             value.place = spot  # an empty value stands nowhere; its key does
         table.value[key] = value
