@@ -118,8 +118,11 @@ def round_off_tension(line, ca, scale):
 def has_converged(size, before, it, part):
     """Outcome OK or NOT_CONVERGED after correction `it`, and the next correction as it is predicted.
 
-    size, before: of this correction and the one before, relative; part: of the correction that was made.
+    size, before: of this correction and the one before, relative; before: infinite for the first one and behind one
+    that was shortened, from which nothing can be predicted; part: of the correction that was made.
     """
+    if not before < math.inf:
+        return (OK if part == 1.0 and size <= TOLERANCE else NOT_CONVERGED), size
     ratio = size / before
     left = size * min(1.0, ratio * ratio)
     if part == 1.0:

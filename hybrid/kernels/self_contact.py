@@ -322,7 +322,7 @@ def place(contact, old, u):
 
 @inner
 def prepare(line, ends, contact, old, u, now, dt):
-    """Before a try of a step of dt from the time now: how much of the prediction is safe, and whether the step comes to contact.
+    """Before a try of a step of dt from the time now: how much of the prediction is safe, whether it comes to contact.
 
     The size of the law follows the speed of what meets.  While anything touches it fades to what still moves: what is
     at rest must not depend on how fast it came there.  It does not grow then, which would put energy in.
