@@ -45,6 +45,19 @@ from hybrid.kernels.rotations import (
     vec_mat,
 )
 
+# Stiffness of an angular spring of none, as a part of that of half a cell: nothing, but a number.
+NO_SPRING = 1e-12
+
+
+@inner
+def put_spring(spring, line, node):
+    """An angular spring in series with the half cell at a clamp, as hybrid.model.line.in_series has it."""
+    rigid = 0.5 * (line.kb[node, 0] + line.kb[node, 1])
+    spring = max(spring, NO_SPRING * max(line.kb[node, 0], line.kb[node, 1]))
+    for k in range(2):
+        line.kb[node, k] = 1.0 / (1.0 / line.kb[node, k] + 1.0 / spring)
+    line.hn[node] *= rigid / (0.5 * (line.kb[node, 0] + line.kb[node, 1]))
+
 
 @inner
 def relative_rotation(Ra, Rb):

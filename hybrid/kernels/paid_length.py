@@ -13,6 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from hybrid.kernels.compile import inner
+from hybrid.kernels.element import put_spring
 from hybrid.kernels.reel import (
     ACCELERATION,
     ADDED_N,
@@ -35,6 +36,7 @@ from hybrid.kernels.reel import (
     RATE,
     ROTARY,
     SIDE,
+    SPRING,
     STRETCH,
     TAU,
     WEIGHT,
@@ -129,7 +131,10 @@ def fill_cells(line, reel):
         for j in range(1 + PER_LENGTH):
             before[j] = q[j]
         begin = end
-    fill_node(line, node(line, reel, n), before, q, 0.0)
+    i = node(line, reel, n)
+    fill_node(line, i, before, q, 0.0)
+    if line.element[i] and reel.numbers[SPRING] < np.inf:
+        put_spring(reel.numbers[SPRING], line, i)
 
 
 @inner

@@ -38,8 +38,9 @@ PER_LENGTH = 20
     FLUX_BEFORE,  # and before the last step
     SIDE,  # 1 where the fairlead is the end of the line, -1 where it is the start
     FAR,  # m, arc length of the far end
-) = range(12)  # fmt: skip
-NUMBERS = 12
+    SPRING,  # N m/rad, of an angular spring between the fairlead and a clamped line; infinite: rigid
+) = range(13)  # fmt: skip
+NUMBERS = 13
 
 
 class Reel(NamedTuple):

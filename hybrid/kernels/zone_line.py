@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.compile import inner, kernel
+from hybrid.kernels.element import put_spring
 from hybrid.kernels.references import reader
 from hybrid.kernels.state import Floats, Line, blank_line
 from hybrid.kernels.zone_criteria import LOAD, SMOOTH, STEP, NodeKinds, blank_kinds
@@ -44,6 +45,7 @@ class Cable(NamedTuple):
     load: NDArray[np.int8]  # (n+1,) 1 where there is one
     turns: NDArray[np.int8]  # (n+1,) 1 where there is a swivel
     held: NDArray[np.int8]  # (2, 2) whether an element sits at the ends of a rod, and resists twist
+    springs: Floats  # (2,) N m/rad, angular springs between held tangents and a rod; infinite: rigid
 
 
 def blank_cable(n: int) -> Cable:
@@ -52,6 +54,7 @@ def blank_cable(n: int) -> Cable:
     return Cable(
         z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z(n), z((n, 3)), z((n, 3)), z(n),
         z(n), z((9, n + 1)), z(9), z(n + 1, np.int8), z(n + 1, np.int8), z((2, 2), np.int8),
+        np.full(2, np.inf),
     )  # fmt: skip
 
 
@@ -155,6 +158,8 @@ def fill_elements(cable, of, line):
             line.element[node] = 1
             for k in range(3):
                 line.kb[node, k], line.k0[node, k] = cable.B[j, k] / half, half * cable.kappa[j, k]
+            if cable.springs[end] < np.inf:
+                put_spring(cable.springs[end], line, node)
             if not cable.held[end, 1]:
                 line.kb[node, 2] = 0.0
 

@@ -1,4 +1,4 @@
-"""Ends of lines that are clamped to points and bodies: frames in axes of these, springs, axes of free points."""
+"""Ends of lines that are clamped to points and bodies: frames in axes of these, axes of free points."""
 
 from __future__ import annotations
 
@@ -14,8 +14,6 @@ from hybrid.model.ends import first_director, transported
 from hybrid.scene.ends import Triple
 from hybrid.scene.system import System
 
-# Stiffness of an angular spring of bend_stiffness 0, as a part of that of a cell: nothing, but a number.
-NO_SPRING = 1e-12
 STRAIGHT = (1.0, 0.0, 0.0)  # direction of a line through a free point in axes of that, where none is given
 SECOND = 1e-3  # weight of the material axis of the first line at a free point against directions of lines
 
@@ -97,21 +95,6 @@ def seated(seat: Floats, axes: Floats) -> tuple[Triple, Triple]:
     frame = (axes @ seat[:TURNS].reshape(3, 3)).tolist()
     tangent, director = ((frame[0][i], frame[1][i], frame[2][i]) for i in (2, 0))
     return tangent, director
-
-
-def with_springs(model: Model, springs: Sequence[float | None]) -> Model:
-    """The model with angular springs (N m/rad; None: rigid) between its clamps and the cells there, in series with half
-    a cell: `hn` is the length of line that would bend as much, so that kb hn stays the bending stiffness."""
-    if all(x is None for x in springs):
-        return model
-    kb, hn = model.line.kb.copy(), model.line.hn.copy()
-    for k, spring in enumerate(springs):
-        if spring is not None:
-            half, node = hn[-k], -k
-            own = kb[node, :2].copy()
-            kb[node, :2] = 1.0 / (1.0 / own + 1.0 / max(spring, NO_SPRING * own.max()))
-            hn[node] = half * own.mean() / kb[node, :2].mean()
-    return replace(model, line=model.line._replace(kb=kb, hn=hn))
 
 
 def with_clamps(model: Model, clamped: Line, ends: Sequence[int]) -> Model:

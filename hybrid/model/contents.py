@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import pi
+from math import inf, pi
 
 from hybrid.kernels.criteria import CRITERIA
 from hybrid.kernels.forces import FORCES, MAY_TOUCH, SELF_CONTACT, SELF_FRICTION
@@ -231,7 +231,9 @@ def contents_of(
         entries.append(Entry(what, loose is None, why, event="torque neglected" if loose is not None else ""))
     for name, end, cell in (("start", scene.ends.start, 0), ("end", scene.ends.end, -1)):
         moving = end.prescribed_motion is not None
-        entries.append(Entry(f"ends.{name}: {end.kind}{', moving' if moving else ''}", True, f"ends.{name}"))
+        spring = f", by a spring of {end.spring:g} N m/rad" if end.spring < inf else ""
+        text = f"ends.{name}: {end.kind}{spring}{', moving' if moving else ''}"
+        entries.append(Entry(text, True, f"ends.{name}"))
         if not line.spin[cell] and end.acts_by_moment:
             entries.append(
                 Entry(

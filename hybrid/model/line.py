@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from hybrid.kernels.axial_law import SHIFT, follow_law
+from hybrid.kernels.element import NO_SPRING
 from hybrid.kernels.forces import AXIAL_LAW, BODIES, ROTARY, STIFFNESS_DAMPING
 from hybrid.kernels.state import NO_ADDRESS, NO_LAW, NO_TABLE, NO_TORSION, Floats, Line, blank_line, no_work, state_for
 from hybrid.model.material import Material
@@ -105,9 +106,22 @@ def _elements(
             element[node] = 1
             kb[node] = B[cell] / half[cell]
             k0[node] = half[cell] * kappa[cell]
+            if material.springs[k] < np.inf:
+                kb[node], hn[node] = in_series(kb[node], hn[node], material.springs[k])
             if not material.held_twist[k]:
                 kb[node, 2] = 0.0
     return element, kb, k0, hn
+
+
+def in_series(kb: Floats, hn: float, spring: float) -> tuple[Floats, float]:
+    """Stiffness (3,) N m of the element at a clamp, and the length, m, that it stands for, with an angular spring
+
+    (N m/rad) between the clamp and the half cell, whose are kb and hn: the length of line that would bend as much, so
+    that kb hn stays the bending stiffness.  (The same: kernels.element.put_spring.)
+    """
+    out = kb.copy()
+    out[:2] = 1.0 / (1.0 / kb[:2] + 1.0 / max(spring, NO_SPRING * kb[:2].max()))
+    return out, float(hn * kb[:2].mean() / out[:2].mean())
 
 
 def torsion_zones(material: Material, h: Floats, rod: np.ndarray, of: np.ndarray) -> Floats:

@@ -47,6 +47,7 @@ class LineOnBase:
             load=load,
             turns=turns,
             held=held,
+            springs=np.array(material.springs),
         )
         self._line_job, self._kinds_job = Table(blank_line_job()), Table(blank_kinds_job())
         self._bits, self._of = -1, of

@@ -69,6 +69,7 @@ class Material:
     swivels: Floats  # arc lengths at which both sides turn freely against each other
     held_tangent: tuple[bool, bool]  # whether an element sits at the ends of a rod
     held_twist: tuple[bool, bool]  # and resists twist
+    springs: tuple[float, float]  # N m/rad, angular springs between held tangents and a rod; infinite: rigid
     at: Floats  # (P,) m, where points are
     lift: Floats  # (P,) N, constant force upwards of each
     footing: Floats  # (P,) m, cable that presses on the seabed as much as each; empty without a seabed
@@ -191,6 +192,7 @@ def _bare(scene: Scene, bounds: Floats, of: list[Section]) -> Material:
         outer_diameter=np.array([x.diameter or 0.0 for x in of]),
         held_tangent=(start.held_tangent is not None, end.held_tangent is not None),
         held_twist=(start.holds_twist, end.holds_twist),
+        springs=(start.spring, end.spring),
         at=np.zeros(0), lift=np.zeros(0), footing=np.zeros(0), points={name: np.zeros(0) for name in POINT},
     )  # fmt: skip
     if any(x.curve for x in of):

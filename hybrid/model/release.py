@@ -34,9 +34,9 @@ def without_clamp(line: Line, node: int) -> Line:
     """The line without the element between an end and its clamp; without a clamp, the line itself."""
     if not line.element[node]:
         return line
-    element, kb, k0 = line.element.copy(), line.kb.copy(), line.k0.copy()
-    element[node], kb[node], k0[node] = 0, 0.0, 0.0
-    return line._replace(element=element, kb=kb, k0=k0)
+    element, kb, k0, hn = line.element.copy(), line.kb.copy(), line.k0.copy(), line.hn.copy()
+    element[node], kb[node], k0[node], hn[node] = 0, 0.0, 0.0, 0.5 * abs(line.s[node] - line.s[-2 if node else 1])
+    return line._replace(element=element, kb=kb, k0=k0, hn=hn)
 
 
 def released_as(model: Model, released: np.ndarray, t: float) -> Model:

@@ -22,7 +22,6 @@ from hybrid.model.clamps import (
     seated,
     untwisted,
     with_clamps,
-    with_springs,
 )
 from hybrid.model.initial_shape import dead_loads
 from hybrid.model.sea import surroundings
@@ -223,7 +222,7 @@ class _Lines:
         system, l = self._system, self._names.index(name)
         directions = self._directions(name)
         clamps = [system.clamp(name, end) for end in ("start", "end")]
-        model = with_springs(self._shape(name, directions), [x.bend_stiffness if x else None for x in clamps])
+        model = self._shape(name, directions)
         carried = system.carried(name)
         if carried:
             other = build(self._scene(name, carried, directions), like=model)

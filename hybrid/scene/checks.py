@@ -7,6 +7,7 @@ when another table of the scene cannot be read.
 from __future__ import annotations
 
 import inspect
+import math
 from collections.abc import Callable, Iterator, Mapping
 from functools import cache
 from typing import Any
@@ -122,7 +123,7 @@ def _rods_can_bend(cable: Cable, model: Model) -> Iterator[Finding]:
             yield Finding((*here, "torsional_stiffness"), f"a number > 0, in N m^2, because {over}", fix)
 
 
-def _corrections_know_the_bending(cable: Cable, model: Model) -> Iterator[Finding]:
+def _corrections_know_the_bending(cable: Cable, model: Model, ends: Ends) -> Iterator[Finding]:
     """What is corrected must bend, and the same in all directions: a catenary does not know which way it lies."""
     zones = model.zones if isinstance(model, ZonesModel) else ()
     corrected = any(isinstance(z, CorrectedZone) for z in zones)
@@ -132,6 +133,10 @@ def _corrections_know_the_bending(cable: Cable, model: Model) -> Iterator[Findin
             yield Finding(("model", "zones", k), "no catenary beside a corrected one: a correction shifts all", fix)
     if not (corrected or isinstance(model, CorrectedModel) or (isinstance(model, AdaptiveModel) and model.correct)):
         return
+    for name, end in ends.named().items():
+        if end.spring < math.inf:
+            expected = "nothing, because what is corrected for bending (model) knows rigid clamps alone"
+            yield Finding(("ends", name, "bend_stiffness"), expected, "leave it out, or write `model: rod`")
     for i, section in enumerate(cable.sections):
         here: Place = ("cable", "sections", i)
         if not section.weakest_bending and not isinstance(model, AdaptiveModel):

@@ -9,6 +9,7 @@ from pydantic import Discriminator, Field, Tag, model_validator
 
 from hybrid.scene.analysis import RodModel, RodZone, ZonesModel
 from hybrid.scene.base import Direction, Finding, Kinds, NonNegative, Table, Truth, by_kind, parallel, refuse
+from hybrid.scene.ends import BEND_STIFFNESS
 from hybrid.scene.motion_tables import TURNS
 from hybrid.scene.points import FixedPoint, FreePoint
 
@@ -42,11 +43,7 @@ class ClampedConnection(Table):
         "counts; absent: no twist of a line that is bent the short way from tangent to tangent [-]",
     )
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
-    bend_stiffness: NonNegative | None = Field(
-        default=None,
-        description="of an angular spring between the tangent and the line, as of a bend stiffener or a flexible "
-        "joint; 0: torque passes, and no bending moment; absent: rigid [N m/rad]",
-    )
+    bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
 
     @model_validator(mode="after")
     def _normal_is_across(self) -> ClampedConnection:

@@ -6,6 +6,7 @@ end out of it.  Directions need not have length one; whoever uses them normalise
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import AliasChoices, Discriminator, Field, Tag, model_validator
@@ -56,6 +57,10 @@ class Release(Table):
         return self
 
 
+BEND_STIFFNESS = (
+    "of an angular spring between the tangent and the line, as of a bend stiffener or a flexible joint; 0: torque "
+    "passes, and no bending moment; absent: rigid [N m/rad]"
+)
 _PAYOUT = "line is paid out here, or taken in, by a winch; at one end alone; absent: its length stays"
 _RELEASE = "when the end is let go and becomes free, in mid-motion; absent: never"
 
@@ -95,6 +100,11 @@ class EndTable(Table):
         """Turns about its tangent by which the scene twists the end."""
         turns: float | None = self._own("turns")
         return turns or 0.0
+
+    @property
+    def spring(self) -> float:
+        """Stiffness of the angular spring between a tangent that is held and the cable [N m/rad]; infinite: rigid."""
+        return math.inf
 
     @property
     def holds_twist(self) -> bool:
@@ -174,6 +184,7 @@ class Clamped(EndTable):
     normal: Direction | None = Field(default=None, description=_NORMAL)
     turns: Number = Field(default=0.0, description=_TURNS)
     swivel: Truth = Field(default=False, description="true: free to spin about the tangent, so no torque")
+    bend_stiffness: NonNegative | None = Field(default=None, description=BEND_STIFFNESS)
     motion: Motion | None = Field(default=None, description="how the clamp moves and turns; absent: not at all")
     payout: Payout | None = Field(default=None, description=_PAYOUT)
     release_at: Release | None = Field(default=None, description=_RELEASE)
@@ -181,6 +192,17 @@ class Clamped(EndTable):
     @property
     def holds_twist(self) -> bool:
         return not self.swivel
+
+    @property
+    def spring(self) -> float:
+        return math.inf if self.bend_stiffness is None else self.bend_stiffness
+
+    @model_validator(mode="after")
+    def _something_is_held(self) -> Clamped:
+        if self.swivel and self.bend_stiffness == 0.0:
+            expected = "false, because with bend_stiffness 0 nothing is left that is held"
+            refuse([Finding(("swivel",), expected, "write kind: pinned, without a tangent: it turns freely")])
+        return self
 
 
 class Guided(EndTable):

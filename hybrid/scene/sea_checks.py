@@ -206,6 +206,7 @@ def arbiter_knows(environment: Environment, cable: Cable, ends: Ends, solver: st
         and not (isinstance(fluid.current, tuple) and isinstance(fluid.current[0], float)),
         "attachments": bool(cable.attachments),
         "bodies": bool(ends.bodies()),
+        "angular springs (bend_stiffness)": any(x.spring < math.inf for x in ends.both),
         "vessels": any(m is not None and m.vessel is not None for m in (x.prescribed_motion for x in ends.both)),
     }
     unknown = [name for name, there in beyond.items() if there]

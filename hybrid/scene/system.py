@@ -255,8 +255,11 @@ class System(Table):
             elif held is None:
                 ends[key] = Pinned(position=place, motion=motion)
             else:
-                swivel = getattr(line.connections, key).swivel
-                ends[key] = Clamped(position=place, tangent=held[0], normal=held[1], swivel=swivel, motion=motion)
+                clamp = getattr(line.connections, key)
+                ends[key] = Clamped(
+                    position=place, tangent=held[0], normal=held[1], swivel=clamp.swivel,
+                    bend_stiffness=clamp.bend_stiffness, motion=motion,
+                )  # fmt: skip
         if places is not None:
             return (scene or self.scene_of(name)).model_copy(update={"ends": Ends(**ends)})
         tables: dict[str, Any] = {

@@ -61,6 +61,7 @@ class PayingOut:
         place, before = float(plan.nodes[count - 1]), float(plan.nodes[count - 2])
         numbers = reel.numbers
         numbers[p.SIDE], numbers[p.FAR] = (1.0 if plan.side else -1.0), plan.far
+        numbers[p.SPRING] = plan.cable.springs[plan.side]
         numbers[p.PLACE], numbers[p.FADING] = place, -np.inf
         numbers[p.LONGEST], numbers[p.SHORTEST] = plan.limits(count)
         reel.rest[:-1], reel.rest[-1] = amount_between(plan.pieces, before, place), place - before
@@ -266,8 +267,8 @@ class PayingOut:
         self.count, self.law = count, law
         self.reel = self._blank(count)
         numbers = np.asarray(given.get("numbers", np.zeros(0)))
-        if numbers.shape == (p.SIDE,):  # of a file from before there were winches at the start
-            given["numbers"] = np.concatenate([numbers, self.reel.numbers[p.SIDE :]])
+        if numbers.shape in ((p.SIDE,), (p.SPRING,)):  # of a file from before winches at the start, or before springs
+            given["numbers"] = np.concatenate([numbers, self.reel.numbers[numbers.size :]])
         kept = matched({"winch": self.winch} | given, {name: getattr(self.reel, name) for name in KEPT}, "payout")
         if not (kept["span"].min() > 0.0 and kept["numbers"][p.LENGTH] > kept["numbers"][p.PLACE]):
             raise ValueError("a length that no line has")

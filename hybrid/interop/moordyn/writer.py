@@ -434,6 +434,9 @@ class _Writer:
         section = self.scene.cable.sections[0 if name == "start" else -1]
         if not section.weakest_bending:
             return self._point(kind, place, _Lump())
+        if end.bend_stiffness is not None:
+            expected = "a clamp without a spring, because a deck has no others"
+            self._refuse(f"ends.{name}.bend_stiffness", f"{end.bend_stiffness:g}", expected, "leave it out")
         if not end.swivel:
             self.notes.append(f"ends.{name} holds the twist; MoorDyn has none")
         return self._rod(kind, self._moved(place), end.tangent, name)
